@@ -1,0 +1,1 @@
+//! The ground side as a library.

@@ -1,0 +1,3 @@
+//! `ground`: the one host program.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Behaviours of the unit, under std and in virtual time: what the tests share.

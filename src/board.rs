@@ -1,0 +1,105 @@
+//! What the unit needs from whatever it runs on: an STM32F407, its emulation, or a host in virtual time.
+
+use embedded_hal_async::{i2c::I2c, spi::SpiDevice};
+use embedded_io_async::{Read, Write};
+
+use crate::{crash::CrashRecord, mode::Resume, recorder::Recorder};
+
+/// The set of types a board provides. One implementation per board file; none of them is named in `src/`.
+pub trait Board {
+    /// The sensor bus, on which a TCA9548A selects one plate at a time.
+    type SensorBus: I2c + RecoverBus;
+    /// One ADIS16265: SPI mode 3, 16-bit words, its own chip select.
+    type Gyro: SpiDevice<u16>;
+    /// Telemetry line to the vehicle, 115200 8N1. Never read.
+    type Telemetry: Write;
+    /// Umbilical line towards the ground.
+    type UmbilicalTx: Write;
+    /// Umbilical line from the ground. An error means bytes were lost (framing, overrun); the next read goes on.
+    type UmbilicalRx: Read;
+    /// Lift-off and micro-g inputs.
+    type Discretes: Discretes;
+    /// Independent watchdog.
+    type Watchdog: Watchdog;
+    /// What survives a reset but not a power cut.
+    type Retained: Retained;
+    /// The flight recorder.
+    type Recorder: Recorder;
+}
+
+/// Everything [`crate::unit::run`] takes, ready to use: clocks run, peripherals are configured, nothing has been sent.
+pub struct Parts<B: Board> {
+    /// I2C bus of the accelerometers, magnetometers and thermometers.
+    pub sensor_bus: B::SensorBus,
+    /// Gyros of plates 1 to 4.
+    pub gyros: [B::Gyro; 4],
+    /// Telemetry line.
+    pub telemetry: B::Telemetry,
+    /// Umbilical, unit to ground.
+    pub umbilical_tx: B::UmbilicalTx,
+    /// Umbilical, ground to unit.
+    pub umbilical_rx: B::UmbilicalRx,
+    /// Lift-off and micro-g inputs.
+    pub discretes: B::Discretes,
+    /// Watchdog, already running.
+    pub watchdog: B::Watchdog,
+    /// Retained memory.
+    pub retained: B::Retained,
+    /// Flight recorder.
+    pub recorder: B::Recorder,
+    /// Why the unit started.
+    pub reset: ResetCause,
+}
+
+/// Frees a bus on which a transfer was abandoned.
+///
+/// A dropped transfer leaves the STM32F4's I2C peripheral with a pending START and never recovers by itself
+/// (virtual-board notes; RM0090 section 27.6.1, SWRST). After `recover` the peripheral is reset and configured
+/// again, up to nine SCL pulses have freed a slave that held SDA (I2C specification UM10204, section 3.1.16), and the
+/// TCA9548A's reset line has been pulsed, so no channel is selected.
+#[allow(async_fn_in_trait)]
+pub trait RecoverBus {
+    /// Takes at most 1 ms; says whether both lines are high afterwards.
+    async fn recover(&mut self) -> bool;
+}
+
+/// The two discrete inputs of the vehicle, `true` = asserted, polarity already undone.
+pub trait Discretes {
+    /// Lift-off, not debounced.
+    fn lift_off(&mut self) -> bool;
+    /// Micro-gravity, not debounced.
+    fn micro_g(&mut self) -> bool;
+}
+
+/// The independent watchdog.
+pub trait Watchdog {
+    /// Restarts its count.
+    fn feed(&mut self);
+}
+
+/// Memory that survives a reset. A power cut loses it; the implementation tells by its checksum.
+pub trait Retained {
+    /// What the unit was doing before the reset; `None` after a power cut or when the content is damaged.
+    fn resume(&mut self) -> Option<Resume>;
+    /// Replaces it.
+    fn keep(&mut self, resume: &Resume);
+    /// The crash that caused this start, once: taking it clears it.
+    fn take_crash(&mut self) -> Option<CrashRecord>;
+    /// Restarts the unit.
+    fn reset(&mut self) -> !;
+}
+
+/// Why the unit started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum ResetCause {
+    /// Power was applied, or browned out.
+    #[default]
+    PowerOn,
+    /// The watchdog was not fed.
+    Watchdog,
+    /// The firmware asked for it, which it does after a panic or fault.
+    Software,
+    /// The reset pin.
+    Pin,
+}

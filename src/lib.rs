@@ -1,0 +1,21 @@
+//! The e-MEMS attitude sensor unit: sixteen sensors to packets, console and telemetry.
+//!
+//! Data flows one way, and the modules are declared in that order:
+//!
+//! ```text
+//! bytes --sensor--> counts --unit::acquire--> Sample --packet--> 156 bytes -> telemetry, umbilical, recorder
+//!                   gyro counts --increments--> rotation increments --derived--> derived frame
+//! umbilical bytes --command--> Command --mode--> Mode, Task
+//! ```
+//!
+//! Everything outside [`sensor`] and [`unit`] is a function of its arguments: no clock, no I/O, no allocation.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod board;
+pub mod crash;
+pub mod mode;
+pub mod packet;
+pub mod recorder;
+pub mod sample;
+pub mod sensor;

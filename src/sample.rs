@@ -1,0 +1,113 @@
+//! One read cycle: sixteen sensors in counts, when each was sampled, and which failed.
+//!
+//! The order of [`SENSORS`] is *the* reading order: of the acquisition, of the packet's fields (Tab. A.3) and of the
+//! error identifier, in which bit `k` (least significant first) is the `k`-th sensor read.
+
+/// Sent for a value that was not read. No sensor of the unit produces it: their codes have at most 14 bits.
+pub const NOT_READ: i16 = i16::MIN;
+
+/// How many sensors a cycle reads.
+pub const SENSOR_COUNT: usize = 16;
+
+/// What a sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Kind {
+    /// LIS331HH.
+    Accelerometer,
+    /// HMC5883L.
+    Magnetometer,
+    /// ADIS16265: rate and its own temperature.
+    Gyro,
+    /// TMP102.
+    Thermometer,
+}
+
+/// One of the sixteen sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Sensor {
+    /// What it measures.
+    pub kind: Kind,
+    /// Plate it sits on, 0 to 3 (the thesis' plates 1 to 4).
+    pub plate: usize,
+}
+
+/// The reading order (thesis, App. B.2: accelerometers first; Tab. A.3 for the rest).
+pub const SENSORS: [Sensor; SENSOR_COUNT] = {
+    const KINDS: [Kind; 4] = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer];
+    let mut order = [Sensor { kind: Kind::Accelerometer, plate: 0 }; SENSOR_COUNT];
+    let mut slot = 0;
+    while slot < SENSOR_COUNT {
+        order[slot] = Sensor { kind: KINDS[slot / 4], plate: slot % 4 };
+        slot += 1;
+    }
+    order
+};
+
+/// Which sensors failed in a cycle: the packet's bytes 5 to 8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Errors(pub u16);
+
+impl Errors {
+    /// Marks the sensor in reading-order `slot`.
+    pub fn set(&mut self, slot: usize) {
+        self.0 |= 1 << slot;
+    }
+
+    /// Whether the sensor in reading-order `slot` failed.
+    pub fn contains(self, slot: usize) -> bool {
+        self.0 >> slot & 1 == 1
+    }
+}
+
+/// What one read cycle gives. Counts are as Tab. A.3 carries them: right-justified two's complement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Sample {
+    /// Cycle number, wraps.
+    pub counter: u16,
+    /// Sensors that failed.
+    pub errors: Errors,
+    /// [LIS331HH counts] x, y, z of each plate, plate frame `p`.
+    pub acc_p: [[i16; 3]; 4],
+    /// [HMC5883L counts] x, y, z of each plate, plate frame `p`.
+    pub mag_p: [[i16; 3]; 4],
+    /// [ADIS16265 counts] rate about each plate's sense axis.
+    pub gyro: [i16; 4],
+    /// [ADIS16265 counts] temperature of each gyro; 0 is 25 degC.
+    pub gyro_temperature: [i16; 4],
+    /// [TMP102 counts] temperature of each plate.
+    pub temperature: [i16; 4],
+    /// Debounced lift-off, `true` = asserted.
+    pub lift_off: bool,
+    /// Debounced micro-gravity, `true` = asserted.
+    pub micro_g: bool,
+    /// [us] start of the cycle, since the unit's clock started.
+    pub start_us: u64,
+    /// [us] instant at which each sensor was sampled, after `start_us`; [`NO_SLOT`] if it was not.
+    pub slots_us: [u32; SENSOR_COUNT],
+}
+
+/// Slot time of a sensor that was not sampled.
+pub const NO_SLOT: u32 = u32::MAX;
+
+impl Sample {
+    /// A cycle in which nothing has been read yet: every value [`NOT_READ`], every error bit set.
+    pub fn unread(counter: u16, start_us: u64) -> Self {
+        Sample {
+            counter,
+            errors: Errors(u16::MAX),
+            acc_p: [[NOT_READ; 3]; 4],
+            mag_p: [[NOT_READ; 3]; 4],
+            gyro: [NOT_READ; 4],
+            gyro_temperature: [NOT_READ; 4],
+            temperature: [NOT_READ; 4],
+            lift_off: false,
+            micro_g: false,
+            start_us,
+            slots_us: [NO_SLOT; SENSOR_COUNT],
+        }
+    }
+}
