@@ -10,7 +10,10 @@ fn main() {
     let board = env::var("EMEMS_BOARD").unwrap_or_else(|_| "obc".into());
     println!("cargo:rustc-cfg=board=\"{board}\"");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
-        println!("cargo:rustc-link-search={}", env::var("CARGO_MANIFEST_DIR").expect("set by cargo"));
+        println!(
+            "cargo:rustc-link-search={}",
+            env::var("CARGO_MANIFEST_DIR").expect("set by cargo")
+        );
         for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
             println!("cargo:rustc-link-arg-bins={argument}");
         }

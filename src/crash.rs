@@ -53,7 +53,14 @@ impl CrashRecord {
             from += 1;
         }
         let place = String::try_from(place.get(from..).unwrap_or("")).unwrap_or_default();
-        CrashRecord { cause, at, lr, cfsr, uptime_us, place }
+        CrashRecord {
+            cause,
+            at,
+            lr,
+            cfsr,
+            uptime_us,
+            place,
+        }
     }
 
     /// The 64 bytes that are kept.
@@ -99,7 +106,14 @@ mod tests {
     use super::*;
 
     fn record() -> CrashRecord {
-        CrashRecord::new(CrashCause::Panic, 123, 0, 0, 5_000_000_000, "a/rather/long/path/to/src/unit/acquire.rs")
+        CrashRecord::new(
+            CrashCause::Panic,
+            123,
+            0,
+            0,
+            5_000_000_000,
+            "a/rather/long/path/to/src/unit/acquire.rs",
+        )
     }
 
     #[test]

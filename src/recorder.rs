@@ -67,7 +67,10 @@ pub struct MemoryRecorder<const N: usize> {
 impl<const N: usize> MemoryRecorder<N> {
     /// An empty recorder.
     pub const fn new() -> Self {
-        MemoryRecorder { records: Vec::new(), erasing: false }
+        MemoryRecorder {
+            records: Vec::new(),
+            erasing: false,
+        }
     }
 }
 
@@ -80,7 +83,10 @@ impl<const N: usize> Recorder for MemoryRecorder<N> {
     }
 
     async fn read(&mut self, index: u32) -> Result<Record, RecorderError> {
-        self.records.get(index as usize).cloned().ok_or(RecorderError::NoSuchRecord)
+        self.records
+            .get(index as usize)
+            .cloned()
+            .ok_or(RecorderError::NoSuchRecord)
     }
 
     fn start_erase(&mut self) {
@@ -109,7 +115,10 @@ mod tests {
     use super::*;
 
     fn record(start_us: u64) -> Record {
-        Record { start_us, packet: [b'0'; PACKET_BYTES] }
+        Record {
+            start_us,
+            packet: [b'0'; PACKET_BYTES],
+        }
     }
 
     #[test]
@@ -129,6 +138,13 @@ mod tests {
         recorder.start_erase();
         assert_eq!(block_on(recorder.append(&record(2))), Err(RecorderError::Erasing));
         assert_eq!(block_on(recorder.erase_step()), Ok(0));
-        assert_eq!(recorder.status(), RecorderStatus { used: 0, capacity: 2, erasing: None });
+        assert_eq!(
+            recorder.status(),
+            RecorderStatus {
+                used: 0,
+                capacity: 2,
+                erasing: None
+            }
+        );
     }
 }

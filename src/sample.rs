@@ -36,10 +36,16 @@ pub struct Sensor {
 /// The reading order (thesis, App. B.2: accelerometers first; Tab. A.3 for the rest).
 pub const SENSORS: [Sensor; SENSOR_COUNT] = {
     const KINDS: [Kind; 4] = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer];
-    let mut order = [Sensor { kind: Kind::Accelerometer, plate: 0 }; SENSOR_COUNT];
+    let mut order = [Sensor {
+        kind: Kind::Accelerometer,
+        plate: 0,
+    }; SENSOR_COUNT];
     let mut slot = 0;
     while slot < SENSOR_COUNT {
-        order[slot] = Sensor { kind: KINDS[slot / 4], plate: slot % 4 };
+        order[slot] = Sensor {
+            kind: KINDS[slot / 4],
+            plate: slot % 4,
+        };
         slot += 1;
     }
     order
@@ -52,8 +58,13 @@ pub struct Errors(pub u16);
 
 impl Errors {
     /// Marks the sensor in reading-order `slot`.
-    pub fn set(&mut self, slot: usize) {
+    pub fn insert(&mut self, slot: usize) {
         self.0 |= 1 << slot;
+    }
+
+    /// Clears the sensor in reading-order `slot`.
+    pub fn remove(&mut self, slot: usize) {
+        self.0 &= !(1 << slot);
     }
 
     /// Whether the sensor in reading-order `slot` failed.
@@ -62,10 +73,11 @@ impl Errors {
     }
 }
 
-/// What one read cycle gives. Counts are as Tab. A.3 carries them: right-justified two's complement.
+/// What one read cycle measured: all that a packet carries. Counts are as Tab. A.3 has them: right-justified two's
+/// complement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Sample {
+pub struct Reading {
     /// Cycle number, wraps.
     pub counter: u16,
     /// Sensors that failed.
@@ -84,19 +96,12 @@ pub struct Sample {
     pub lift_off: bool,
     /// Debounced micro-gravity, `true` = asserted.
     pub micro_g: bool,
-    /// [us] start of the cycle, since the unit's clock started.
-    pub start_us: u64,
-    /// [us] instant at which each sensor was sampled, after `start_us`; [`NO_SLOT`] if it was not.
-    pub slots_us: [u32; SENSOR_COUNT],
 }
 
-/// Slot time of a sensor that was not sampled.
-pub const NO_SLOT: u32 = u32::MAX;
-
-impl Sample {
+impl Reading {
     /// A cycle in which nothing has been read yet: every value [`NOT_READ`], every error bit set.
-    pub fn unread(counter: u16, start_us: u64) -> Self {
-        Sample {
+    pub fn unread(counter: u16) -> Self {
+        Reading {
             counter,
             errors: Errors(u16::MAX),
             acc_p: [[NOT_READ; 3]; 4],
@@ -106,8 +111,21 @@ impl Sample {
             temperature: [NOT_READ; 4],
             lift_off: false,
             micro_g: false,
-            start_us,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
         }
     }
+}
+
+/// Slot time of a sensor that was not sampled.
+pub const NO_SLOT: u32 = u32::MAX;
+
+/// A read cycle with its times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Sample {
+    /// What was measured.
+    pub reading: Reading,
+    /// [us] start of the cycle, since the unit's clock started.
+    pub start_us: u64,
+    /// [us] instant at which each sensor was sampled, after `start_us`, in reading order; [`NO_SLOT`] if it was not.
+    pub slots_us: [u32; SENSOR_COUNT],
 }
