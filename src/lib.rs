@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod board;
+pub mod command;
 pub mod crash;
 pub mod mode;
 pub mod packet;
