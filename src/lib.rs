@@ -15,6 +15,9 @@
 pub mod board;
 pub mod command;
 pub mod crash;
+pub mod derived;
+pub mod geometry;
+pub mod increments;
 pub mod mode;
 pub mod packet;
 pub mod recorder;
