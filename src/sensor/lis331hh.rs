@@ -9,7 +9,7 @@ use embedded_hal_async::{delay::DelayNs, i2c::I2c};
 
 use super::{Error, Register};
 
-/// Bus address with SA0 low (datasheet table 12).
+/// Bus address with SA0 low (datasheet section 5.1.1).
 pub const ADDRESS: u8 = 0x18;
 
 /// Content of WHO_AM_I (datasheet section 7.1).
@@ -25,11 +25,11 @@ const ZYXOR: u8 = 0x80;
 /// STATUS_REG: all axes are new.
 const ZYXDA: u8 = 0x08;
 
-/// [counts at 6 g] by how much self-test may move x, y, z (datasheet table 3, Vst). Upper limits and all of z are the
+/// [counts at 6 g] by how much self-test may move x, y, z (datasheet, mechanical characteristics, Vst at 6 g). Upper limits and all of z are the
 /// datasheet's; its lower limit of x and y is taken from the sister part LIS331DLH (120 of at most 550 mg), whose upper
 /// limit is this one's too.
 const SELF_TEST_COUNTS: [(i16, i16); 3] = [(40, 180), (40, 180), (220, 370)];
-/// [ms] five samples at the slowest rate: the new state has passed the filter (datasheet table 3 note: 1/ODR + 1 ms).
+/// [ms] five samples at the slowest rate: the new state has passed the filter (datasheet, turn-on time: 1/ODR + 1 ms).
 const SETTLING_MS: u32 = 100;
 
 const fn register(name: &'static str, address: u8) -> Register {
@@ -37,7 +37,7 @@ const fn register(name: &'static str, address: u8) -> Register {
     Register { part, name, address }
 }
 
-/// Registers (datasheet table 16). The five settings and the seven bytes from STATUS_REG on are each read in one go.
+/// Registers (datasheet section 6). The five settings and the seven bytes from STATUS_REG on are each read in one go.
 const WHO_AM_I: Register = register("WHO_AM_I", 0x0F);
 const CTRL_REG1: Register = register("CTRL_REG1", 0x20);
 const CTRL_REG2: Register = register("CTRL_REG2", 0x21);
@@ -49,7 +49,7 @@ const OUT_X: Register = register("OUT_X", 0x28);
 const OUT_Y: Register = register("OUT_Y", 0x2A);
 const OUT_Z: Register = register("OUT_Z", 0x2C);
 
-/// Full scale (datasheet table 26, FS1 FS0).
+/// Full scale (datasheet, CTRL_REG4 description, FS1 FS0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum FullScale {
@@ -60,7 +60,7 @@ pub enum FullScale {
 }
 
 impl FullScale {
-    /// [mg/count] sensitivity (datasheet table 3, So).
+    /// [mg/count] sensitivity (datasheet, mechanical characteristics, So).
     pub const fn mg_per_count(self) -> f32 {
         match self {
             FullScale::G6 => 3.0,
@@ -70,7 +70,7 @@ impl FullScale {
     }
 }
 
-/// Output data rate (datasheet table 20, DR1 DR0). The low-pass filter follows it: 37, 74, 292, 780 Hz.
+/// Output data rate (datasheet, CTRL_REG1 description, DR1 DR0). The low-pass filter follows it: 37, 74, 292, 780 Hz.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Rate {
@@ -181,7 +181,7 @@ impl<I2C: I2c> Lis331hh<I2C> {
     }
 
     async fn self_test_change(&mut self, delay: &mut impl DelayNs) -> Result<[i16; 3], Error<I2C::Error>> {
-        // The limits hold at 6 g only (datasheet table 3).
+        // The limits hold at 6 g only (mechanical characteristics, Vst).
         let mut samples = [[0; 3]; 2];
         for (sample, ctrl_reg4) in samples.iter_mut().zip([BDU, BDU | ST]) {
             self.write(CTRL_REG4, &[CTRL_REG4.address, ctrl_reg4]).await?;
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn verify_finds_a_part_that_restarted() {
-        // Power-on values (datasheet table 16): power-down, 50 Hz, axes on.
+        // Power-on values (datasheet section 6): power-down, 50 Hz, axes on.
         let power_on = settings([0x07, 0, 0, 0, 0]);
         let error = with(&[power_on], async |part| part.verify(FAST_24G).await).unwrap_err();
         let (register, wrote, read) = (CTRL_REG1, 0x3F, 0x07);
@@ -359,8 +359,7 @@ mod tests {
         let too_far = Error::SelfTest {
             register: OUT_Z,
             change: 455,
-            least: 220,
-            most: 370,
+            limits: (220, 370),
         };
         assert_eq!(self_test(455), Err(too_far));
     }

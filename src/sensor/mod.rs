@@ -8,8 +8,10 @@
 
 use core::fmt;
 
+pub mod hmc5883l;
 pub mod lis331hh;
 pub mod tca9548a;
+pub mod tmp102;
 
 /// A register of a part, as errors name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,10 +75,8 @@ pub enum Error<E> {
         register: Register,
         /// [counts] how far it moved.
         change: i16,
-        /// [counts] how far it must move.
-        least: i16,
-        /// [counts] how far it may move.
-        most: i16,
+        /// [counts] how far it must, and may, move.
+        limits: (i16, i16),
     },
 }
 
@@ -95,14 +95,13 @@ impl<E> Error<E> {
         if read == wrote { Ok(()) } else { Err(lost) }
     }
 
-    fn unless_within(register: Register, change: i16, (least, most): (i16, i16)) -> Result<(), Self> {
+    fn unless_within(register: Register, change: i16, limits: (i16, i16)) -> Result<(), Self> {
         let off = Error::SelfTest {
             register,
             change,
-            least,
-            most,
+            limits,
         };
-        if (least..=most).contains(&change) {
+        if (limits.0..=limits.1).contains(&change) {
             Ok(())
         } else {
             Err(off)
@@ -142,8 +141,7 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
             Error::SelfTest {
                 register,
                 change,
-                least,
-                most,
+                limits: (least, most),
             } => write!(
                 f,
                 "{register} moved {change} counts in self-test, not {least} to {most}: keep it still and repeat, or replace it"
@@ -183,12 +181,11 @@ mod tests {
         check(lost, "holds 0x10, written was 0x00:", "configure");
         check(Error::Garbage { register, read: 0xFFFF }, "read 0xFFFF,", "probe");
         check(Error::Stuck { register, read }, "stays 0x10:", "cycle");
-        let (change, least, most) = (455, 220, 370);
+        let (change, limits) = (455, (220, 370));
         let moved = Error::SelfTest {
             register,
             change,
-            least,
-            most,
+            limits,
         };
         check(moved, "moved 455 counts in self-test, not 220 to 370:", "replace");
     }
