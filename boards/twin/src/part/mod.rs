@@ -3,8 +3,10 @@
 //! Both boards drive them byte by byte: the emulated one as the STM32's peripherals clock them, the host one as it
 //! plays an `embedded-hal` transaction. Time is always an argument, in nanoseconds since power-on.
 
+pub mod hmc5883l;
 pub mod lis331hh;
 pub mod signal;
+pub mod tmp102;
 
 use std::sync::Arc;
 
