@@ -207,6 +207,15 @@ impl Hmc5883l {
         };
         u8::from(self.locked) << 1 | u8::from(self.ready && !writing)
     }
+
+    /// The pointer moves on after every byte, round the six data registers and round the end (register access).
+    fn step(&mut self) {
+        self.pointer = match self.pointer {
+            DATA_Y_LSB => DATA_X_MSB,
+            IDENTIFICATION_C.. => CRA,
+            pointer => pointer + 1,
+        };
+    }
 }
 
 impl I2cPart for Hmc5883l {
@@ -261,17 +270,6 @@ impl I2cPart for Hmc5883l {
         self.begin(now);
         self.activity = Activity::Single {
             due: now.saturating_add(TURN_ON_NS),
-        };
-    }
-}
-
-impl Hmc5883l {
-    /// The pointer moves on after every byte, round the six data registers and round the end (register access).
-    fn step(&mut self) {
-        self.pointer = match self.pointer {
-            DATA_Y_LSB => DATA_X_MSB,
-            IDENTIFICATION_C.. => CRA,
-            pointer => pointer + 1,
         };
     }
 }

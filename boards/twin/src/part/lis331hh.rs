@@ -5,28 +5,15 @@
 //! auto-increment, the high-pass on the output (FDS), self-test, clipping at the code. Not modelled: interrupts, sleep
 //! to wake-up, the reference mode of the high-pass and its reset by reading HP_FILTER_RESET.
 
-use core::f64::consts::TAU;
+mod converter;
 
 use nalgebra::Vector3;
 
-use super::{
-    I2cPart, Input, Nanos,
-    signal::{ConversionClock, LowPass, Specimen, quantise, seconds},
-};
+use super::{I2cPart, Input, Nanos, signal::Specimen};
+use converter::Converter;
 
 /// 7-bit address with SA0 low.
 pub const ADDRESS: u8 = 0x18;
-
-/// [m/s2] of one g, for the datasheet's mg.
-const STANDARD_GRAVITY: f64 = 9.80665;
-/// [s] of the unit's nominal 25 Hz bandwidth.
-const TAU_S: f64 = 1.0 / (TAU * 25.0);
-/// [m/s2] deflection by the self-test actuator: typical 300, 300, 350 mg (of the LIS331DLH, whose element it shares).
-const SELF_TEST: Vector3<f64> = Vector3::new(
-    0.30 * STANDARD_GRAVITY,
-    0.30 * STANDARD_GRAVITY,
-    0.35 * STANDARD_GRAVITY,
-);
 
 const WHO_AM_I: u8 = 0x0F;
 const CTRL_REG1: u8 = 0x20;
@@ -42,7 +29,7 @@ const WRITABLE: [u8; 12] = [0x20, 0x21, 0x22, 0x23, 0x24, 0x26, 0x30, 0x32, 0x33
 /// The two bytes of one axis, kept together while only one has been read (BDU).
 #[derive(Clone, Copy)]
 struct Held {
-    code: i16,
+    output: i16,
     first: u8,
 }
 
@@ -55,21 +42,13 @@ pub struct Lis331hh {
     expects_sub_address: bool,
     /// `None` in power-down.
     converter: Option<Converter>,
-    /// Codes of the last conversion, if it has been worked out.
-    codes: [i16; 3],
+    /// Output registers, left-justified.
+    outputs: [i16; 3],
+    /// The last conversion is not yet worked out into `outputs`.
     stale: bool,
     /// Conversions of each axis since it was last read, at most 2 (2 = overrun).
     unread: [u8; 3],
     held: [Option<Held>; 3],
-}
-
-/// The running converter at one output data rate.
-struct Converter {
-    clock: ConversionClock,
-    latest: i64,
-    low_pass: LowPass<3>,
-    /// With its time constant; built when FDS asks for it.
-    high_pass: Option<(f64, LowPass<3>)>,
 }
 
 impl Lis331hh {
@@ -82,7 +61,7 @@ impl Lis331hh {
             sub_address: 0,
             expects_sub_address: false,
             converter: None,
-            codes: [0; 3],
+            outputs: [0; 3],
             stale: false,
             unread: [0; 3],
             held: [None; 3],
@@ -95,47 +74,36 @@ impl Lis331hh {
         self.registers[usize::from(address & 0x7F)]
     }
 
+    /// CTRL_REG1 bits Xen, Yen, Zen.
+    fn is_enabled(&self, axis: usize) -> bool {
+        self.register(CTRL_REG1) >> axis & 1 == 1
+    }
+
     /// Takes notice of the conversions completed up to `now`.
     fn advance(&mut self, now: Nanos) {
-        let Some(converter) = &mut self.converter else {
-            return;
-        };
-        let latest = converter.clock.latest(now);
-        if latest <= converter.latest {
+        let fresh = self.converter.as_mut().map_or(0, |converter| converter.advance(now));
+        if fresh == 0 {
             return;
         }
-        let fresh = (latest - converter.latest).min(2) as u8;
-        converter.latest = latest;
         self.stale = true;
-        let enabled = self.register(CTRL_REG1);
-        for (axis, unread) in self.unread.iter_mut().enumerate() {
-            if enabled >> axis & 1 == 1 {
-                *unread = (*unread + fresh).min(2);
+        for axis in 0..3 {
+            if self.is_enabled(axis) {
+                self.unread[axis] = (self.unread[axis] + fresh).min(2);
             }
         }
     }
 
     /// Works out the last conversion, with the registers as they were when it was made.
     fn convert(&mut self) {
+        let ctrl_reg4 = self.register(CTRL_REG4);
         let Some(converter) = self.converter.as_mut().filter(|_| self.stale) else {
             return;
         };
         self.stale = false;
-        let [ctrl_reg1, ctrl_reg4] = [CTRL_REG1, CTRL_REG4].map(|r| self.registers[usize::from(r)]);
-        let (k, input) = (converter.latest, &*self.force_p);
-        let mut force = converter.low_pass.at(k, input);
-        if let Some((tau_s, low_pass)) = &mut converter.high_pass {
-            // High-pass after low-pass, both of first order, split into partial fractions; the bias goes with the DC.
-            force = (force - low_pass.at(k, input)) * (*tau_s / (*tau_s - TAU_S));
-        } else {
-            // CTRL_REG4 bits ST, STsign.
-            let self_test = f64::from(ctrl_reg4 >> 1 & 1) * if ctrl_reg4 & 8 == 0 { 1.0 } else { -1.0 };
-            force += self.specimen.bias + SELF_TEST * self_test;
-        }
-        force += self.specimen.noise(converter.clock.instant_ns(k));
-        for (axis, code) in self.codes.iter_mut().enumerate() {
-            if ctrl_reg1 >> axis & 1 == 1 {
-                *code = (quantise(force[axis], sensitivity(ctrl_reg4), -2048..=2047) << 4) as i16;
+        let codes = converter.codes(&*self.force_p, &self.specimen, ctrl_reg4);
+        for (axis, code) in codes.into_iter().enumerate() {
+            if self.is_enabled(axis) {
+                self.outputs[axis] = code << 4;
             }
         }
     }
@@ -148,52 +116,29 @@ impl Lis331hh {
         self.advance(now);
         self.convert();
         let before = self.register(address);
-        // BOOT (CTRL_REG2 bit 7) clears itself; the other bits of a boot are not seen from outside.
+        // BOOT (CTRL_REG2 bit 7) clears itself; a boot is not otherwise seen from outside.
         let value = if address == CTRL_REG2 { value & 0x7F } else { value };
         self.registers[usize::from(address)] = value;
         match address {
-            CTRL_REG1 if (value ^ before) & 0xF8 != 0 => self.start_converter(now),
-            CTRL_REG2 => self.start_high_pass(),
+            // PM and DR.
+            CTRL_REG1 if (value ^ before) & 0xF8 != 0 => {
+                self.converter = Converter::start(value, self.register(CTRL_REG2), self.specimen.phase, now);
+            }
+            CTRL_REG2 => {
+                if let Some(converter) = &mut self.converter {
+                    converter.select_filter(value);
+                }
+            }
             _ => {}
         }
-    }
-
-    fn start_converter(&mut self, now: Nanos) {
-        self.converter = period_ns(self.register(CTRL_REG1)).map(|period_ns| {
-            let clock = ConversionClock::new(period_ns, self.specimen.phase);
-            // Turn-on time: 1/ODR + 1 ms (mechanical characteristics).
-            let first = clock.latest(now.saturating_add(period_ns + 1_000_000)) + 1;
-            Converter {
-                clock,
-                latest: first - 1,
-                low_pass: LowPass::new(clock, TAU_S),
-                high_pass: None,
-            }
-        });
-        self.start_high_pass();
-    }
-
-    fn start_high_pass(&mut self) {
-        let ctrl_reg2 = self.register(CTRL_REG2);
-        let period = period_ns(self.register(CTRL_REG1)).unwrap_or(1);
-        let Some(converter) = &mut self.converter else {
-            return;
-        };
-        // FDS; cut-off ODR / (6 HPc), HPc = 8, 16, 32, 64 (CTRL_REG2 description).
-        converter.high_pass = (ctrl_reg2 & 0x10 != 0).then(|| {
-            let periods = 6.0 * f64::from(8_u32 << (ctrl_reg2 & 3)) / TAU;
-            let tau_s = periods * seconds(period as i64);
-            (tau_s, LowPass::new(converter.clock, tau_s))
-        });
     }
 
     fn status(&self) -> u8 {
         let bits = |least: u8| {
             let axes = (0..3).fold(0, |bits, axis| bits | u8::from(self.unread[axis] >= least) << axis);
-            (axes, u8::from(axes == 7) << 3)
+            axes | u8::from(axes == 7) << 3
         };
-        let ((new, all_new), (over, all_over)) = (bits(1), bits(2));
-        (over | all_over) << 4 | new | all_new
+        bits(2) << 4 | bits(1)
     }
 
     fn output(&mut self, address: u8) -> u8 {
@@ -207,47 +152,27 @@ impl Lis331hh {
                 self.convert();
                 self.unread[axis] = 0;
                 Held {
-                    code: self.codes[axis],
+                    output: self.outputs[axis],
                     first: byte,
                 }
             }
         };
         self.held[axis] = (block_data_update && held.first == byte).then_some(held);
         // BLE (CTRL_REG4 bit 6) puts the high byte at the lower address.
-        let [low, high] = held.code.to_le_bytes();
+        let [low, high] = held.output.to_le_bytes();
         if (byte & 1 == 1) ^ (ctrl_reg4 & 0x40 != 0) {
             high
         } else {
             low
         }
     }
-}
 
-/// [m/s2] of one 12-bit digit: 3, 6, 12 mg for FS = 00, 01, 11 (mechanical characteristics).
-fn sensitivity(ctrl_reg4: u8) -> f64 {
-    let digit_mg = match ctrl_reg4 >> 4 & 3 {
-        0 => 3.0,
-        1 => 6.0,
-        _ => 12.0,
-    };
-    digit_mg * 1e-3 * STANDARD_GRAVITY
-}
-
-/// [ns] between conversions by PM and DR of CTRL_REG1; `None` in power-down (and for the reserved PM = 111).
-fn period_ns(ctrl_reg1: u8) -> Option<u64> {
-    let period_ms = match (ctrl_reg1 >> 5, ctrl_reg1 >> 3 & 3) {
-        (1, 0) => 20.0,
-        (1, 1) => 10.0,
-        (1, 2) => 2.5,
-        (1, _) => 1.0,
-        (2, _) => 2000.0,
-        (3, _) => 1000.0,
-        (4, _) => 500.0,
-        (5, _) => 200.0,
-        (6, _) => 100.0,
-        _ => return None,
-    };
-    Some((period_ms * 1e6) as u64)
+    /// With bit 7 of the sub-address set, it moves on after every byte (I2C operation).
+    fn step(&mut self) {
+        if self.sub_address & 0x80 != 0 {
+            self.sub_address = self.sub_address.wrapping_add(1) | 0x80;
+        }
+    }
 }
 
 impl I2cPart for Lis331hh {
@@ -290,26 +215,19 @@ impl I2cPart for Lis331hh {
         self.sub_address = 0;
         self.expects_sub_address = false;
         self.converter = None;
-        self.codes = [0; 3];
+        self.outputs = [0; 3];
         self.stale = false;
         self.unread = [0; 3];
         self.held = [None; 3];
     }
 }
 
-impl Lis331hh {
-    /// With bit 7 of the sub-address set, it moves on after every byte (I2C operation).
-    fn step(&mut self) {
-        if self.sub_address & 0x80 != 0 {
-            self.sub_address = self.sub_address.wrapping_add(1) | 0x80;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use core::f64::consts::TAU;
     use std::sync::Arc;
 
+    use super::converter::{STANDARD_GRAVITY, TAU_S};
     use super::*;
     use crate::part::testing::{read, write};
 
@@ -408,7 +326,7 @@ mod tests {
         write(&mut part, &[0x20, ON_50_HZ], 0);
         write(&mut part, &[0x21, 0x10], 0);
         assert_eq!(axes(&mut part, 9_000 * MS), [0; 3]);
-        // Cut-off 50 Hz / 48; 200 ms after the step; the node before it makes it 20 ms/8 early.
+        // Cut-off 50 Hz / 48; 200 ms after the step.
         let tau_s = 48.0 / TAU / 50.0;
         let gain = tau_s / (tau_s - TAU_S);
         let expected = 1000.0 * gain * (-0.2 / tau_s).exp();
