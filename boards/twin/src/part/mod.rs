@@ -3,6 +3,7 @@
 //! Both boards drive them byte by byte: the emulated one as the STM32's peripherals clock them, the host one as it
 //! plays an `embedded-hal` transaction. Time is always an argument, in nanoseconds since power-on.
 
+pub mod adis16265;
 pub mod hmc5883l;
 pub mod lis331hh;
 pub mod signal;
