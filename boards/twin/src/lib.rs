@@ -2,5 +2,6 @@
 
 pub mod geometry;
 pub mod part;
+pub mod plant;
 pub mod run;
 pub mod truth;
