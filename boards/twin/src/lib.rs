@@ -1,7 +1,8 @@
 //! The twin: physical truth, the parts at register level, and the host board on which the unit runs in virtual time.
 
-pub mod geometry;
 pub mod environment;
+pub mod geometry;
+pub mod host;
 pub mod motion;
 pub mod part;
 pub mod plant;
