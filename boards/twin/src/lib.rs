@@ -3,5 +3,6 @@
 pub mod environment;
 pub mod motion;
 pub mod part;
+pub mod recording;
 pub mod run;
 pub mod truth;
