@@ -42,6 +42,17 @@ impl<const N: usize> Series<N> {
         self
     }
 
+    /// The same, unless `each` refuses a value.
+    pub fn try_map<E>(
+        mut self,
+        mut each: impl FnMut(SVector<f64, N>) -> Result<SVector<f64, N>, E>,
+    ) -> Result<Self, E> {
+        for value in &mut self.values {
+            *value = each(*value)?;
+        }
+        Ok(self)
+    }
+
     /// Index of the sample before `t_s`, and how far [0, 1] it is from there to the next.
     pub fn interval(&self, t_s: f64) -> (usize, f64) {
         let (first, last) = self.span_s();

@@ -44,6 +44,18 @@ pub struct Located<const N: usize> {
     pub lines: Vec<u64>,
 }
 
+impl<const N: usize> Located<N> {
+    /// The samples replaced one by one, unless `each`, which is told the line, refuses one.
+    pub fn try_map<E>(
+        self,
+        mut each: impl FnMut(u64, SVector<f64, N>) -> Result<SVector<f64, N>, E>,
+    ) -> Result<Series<N>, E> {
+        let mut lines = self.lines.into_iter();
+        self.series
+            .try_map(|value| each(lines.next().unwrap_or_default(), value))
+    }
+}
+
 impl Table {
     /// Reads a file.
     pub fn open(path: &Path, wanted: &[&str]) -> Result<Self, FileError> {
