@@ -157,7 +157,7 @@ mod tests {
                 let t = PAD_S + f64::from(i) * step;
                 let force_n = world.motion.at(t).attitude.q_nb * world.at(t).force_b;
                 // Inverse-square gravity; at 240 km it is 7 % less than at the pad.
-                let gravity = world.environment.gravity * (6.371e6 / (6.371e6 + height) as f64).powi(2);
+                let gravity = world.environment.gravity * (6.371e6 / (6.371e6_f64 + height)).powi(2);
                 speed += (-force_n.z - gravity) * step;
                 height += speed * step;
                 (t - PAD_S, height, speed)
