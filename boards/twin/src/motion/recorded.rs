@@ -175,6 +175,13 @@ mod tests {
     }
 
     #[test]
+    fn coarse_samples_keep_their_derivatives_exact() {
+        // 60 to 100 deg apart the spline leaves the unit sphere by up to a fifth, so that every term of w' counts.
+        let rows = "0,1,0,0,0\n1,0.8,0.6,0,0\n2,0.5,0.5,0.7,0.1\n3,0.1,0.3,0.3,0.9\n4,0.1,-0.4,0.4,0.8\n";
+        check::derivatives(&read(&format!("t_s,qw,qx,qy,qz\n{rows}")).unwrap(), 0.01, 3.99);
+    }
+
+    #[test]
     fn a_sampled_motion_comes_back_with_its_rates_and_accelerations() {
         let (rate, acc) = errors(&tumble(|_| false));
         // Spline truncation h^3 and h^2 / 12 of a motion of 1 rad/s, at h = 10 ms; rounding 1e-9 / h and / h^2.
