@@ -1,3 +1,5 @@
+//! The table against literal files, good and bad; each refusal by its full text.
+
 use std::io::{Cursor, Write};
 
 use flate2::Compression;
