@@ -6,5 +6,6 @@ pub mod host;
 pub mod motion;
 pub mod part;
 pub mod plant;
+pub mod recording;
 pub mod run;
 pub mod truth;
