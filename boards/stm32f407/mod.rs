@@ -6,7 +6,7 @@
 //! | sensor bus, 400 kHz | I2C1 | DMA1 stream 0 receives, stream 7 transmits, both channel 1 |
 //! | gyros, mode 3, 1.3125 MHz, 16 bit | SPI1 | none: [`gyros`] says why |
 //! | telemetry, 115200 8N1 | USART2 | DMA1 stream 6 transmits, channel 4 |
-//! | umbilical, 115200 8N1 | USART3 | DMA1 stream 1 receives, stream 3 transmits, both channel 4 |
+//! | umbilical, 115200 8N1 | USART3 | DMA1 stream 3 transmits, channel 4; bytes are received one by one |
 //! | watchdog, 1 s | IWDG | |
 //!
 //! In: the pins. Out: the [`Parts`](emems::board::Parts) of [`Stm32f407`]. All of the firmware's unsafe code is in
@@ -28,7 +28,7 @@ use emems::recorder::MemoryRecorder;
 
 pub use self::bus::SensorBus;
 pub use self::gyros::gyros;
-pub use self::lines::{Umbilical, VehicleInputs, telemetry};
+pub use self::lines::{VehicleInputs, telemetry, umbilical};
 pub use self::retained::ResetSafeRam;
 
 bind_interrupts!(struct Irqs {
@@ -38,8 +38,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM7 => dma::InterruptHandler<peripherals::DMA1_CH7>;
     USART2 => usart::InterruptHandler<peripherals::USART2>;
     DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
-    USART3 => usart::InterruptHandler<peripherals::USART3>;
-    DMA1_STREAM1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+    USART3 => lines::ReceiverInterrupt, usart::InterruptHandler<peripherals::USART3>;
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
 });
 
