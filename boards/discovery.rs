@@ -20,9 +20,10 @@ mod stm32f407;
 
 use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
-use emems::recorder::MemoryRecorder;
 
-use self::stm32f407::{ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, start, telemetry, umbilical};
+use self::stm32f407::{
+    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+};
 
 /// The types of this board.
 pub type Discovery = Stm32f407<PB8, PB7>;
@@ -46,7 +47,7 @@ pub fn init() -> Parts<Discovery> {
         discretes: VehicleInputs::new(p.PE12, p.PE13),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: MemoryRecorder::new(),
+        recorder: recorder(),
         reset,
     }
 }

@@ -21,9 +21,10 @@ mod stm32f407;
 
 use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
-use emems::recorder::MemoryRecorder;
 
-use self::stm32f407::{ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, start, telemetry, umbilical};
+use self::stm32f407::{
+    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+};
 
 /// The types of this board.
 pub type Obc = Stm32f407<PB6, PB7>;
@@ -47,7 +48,7 @@ pub fn init() -> Parts<Obc> {
         discretes: VehicleInputs::new(p.PC6, p.PC7),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: MemoryRecorder::new(),
+        recorder: recorder(),
         reset,
     }
 }

@@ -57,10 +57,7 @@ pub fn umbilical(
     });
     // SAFETY: `Irqs` binds the handlers, and what they need is static.
     unsafe { typelevel::USART3::enable() };
-    let receiver = Receiver {
-        lost: false,
-        _pin: pin,
-    };
+    let receiver = Receiver { lost: false, _pin: pin };
     (line, receiver)
 }
 
