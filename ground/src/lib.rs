@@ -1,1 +1,4 @@
 //! The ground side as a library.
+
+pub mod channel;
+pub mod log;
