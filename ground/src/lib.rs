@@ -1,1 +1,3 @@
 //! The ground side as a library.
+
+pub mod console;
