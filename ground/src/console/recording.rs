@@ -45,8 +45,11 @@ impl Recording {
         let commands_path = commands_path(path);
         let mut commands = append(&commands_path).map_err(failed(&commands_path))?;
         let time = humantime::format_rfc3339_millis(clock);
-        writeln!(commands, "# {time} {line}: times in seconds from here, offset in bytes of the recording")
-            .map_err(failed(&commands_path))?;
+        writeln!(
+            commands,
+            "# {time} {line}: times in seconds from here, offset in bytes of the recording"
+        )
+        .map_err(failed(&commands_path))?;
         Ok(Recording {
             path: path.to_owned(),
             received,
@@ -119,7 +122,8 @@ mod tests {
         second.keep(b"01").unwrap();
         second.note(Duration::ZERO, "unplugged").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"@0001");
-        let title = "# 1970-01-01T00:00:00.000Z /dev/ttyUSB0: times in seconds from here, offset in bytes of the recording\n";
+        let title =
+            "# 1970-01-01T00:00:00.000Z /dev/ttyUSB0: times in seconds from here, offset in bytes of the recording\n";
         assert_eq!(
             fs::read_to_string(commands_path(&path)).unwrap(),
             format!("{title}    1.500000          3 sent G_ST\n{title}    0.000000          5 unplugged\n")
@@ -130,12 +134,21 @@ mod tests {
     fn a_file_that_cannot_be_written_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("missing/pad.log");
-        let error = Recording::open(&path, "x", SystemTime::UNIX_EPOCH).err().unwrap().to_string();
-        assert!(error.starts_with(&format!("cannot record to {}: ", path.display())), "{error}");
+        let error = Recording::open(&path, "x", SystemTime::UNIX_EPOCH)
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            error.starts_with(&format!("cannot record to {}: ", path.display())),
+            "{error}"
+        );
     }
 
     #[test]
     fn the_default_name_is_the_instant() {
-        assert_eq!(default_path(SystemTime::UNIX_EPOCH), Path::new("umbilical-19700101T000000Z.log"));
+        assert_eq!(
+            default_path(SystemTime::UNIX_EPOCH),
+            Path::new("umbilical-19700101T000000Z.log")
+        );
     }
 }

@@ -34,7 +34,9 @@ enum Port {
     Unknown,
     Open(Box<dyn SerialPort>),
     /// Not to be looked for before this time.
-    Absent { until: Duration },
+    Absent {
+        until: Duration,
+    },
 }
 
 impl SerialLine {
@@ -96,7 +98,10 @@ impl Line for SerialLine {
             Port::Unknown | Port::Absent { .. } => return self.look(wait),
         };
         let mut piece = [0; PIECE_BYTES];
-        let read = port.set_timeout(wait).map_err(io::Error::from).and_then(|()| port.read(&mut piece));
+        let read = port
+            .set_timeout(wait)
+            .map_err(io::Error::from)
+            .and_then(|()| port.read(&mut piece));
         match read {
             // A read that is ready and empty is how a vanished device ends.
             Ok(0) => {
@@ -107,7 +112,9 @@ impl Line for SerialLine {
                 at: self.now(),
                 bytes: piece.into_iter().take(length).collect(),
             },
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => Heard::Silence,
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+                Heard::Silence
+            }
             Err(error) => {
                 self.lost();
                 Heard::Unplugged(error.to_string())
@@ -127,7 +134,11 @@ impl Line for SerialLine {
 fn advice(error: &serialport::Error) -> String {
     let ports = serialport::available_ports().unwrap_or_default();
     let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
-    let present = if names.is_empty() { "none".into() } else { names.join(", ") };
+    let present = if names.is_empty() {
+        "none".into()
+    } else {
+        names.join(", ")
+    };
     match error.kind() {
         serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
             format!("{error}: your user may not open it (on Linux: join the group dialout)")
@@ -174,7 +185,8 @@ mod tests {
 
             std::fs::remove_file(&path).unwrap();
             drop(unit);
-            let lost = std::iter::repeat_with(|| line.hear(PATIENCE)).find(|heard| !matches!(heard, Heard::Bytes { .. }));
+            let lost =
+                std::iter::repeat_with(|| line.hear(PATIENCE)).find(|heard| !matches!(heard, Heard::Bytes { .. }));
             assert!(matches!(lost, Some(Heard::Unplugged(_))), "{lost:?}");
             assert_eq!(line.hear(PATIENCE), Heard::Silence);
         }

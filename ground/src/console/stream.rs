@@ -291,7 +291,19 @@ mod tests {
         let mut frame = derived::encode(&derived());
         frame[20] ^= 1;
         let found = items(&frame);
-        assert!(matches!(found[..], [(0, Item::Unread { why: Why::Derived(_), .. })]), "{found:?}");
+        assert!(
+            matches!(
+                found[..],
+                [(
+                    0,
+                    Item::Unread {
+                        why: Why::Derived(_),
+                        ..
+                    }
+                )]
+            ),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -318,20 +330,32 @@ mod tests {
         assert_eq!(stream.read(&packet(1)[..80]), []);
         assert!(matches!(stream.cut(), Some(Found { at: 0, .. })));
         let found = stream.read(&packet(9)[80..]);
-        assert!(matches!(found[..], [Found { at: 80, item: Item::Unread { why: Why::NoStart, .. } }]));
+        assert!(matches!(
+            found[..],
+            [Found {
+                at: 80,
+                item: Item::Unread { why: Why::NoStart, .. }
+            }]
+        ));
     }
 
     #[test]
     fn endless_lines_and_noise_are_bounded() {
         let line = items(&[b'>'; 5000]);
-        assert!(line.iter().all(|(_, item)| matches!(item, Item::Unread { bytes, .. } if bytes.len() <= LONGEST_LINE)));
+        assert!(
+            line.iter()
+                .all(|(_, item)| matches!(item, Item::Unread { bytes, .. } if bytes.len() <= LONGEST_LINE))
+        );
         let noise = items(&[0xFF; 1000]);
         assert_eq!(noise.len(), 4);
     }
 
     #[test]
     fn a_garbled_reply_cannot_command_the_terminal() {
-        assert_eq!(items(b">\x1b[2J\xC3\r\n"), [(0, Item::Reply("\u{FFFD}[2J\u{FFFD}".into()))]);
+        assert_eq!(
+            items(b">\x1b[2J\xC3\r\n"),
+            [(0, Item::Reply("\u{FFFD}[2J\u{FFFD}".into()))]
+        );
     }
 
     proptest! {
