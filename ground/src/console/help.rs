@@ -11,17 +11,11 @@ use ratatui::{
 use super::input;
 
 const KEYS: [(&str, &str); 6] = [
-    (
-        "Enter",
-        "send the line as typed; the unit asks for what needs confirming",
-    ),
-    ("Tab", "complete; again: the next candidate;  Esc: empty the line"),
+    ("Enter", "send the line as typed; the unit asks what needs confirming"),
+    ("Tab Esc", "complete, again for the next candidate;  empty the line"),
     ("Up Down", "words sent before;  PgUp PgDn: the log"),
     ("F2 F3", "table or four plots;  group of the plot beside the table"),
-    (
-        "F4 F5",
-        "plate and seconds of the plots; on an empty line also 1-4 and + -",
-    ),
+    ("F4 F5", "plate;  seconds of the plots  (on an empty line: 1-4, + -)"),
     ("q Ctrl-C", "quit (q: on an empty line);  F1 or ?: this help"),
 ];
 
@@ -37,7 +31,7 @@ pub fn draw(frame: &mut Frame) {
         .areas(area);
     frame.render_widget(Clear, area);
     frame.render_widget(
-        Paragraph::new(lines).block(Block::bordered().title(" keys and commands ")),
+        Paragraph::new(lines).block(Block::bordered().title(" keys and commands (any key closes) ")),
         area,
     );
 }

@@ -28,10 +28,10 @@ pub enum Action {
 impl View {
     /// Takes a pressed key while the log has `log_lines`.
     pub fn key(&mut self, key: KeyEvent, log_lines: usize) -> Option<Action> {
-        let control = key.modifiers.contains(KeyModifiers::CONTROL);
+        let control = key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
         let empty = self.input.text().is_empty();
         match key.code {
-            KeyCode::Char('c' | 'd') if control => return Some(Action::Quit),
+            KeyCode::Char('c' | 'd') if key.modifiers == KeyModifiers::CONTROL => return Some(Action::Quit),
             KeyCode::Char(_) if control => {}
             // Any key closes the help, and does nothing else: nobody sends what he cannot see.
             _ if self.help => self.help = false,

@@ -29,6 +29,7 @@ pub mod recording;
 pub mod screen;
 pub mod serial;
 pub mod session;
+mod state;
 pub mod stream;
 mod table;
 pub mod view;

@@ -3,7 +3,7 @@
 //! In: what was [`Found`] in the stream and when, words sent, the line going and coming. Out: a [`Model`] that a view
 //! shows as it stands. It reads no clock and does no I/O.
 //!
-//! The unit's mode is what the unit last said, in a reply ("mode WAIT") or a derived frame, never what was asked of it.
+//! The unit's mode is what the unit last said, in a reply or a derived frame, never what was asked of it.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -133,7 +133,7 @@ impl Model {
         match found.item {
             Item::Packet(reading) => self.packet(at, *reading),
             Item::Reply(text) => {
-                self.mode = mode_named(&text).or(self.mode);
+                self.mode = mode_reported(&text).or(self.mode);
                 self.say(at, Source::Unit, text);
             }
             Item::Derived(derived) => {
@@ -206,10 +206,16 @@ fn contains(text: &str, word: &[u8]) -> bool {
     text.as_bytes().windows(word.len()).any(|letters| letters == word)
 }
 
-/// The mode a reply reports.
-fn mode_named(reply: &str) -> Option<Mode> {
-    let (_, after) = reply.split_once("mode ")?;
-    let name = after.split(|letter: char| !letter.is_ascii_alphabetic()).next()?;
+/// The mode a reply reports: "G_MV ok: FLIGHT", "G_ST WAIT task none ...", "lift-off: FLIGHT, ...". Refusals ("G_MA no: only in WAIT") and the
+/// unit's help ("G_MT WAIT: ...") name modes too, and report none.
+fn mode_reported(reply: &str) -> Option<Mode> {
+    let mut words = reply.split(' ');
+    let name = match (words.next()?, words.next()?) {
+        ("G_ST", name) => name,
+        ("lift-off:", name) => name.trim_end_matches(','),
+        (_, "ok:") => words.next()?,
+        _ => return None,
+    };
     [Mode::Wait, Mode::Flight].into_iter().find(|mode| mode.name() == name)
 }
 
@@ -258,13 +264,18 @@ mod tests {
     fn the_mode_is_what_the_unit_said_last() {
         let mut model = model();
         model.sent(AT, "G_MV");
-        assert_eq!(model.mode, None, "what was asked for is not what is");
-        model.found(AT, reply("mode FLIGHT, recording"));
-        assert_eq!(model.mode, Some(Mode::Flight));
-        model.found(AT, reply("G_MA refused: only in WAIT"));
-        assert_eq!(model.mode, Some(Mode::Flight));
-        model.found(AT, reply("mode WAIT"));
-        assert_eq!(model.mode, Some(Mode::Wait));
+        let mut check = |text: &str, mode| {
+            model.found(AT, reply(text));
+            assert_eq!(model.mode, mode, "{text}");
+        };
+        check("G_MV: send G_MV within 10 s", None);
+        check("G_MV ok: FLIGHT", Some(Mode::Flight));
+        check("G_MA no: only in WAIT", Some(Mode::Flight));
+        check("G_MT WAIT: packets to the umbilical", Some(Mode::Flight));
+        check("G_ST WAIT task none recording 0 derived 0", Some(Mode::Wait));
+        check("G_ST lift-off 0 micro-g 0 errors 0000 noise 0", Some(Mode::Wait));
+        check("lift-off: FLIGHT, recording", Some(Mode::Flight));
+        check("", Some(Mode::Flight));
     }
 
     #[test]

@@ -14,7 +14,8 @@ use super::{
     line::Line,
     model::Link,
     session::Session,
-    view::{log_line, packet_line, unit_line},
+    state::{packet_line, unit_line},
+    view::log_line,
 };
 
 /// Longest wait for the line before the words are asked.
@@ -59,10 +60,11 @@ fn step(
     next_state: &mut Duration,
     out: &mut impl Write,
 ) -> io::Result<()> {
+    // First the line: it may be opened here, and words piped in are there at once.
+    session.hear(WAIT);
     for word in words.try_iter().filter(|word| !word.trim().is_empty()) {
         session.send(word.trim());
     }
-    session.hear(WAIT);
     let model = &mut session.model;
     for line in model.log.drain(..) {
         writeln!(out, "{}", log_line(&line))?;
@@ -99,7 +101,7 @@ mod tests {
         typed.send("G_ST\r".into()).unwrap();
         typed.send(" ".into()).unwrap();
         unit.plug(Duration::ZERO).unwrap();
-        unit.send(Duration::from_millis(10), b">mode WAIT\r\n").unwrap();
+        unit.send(Duration::from_millis(10), b">G_MT ok: WAIT\r\n").unwrap();
         for cycle in 1..=11_u64 {
             let packet = encode(&Reading::unread(cycle as u16));
             unit.send(Duration::from_millis(200 * cycle), &packet).unwrap();
@@ -112,7 +114,7 @@ mod tests {
         assert_eq!(unit.commands(), b"G_ST\r\n");
         let out = String::from_utf8(out).unwrap();
         let lines: Vec<_> = out.lines().map(str::trim).collect();
-        assert_eq!(lines[..3], ["0.00 > G_ST", "0.00 * plugged", "0.01 < mode WAIT"]);
+        assert_eq!(lines[..3], ["0.00 * plugged", "0.00 > G_ST", "0.01 < G_MT ok: WAIT"]);
         let state = "flying  plugged  mode WAIT  lift-off no  micro-g no  packet";
         let errors = "errors FFFF: acc 1-4, mag 1-4, gyro 1-4, temp 1-4";
         assert_eq!(

@@ -21,12 +21,12 @@ pub struct Recording {
 
 /// A file of the recording could not be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot record to {}: {source}; give another file with --record", path.display())]
+#[error("cannot record to {}: {why}; give another file with --record", path.display())]
 pub struct OpenError {
     /// The file.
     pub path: PathBuf,
     /// What the system says.
-    pub source: io::Error,
+    pub why: io::Error,
 }
 
 impl Recording {
@@ -38,7 +38,7 @@ impl Recording {
         let append = |path: &Path| OpenOptions::new().append(true).create(true).open(path);
         let failed = |path: &Path| {
             let path = path.to_owned();
-            move |source| OpenError { path, source }
+            move |why| OpenError { path, why }
         };
         let received = append(path).map_err(failed(path))?;
         let offset = received.metadata().map_err(failed(path))?.len();

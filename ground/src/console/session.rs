@@ -148,9 +148,9 @@ mod tests {
         let mut bench = bench();
         bench.session.send("G_ST");
         assert_eq!(bench.unit.commands(), b"G_ST\r\n");
-        bench.says(10, b">mode WA");
+        bench.says(10, b">G_MT ok: WA");
         bench.says(20, b"IT\r\n");
-        assert_eq!(bench.log(), ["G_ST", "mode WAIT"]);
+        assert_eq!(bench.log(), ["G_ST", "G_MT ok: WAIT"]);
         assert_eq!(bench.session.model.mode, Some(Mode::Wait));
     }
 

@@ -26,7 +26,8 @@ pub const HEIGHT: u16 = 17;
 /// The table as the model has it.
 pub fn table(model: &Model) -> Table<'static> {
     let title = Style::new().add_modifier(Modifier::BOLD);
-    let header = ["sensor", "x", "y", "z", "x", "y", "z", ""].map(right);
+    // A gyro has its rate under x and its temperature under z.
+    let header = ["", "x cnt", "y cnt", "z cnt", "x", "y", "z", " unit"].map(right);
     let widths = [6, 6, 6, 6, 8, 8, 8, 7].map(Constraint::Length);
     let rows = (0..SENSORS.len()).map(|slot| row(model, slot));
     let table = Table::new(rows, widths)
