@@ -149,8 +149,11 @@ impl Model {
         }
     }
 
-    /// Takes a line for the log.
+    /// Takes a line for the log. Of damaged places in a row only the newest stays, so that noise hides no reply; the
+    /// tally counts them all.
     pub fn say(&mut self, at: Duration, source: Source, text: String) {
+        let noise = |line: &mut LogLine| source == Source::Unread && line.source == Source::Unread;
+        self.log.pop_back_if(noise);
         self.log.push_back(LogLine { at, source, text });
         if self.log.len() > LOG_LINES {
             self.log.pop_front();
@@ -316,6 +319,19 @@ mod tests {
         assert_eq!(model.tally.unread, 1);
         let text = "4 unreadable bytes at 156: begins with none of '@', '>', '$': \\x1b[2J";
         assert_eq!(model.log[0].text, text);
+    }
+
+    #[test]
+    fn noise_hides_no_reply() {
+        let mut model = model();
+        model.found(AT, reply("G_ST"));
+        for _ in 0..LOG_LINES {
+            let why = Why::NoStart;
+            model.found(AT, item(Item::Unread { bytes: vec![0xFF], why }));
+        }
+        let sources: Vec<_> = model.log.iter().map(|line| line.source).collect();
+        assert_eq!(sources, [Source::Unit, Source::Unread]);
+        assert_eq!(model.tally.unread, LOG_LINES as u64);
     }
 
     #[test]

@@ -175,11 +175,13 @@ mod tests {
         assert_eq!(bench.unit.commands(), b"", "nothing is kept to act later");
         bench.unit.plug(Duration::from_millis(700)).unwrap();
         bench.session.hear(Duration::ZERO);
-        bench.says(800, &packets[3]);
+        // Plugged in within a packet, so that two halves would make a whole one.
+        bench.says(800, &packets[2][80..]);
+        bench.says(1000, &packets[3]);
 
         let tally = bench.session.model.tally;
-        assert_eq!((tally.packets, tally.missed, tally.unread), (2, 2, 1));
-        let kept = [&packets[0][..], &packets[1][..80], &packets[3]].concat();
+        assert_eq!((tally.packets, tally.missed, tally.unread), (2, 2, 2));
+        let kept = [&packets[0][..], &packets[1][..80], &packets[2][80..], &packets[3]].concat();
         assert_eq!(fs::read(&bench.path).unwrap(), kept);
         let notes = fs::read_to_string(commands_path(&bench.path)).unwrap();
         let notes: Vec<_> = notes.lines().skip(1).map(str::trim_start).collect();
