@@ -1,6 +1,7 @@
 //! The ground side as a library.
 
 pub mod channel;
+pub mod console;
 pub mod decode;
 pub mod digest;
 pub mod envelope;

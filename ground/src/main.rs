@@ -7,10 +7,13 @@ use clap::Parser;
 #[command(name = "ground", version)]
 enum Command {
     Decode(ground::decode::Arguments),
+    /// Talk to the unit over its umbilical, see all sensors, keep everything it says
+    Console(ground::console::Arguments),
 }
 
 fn main() -> anyhow::Result<()> {
     match Command::parse() {
         Command::Decode(arguments) => Ok(ground::decode::decode(&arguments)?),
+        Command::Console(arguments) => Ok(ground::console::console(&arguments)?),
     }
 }
