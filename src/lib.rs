@@ -21,5 +21,6 @@ pub mod increments;
 pub mod mode;
 pub mod packet;
 pub mod recorder;
+pub mod resume;
 pub mod sample;
 pub mod sensor;

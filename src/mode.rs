@@ -9,6 +9,7 @@
 //! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
 
 use crate::command::Command;
+pub use crate::resume::Resume;
 
 /// [us] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -198,20 +199,6 @@ impl State {
             Verdict::Refused(Refusal::Mode(mode))
         }
     }
-}
-
-/// What the unit was doing when a reset struck.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Resume {
-    /// Mode to return to.
-    pub mode: Mode,
-    /// Whether packets were being recorded.
-    pub recording: bool,
-    /// Counter of the next packet.
-    pub next_counter: u16,
-    /// Resets since power-on.
-    pub resets: u16,
 }
 
 #[cfg(test)]

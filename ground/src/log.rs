@@ -1,16 +1,18 @@
 //! A byte stream to readings, however damaged.
 //!
-//! In: bytes, in pieces of any size. Out: every intact packet with its offset, and for each stretch of bytes between
-//! intact packets one [`Reject`] with offset, length and reason. Refuses nothing and never panics; line ends between
-//! frames are passed over without a word, since one packet a line is how people keep streams.
+//! In: bytes, in pieces of any size. Out: every intact packet and derived frame with its offset, and for each stretch
+//! of bytes between them one [`Reject`] with offset, length and reason. Refuses nothing and never panics; line ends
+//! between frames are passed over without a word, since one packet a line is how people keep streams.
 //!
-//! Nothing but `@` starts a packet and no packet holds another `@` (Tab. A.3: digits, then `#`), so a reader that starts
-//! anew at every `@` finds every intact packet, and two candidates never overlap. That is all the memory it needs.
+//! Packets start with `@`, derived frames with `$`, and neither character stands anywhere else in either. So a reader
+//! that starts anew at each of them finds every intact frame, two candidates never overlap, and one frame is all it
+//! need remember.
 
 pub mod sequence;
 
 use crc::{CRC_16_IBM_3740, Crc};
 use emems::{
+    derived::{self, DERIVED_BYTES, DERIVED_START, Derived, DerivedError},
     packet::{self, ERROR_IDENTIFIER, PACKET_BYTES, PacketError, START},
     sample::{Errors, Reading},
 };
@@ -40,11 +42,18 @@ pub enum Item {
         /// What it says.
         reading: Reading,
     },
-    /// Bytes that are not an intact packet.
+    /// An intact derived frame.
+    Derived {
+        /// Offset of its `$`.
+        offset: u64,
+        /// What it says.
+        derived: Derived,
+    },
+    /// Bytes that are no intact frame.
     Reject(Reject),
 }
 
-/// A stretch of bytes between intact packets.
+/// A stretch of bytes between intact frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("offset {offset}, {length} bytes: {reason}")]
 pub struct Reject {
@@ -59,22 +68,30 @@ pub struct Reject {
 /// Why bytes were rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
-    /// They stand outside any packet.
-    #[error("not part of a packet")]
-    OutsidePacket,
+    /// They stand outside any frame.
+    #[error("not part of a frame")]
+    OutsideFrame,
     /// They begin like a packet.
     #[error("begins like a packet, then {0}")]
-    Malformed(PacketError),
-    /// The next packet or the end of the stream came too early.
-    #[error("packet cut off after {0} of {PACKET_BYTES} bytes")]
-    CutOff(usize),
-    /// The packet has the right form and the wrong check sum.
-    #[error("check sum {found:04X} in bytes 5 to 8, {expected:04X} over the rest")]
-    Crc {
+    Packet(PacketError),
+    /// They begin like a derived frame.
+    #[error("begins like a derived frame, but {0}")]
+    Derived(DerivedError),
+    /// The next frame or the end of the stream came too early.
+    #[error("frame cut off after {found} of {whole} bytes")]
+    CutOff {
+        /// Bytes that are there.
+        found: usize,
+        /// Bytes of a whole frame of its kind.
+        whole: usize,
+    },
+    /// The packet has the right form and the wrong checksum.
+    #[error("checksum {sent:04X} in bytes 5 to 8, the rest gives {computed:04X}")]
+    Checksum {
         /// In the packet.
-        found: u16,
-        /// Over its other bytes.
-        expected: u16,
+        sent: u16,
+        /// Of its other bytes.
+        computed: u16,
     },
 }
 
@@ -108,37 +125,51 @@ impl Decoder {
 
     /// Ends the stream; returns the last stretch, if any.
     pub fn finish(mut self) -> Option<Reject> {
-        if !self.candidate.is_empty() {
-            self.abandon_candidate();
-        }
+        self.abandon_candidate();
         self.close_stretch(self.position)
     }
 
     fn push_byte(&mut self, byte: u8, items: &mut Vec<Item>) {
-        if byte == START {
-            if !self.candidate.is_empty() {
+        match byte {
+            START | DERIVED_START => {
                 self.abandon_candidate();
+                self.candidate.push(byte);
             }
-            self.candidate.push(byte);
-        } else if self.candidate.is_empty() {
-            if self.stretch.is_none() && !matches!(byte, b'\r' | b'\n') {
-                self.stretch = Some((self.position, Reason::OutsidePacket));
+            _ if !self.candidate.is_empty() => {
+                self.candidate.push(byte);
+                if self.candidate.len() == self.whole() {
+                    self.judge_candidate(items);
+                }
             }
-        } else {
-            self.candidate.push(byte);
-            if self.candidate.len() == PACKET_BYTES {
-                self.judge_candidate(items);
+            b'\r' | b'\n' => {}
+            _ => {
+                self.stretch.get_or_insert((self.position, Reason::OutsideFrame));
             }
         }
     }
 
-    /// All 156 bytes of a candidate are there.
+    /// Bytes the candidate must have.
+    fn whole(&self) -> usize {
+        match self.candidate.first() {
+            Some(&DERIVED_START) => DERIVED_BYTES,
+            _ => PACKET_BYTES,
+        }
+    }
+
+    /// All bytes of a candidate are there.
     fn judge_candidate(&mut self, items: &mut Vec<Item>) {
-        let offset = self.position + 1 - PACKET_BYTES as u64;
-        match self.read_candidate() {
-            Ok(reading) => {
+        let offset = self.position + 1 - self.candidate.len() as u64;
+        let item = if self.candidate.starts_with(&[DERIVED_START]) {
+            derived::decode(&self.candidate)
+                .map(|derived| Item::Derived { offset, derived })
+                .map_err(Reason::Derived)
+        } else {
+            self.read_packet().map(|reading| Item::Packet { offset, reading })
+        };
+        match item {
+            Ok(item) => {
                 items.extend(self.close_stretch(offset).map(Item::Reject));
-                items.push(Item::Packet { offset, reading });
+                items.push(item);
             }
             Err(reason) => {
                 self.stretch.get_or_insert((offset, reason));
@@ -147,30 +178,33 @@ impl Decoder {
         self.candidate.clear();
     }
 
-    /// A candidate ended before its 156 bytes were there: at the byte about to be taken.
+    /// The candidate, if any, ended before all its bytes were there: at the byte about to be taken.
     fn abandon_candidate(&mut self) {
-        let length = self.candidate.len();
+        let (found, whole) = (self.candidate.len(), self.whole());
+        if found == 0 {
+            return;
+        }
         let reason = match packet::decode(&self.candidate) {
-            Err(error) if error.at < length => Reason::Malformed(error),
-            _ => Reason::CutOff(length),
+            Err(error) if whole == PACKET_BYTES && error.at < found => Reason::Packet(error),
+            _ => Reason::CutOff { found, whole },
         };
-        self.stretch.get_or_insert((self.position - length as u64, reason));
+        self.stretch.get_or_insert((self.position - found as u64, reason));
         self.candidate.clear();
     }
 
-    fn read_candidate(&self) -> Result<Reading, Reason> {
-        let reading = packet::decode(&self.candidate).map_err(Reason::Malformed)?;
+    fn read_packet(&self) -> Result<Reading, Reason> {
+        let reading = packet::decode(&self.candidate).map_err(Reason::Packet)?;
         match self.bytes_5_to_8 {
             Bytes5To8::Errors => Ok(reading),
             Bytes5To8::Crc => {
-                let (found, expected) = (reading.errors.0, crc_of_the_rest(&self.candidate));
-                if found == expected {
+                let (sent, computed) = (reading.errors.0, crc_of_the_rest(&self.candidate));
+                if sent == computed {
                     Ok(Reading {
                         errors: unread_sensors(&reading),
                         ..reading
                     })
                 } else {
-                    Err(Reason::Crc { found, expected })
+                    Err(Reason::Checksum { sent, computed })
                 }
             }
         }
@@ -186,7 +220,7 @@ impl Decoder {
     }
 }
 
-/// Check sum over a packet without its bytes 5 to 8.
+/// Checksum over a packet without its bytes 5 to 8.
 fn crc_of_the_rest(packet: &[u8]) -> u16 {
     let mut digest = CRC.digest();
     digest.update(packet.get(..ERROR_IDENTIFIER.start).unwrap_or_default());

@@ -2,16 +2,17 @@
 
 use clap::Parser;
 
-/// The ground side of the e-MEMS unit.
+/// The ground side of the e-MEMS attitude sensor unit.
 #[derive(Parser)]
-#[command(name = "ground")]
+#[command(name = "ground", version)]
 enum Command {
-    /// Talk to the unit over its umbilical, see all sensors, keep everything it says
     Console(ground::console::Arguments),
+    Decode(ground::decode::Arguments),
 }
 
 fn main() -> anyhow::Result<()> {
     match Command::parse() {
         Command::Console(arguments) => Ok(ground::console::console(&arguments)?),
+        Command::Decode(arguments) => Ok(ground::decode::decode(&arguments)?),
     }
 }

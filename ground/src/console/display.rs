@@ -3,12 +3,9 @@
 //! In: channels of [`crate::channel`] and their counts. Out: groups for tabs and plots, values in the unit an engineer
 //! reads (rates in °/s, everything else as [`Quantity`] has it), and text for a cell.
 
-use emems::sample::Kind;
+use emems::{sample::Kind, sensor::hmc5883l::OVERFLOW};
 
 use crate::channel::{CHANNELS, Quantity};
-
-/// HMC5883L: the code of an axis that overflowed (datasheet, "Data Output Registers").
-const MAGNETOMETER_OVERFLOW: i16 = -4096;
 
 /// Sensors of a kind, as plotted together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +103,7 @@ pub fn unit(quantity: Quantity) -> &'static str {
 pub fn cells(quantity: Quantity, counts: Option<i16>) -> [String; 2] {
     match counts {
         None => ["--".into(), "--".into()],
-        Some(MAGNETOMETER_OVERFLOW) if quantity == Quantity::Field => ["ovf".into(), "ovf".into()],
+        Some(OVERFLOW) if quantity == Quantity::Field => ["ovf".into(), "ovf".into()],
         Some(counts) => [counts.to_string(), format!("{:.2}", value(quantity, counts))],
     }
 }

@@ -39,7 +39,7 @@ use recording::Recording;
 use serial::SerialLine;
 use session::Session;
 
-/// `ground console`: talk to the unit over its umbilical, see all sensors, keep everything it says.
+/// Talk to the unit over its umbilical, see all sensors live, keep everything it says
 #[derive(Clone, Debug, clap::Args)]
 pub struct Arguments {
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3); it may be plugged in later

@@ -1,6 +1,11 @@
 //! What the stream reader finds, literal damage first, then any damage.
 
-use emems::packet::{Expected, encode};
+use emems::{
+    increments::{Channel, Increments},
+    mode::Mode,
+    packet::{Expected, encode},
+    sample::NOT_READ,
+};
 use proptest::prelude::*;
 
 use super::*;
@@ -14,6 +19,7 @@ fn read(bytes_5_to_8: Bytes5To8, pieces: &[&[u8]]) -> (Vec<(u64, u16)>, Vec<Stri
     for item in pieces.iter().flat_map(|piece| decoder.push(piece)).collect::<Vec<_>>() {
         match item {
             Item::Packet { offset, reading } => packets.push((offset, reading.counter)),
+            Item::Derived { .. } => {}
             Item::Reject(reject) => rejects.push(reject.to_string()),
         }
     }
@@ -44,14 +50,14 @@ fn a_truncated_packet_costs_itself_only() {
         &[&GOLDEN[..40], GOLDEN, &GOLDEN[..7]].concat(),
         &[(40, 1)],
         &[
-            "offset 0, 40 bytes: packet cut off after 40 of 156 bytes",
-            "offset 196, 7 bytes: packet cut off after 7 of 156 bytes",
+            "offset 0, 40 bytes: frame cut off after 40 of 156 bytes",
+            "offset 196, 7 bytes: frame cut off after 7 of 156 bytes",
         ],
     );
     check(
         &[&GOLDEN[100..], GOLDEN].concat(),
         &[(56, 1)],
-        &["offset 0, 56 bytes: not part of a packet"],
+        &["offset 0, 56 bytes: not part of a frame"],
     );
 }
 
@@ -93,7 +99,7 @@ fn starts_and_ends_within_a_packet_do_not_hide_the_next() {
     check(
         &[broken.as_slice(), GOLDEN].concat(),
         &[(156, 1)],
-        &["offset 0, 156 bytes: packet cut off after 50 of 156 bytes"],
+        &["offset 0, 156 bytes: frame cut off after 50 of 156 bytes"],
     );
 }
 
@@ -102,12 +108,63 @@ fn console_text_between_packets_is_one_stretch_a_line_or_not() {
     check(
         &[GOLDEN.as_slice(), b"\r\nG_MT ok\r\n@ home\r\n", GOLDEN].concat(),
         &[(0, 1), (175, 1)],
-        &["offset 158, 17 bytes: not part of a packet"],
+        &["offset 158, 17 bytes: not part of a frame"],
+    );
+}
+
+fn derived_frame() -> [u8; DERIVED_BYTES] {
+    let silent = Channel {
+        integral_counts_s: 0.0,
+        least: NOT_READ,
+        most: NOT_READ,
+        count: 0,
+    };
+    derived::encode(&Derived {
+        counter: 1,
+        start_us: 200_000,
+        mode: Mode::Flight,
+        health: derived::Health(0),
+        cycle_us: 3_700,
+        slots_us: std::array::from_fn(|slot| 225 * slot as u32),
+        increments: Increments {
+            angle_b: [0.0; 3],
+            covered_us: 0,
+            gyro: [silent; 4],
+        },
+    })
+}
+
+#[test]
+fn derived_frames_between_packets_are_read_too() {
+    let stream = [GOLDEN.as_slice(), &derived_frame(), GOLDEN].concat();
+    let items = Decoder::default().push(&stream);
+    let [
+        Item::Packet { offset: 0, .. },
+        Item::Derived { offset: 156, derived },
+        Item::Packet { offset: 381, .. },
+    ] = items.as_slice()
+    else {
+        panic!("{items:?}")
+    };
+    assert_eq!((derived.counter, derived.cycle_us), (1, 3_700));
+}
+
+#[test]
+fn a_damaged_derived_frame_costs_itself_only() {
+    let mut flipped = derived_frame();
+    flipped[30] = b'7';
+    check(
+        &[flipped.as_slice(), GOLDEN, &derived_frame()[..100], GOLDEN].concat(),
+        &[(225, 1), (481, 1)],
+        &[
+            "offset 0, 225 bytes: begins like a derived frame, but checksum 9311 was sent, the fields give D49E",
+            "offset 381, 100 bytes: frame cut off after 100 of 225 bytes",
+        ],
     );
 }
 
 #[test]
-fn bytes_5_to_8_may_be_a_check_sum() {
+fn bytes_5_to_8_may_be_a_checksum() {
     let mut packet = *GOLDEN;
     packet[5..9].copy_from_slice(b"642C");
     assert_eq!(read(Bytes5To8::Crc, &[&packet]), (vec![(0, 1)], vec![]));
@@ -115,13 +172,13 @@ fn bytes_5_to_8_may_be_a_check_sum() {
         read(Bytes5To8::Crc, &[GOLDEN]),
         (
             vec![],
-            vec!["offset 0, 156 bytes: check sum 0000 in bytes 5 to 8, 642C over the rest".into()]
+            vec!["offset 0, 156 bytes: checksum 0000 in bytes 5 to 8, the rest gives 642C".into()]
         )
     );
 }
 
 #[test]
-fn behind_a_check_sum_failed_sensors_are_told_by_their_values() {
+fn behind_a_checksum_failed_sensors_are_told_by_their_values() {
     let mut reading = packet::decode(GOLDEN).expect("golden frame");
     (reading.acc_p[1], reading.temperature[3]) = ([i16::MIN; 3], i16::MIN);
     let rest = crc_of_the_rest(&encode(&reading));
@@ -142,7 +199,7 @@ fn a_reason_carries_the_byte() {
     decoder.push(&packet);
     assert_eq!(
         decoder.finish().map(|reject| reject.reason),
-        Some(Reason::Malformed(PacketError {
+        Some(Reason::Packet(PacketError {
             at: 154,
             found: Some(b'2'),
             expected: Expected::Flag
@@ -155,8 +212,9 @@ fn part() -> impl Strategy<Value = (bool, Vec<u8>)> {
     prop_oneof![
         any::<u16>().prop_map(|counter| (true, encode(&Reading::unread(counter)).to_vec())),
         proptest::collection::vec(any::<u8>(), 0..40).prop_map(|bytes| (false, bytes)),
-        "[@#0-9A-Fa-f\r\n]{0,200}".prop_map(|text| (false, text.into_bytes())),
+        "[@#$0-9A-Fa-f\r\n]{0,200}".prop_map(|text| (false, text.into_bytes())),
         (0usize..156).prop_map(|cut| (false, GOLDEN[..cut].to_vec())),
+        (0usize..=DERIVED_BYTES).prop_map(|cut| (false, derived_frame()[..cut].to_vec())),
         (0usize..156).prop_map(|cut| (false, GOLDEN[cut + 1..].to_vec())),
     ]
 }
@@ -185,6 +243,7 @@ proptest! {
         for item in items {
             let (offset, length) = match item {
                 Item::Packet { offset, .. } => (offset, PACKET_BYTES as u64),
+                Item::Derived { offset, .. } => (offset, DERIVED_BYTES as u64),
                 Item::Reject(Reject { offset, length, .. }) => (offset, length),
             };
             prop_assert!(length > 0);
