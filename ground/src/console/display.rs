@@ -83,7 +83,7 @@ pub fn short_name(kind: Kind) -> &'static str {
     }
 }
 
-/// Value of some counts in [`unit`].
+/// Value of some counts in [`unit()`].
 pub fn value(quantity: Quantity, counts: i16) -> f64 {
     match quantity {
         Quantity::Rate => quantity.si(counts).to_degrees(),
@@ -99,7 +99,7 @@ pub fn unit(quantity: Quantity) -> &'static str {
     }
 }
 
-/// Cells for a value: counts, and in [`unit`] with two decimals, which is a count or less for every sensor.
+/// Cells for a value: counts, and in [`unit()`] with two decimals, which is a count or less for every sensor.
 pub fn cells(quantity: Quantity, counts: Option<i16>) -> [String; 2] {
     match counts {
         None => ["--".into(), "--".into()],
