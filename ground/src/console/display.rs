@@ -3,7 +3,10 @@
 //! In: channels of [`crate::channel`] and their counts. Out: groups for tabs and plots, values in the unit an engineer
 //! reads (rates in °/s, everything else as [`Quantity`] has it), and text for a cell.
 
-use emems::{sample::Kind, sensor::hmc5883l::OVERFLOW};
+use emems::{
+    sample::{Errors, Kind, SENSORS},
+    sensor::hmc5883l::OVERFLOW,
+};
 
 use crate::channel::{CHANNELS, Quantity};
 
@@ -81,6 +84,24 @@ pub fn short_name(kind: Kind) -> &'static str {
         Kind::Gyro => "gyro",
         Kind::Thermometer => "temp",
     }
+}
+
+/// The failed sensors, thesis' plate numbers: "acc 1-4, gyro 2".
+pub fn failed_names(errors: Errors) -> String {
+    let groups = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer];
+    let named = groups.iter().filter_map(|kind| {
+        let failed = SENSORS
+            .iter()
+            .enumerate()
+            .filter(|(slot, sensor)| sensor.kind == *kind && errors.contains(*slot));
+        let plates: Vec<_> = failed.map(|(_, sensor)| (sensor.plate + 1).to_string()).collect();
+        match plates.len() {
+            0 => None,
+            4 => Some(format!("{} 1-4", short_name(*kind))),
+            _ => Some(format!("{} {}", short_name(*kind), plates.join(" "))),
+        }
+    });
+    named.collect::<Vec<_>>().join(", ")
 }
 
 /// Value of some counts in [`unit()`].
@@ -167,5 +188,15 @@ mod tests {
     #[test]
     fn sizes_are_short() {
         assert_eq!([9_999, 12_345, 12_345_678].map(size), ["9999 B", "12.3 kB", "12.3 MB"]);
+    }
+
+    #[test]
+    fn failed_sensors_are_named_by_kind_and_plate() {
+        let check = |errors, names: &str| assert_eq!(failed_names(Errors(errors)), names);
+        check(0, "");
+        check(0x8001, "acc 1, temp 4");
+        check(0x020F, "acc 1-4, gyro 2");
+        check(0x0060, "mag 2 3");
+        check(0xFFFF, "acc 1-4, mag 1-4, gyro 1-4, temp 1-4");
     }
 }

@@ -1,13 +1,13 @@
 //! The umbilical console: one screen for the engineer at the launch pad.
 //!
-//! In: a [`line`] to the unit (a serial port, or a unit that flies in another thread), keys or lines of text. Out: the
+//! In: a [`mod@line`] to the unit (a serial port, or a unit that flies in another thread), keys or lines of text. Out: the
 //! unit's replies, all sensors live, and a recording of every byte received. Data flows one way:
 //!
 //! ```text
 //! line -> recording -> stream -> model -> view -> terminal          keys -> input -> line
 //! ```
 //!
-//! [`stream`], [`model`], [`input`], [`keys`] and [`view`] are functions of their arguments; only [`line`], [`serial`],
+//! [`stream`], [`model`], [`input`], [`keys`] and [`view`] are functions of their arguments; only [`mod@line`], [`serial`],
 //! [`recording`], [`screen`] and [`plain`] touch the world, and [`session`] is where they meet.
 
 use std::{
