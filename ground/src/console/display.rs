@@ -3,12 +3,12 @@
 //! In: channels of [`crate::channel`] and their counts. Out: groups for tabs and plots, values in the unit an engineer
 //! reads (rates in °/s, everything else as [`Quantity`] has it), and text for a cell.
 
-use emems::sample::Kind;
+use emems::{
+    sample::{Errors, Kind, SENSORS},
+    sensor::hmc5883l::OVERFLOW,
+};
 
 use crate::channel::{CHANNELS, Quantity};
-
-/// HMC5883L: the code of an axis that overflowed (datasheet, "Data Output Registers").
-const MAGNETOMETER_OVERFLOW: i16 = -4096;
 
 /// Sensors of a kind, as plotted together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +86,25 @@ pub fn short_name(kind: Kind) -> &'static str {
     }
 }
 
-/// Value of some counts in [`unit`].
+/// The failed sensors, thesis' plate numbers: "acc 1-4, gyro 2".
+pub fn failed_names(errors: Errors) -> String {
+    let groups = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer];
+    let named = groups.iter().filter_map(|kind| {
+        let failed = SENSORS
+            .iter()
+            .enumerate()
+            .filter(|(slot, sensor)| sensor.kind == *kind && errors.contains(*slot));
+        let plates: Vec<_> = failed.map(|(_, sensor)| (sensor.plate + 1).to_string()).collect();
+        match plates.len() {
+            0 => None,
+            4 => Some(format!("{} 1-4", short_name(*kind))),
+            _ => Some(format!("{} {}", short_name(*kind), plates.join(" "))),
+        }
+    });
+    named.collect::<Vec<_>>().join(", ")
+}
+
+/// Value of some counts in [`unit()`].
 pub fn value(quantity: Quantity, counts: i16) -> f64 {
     match quantity {
         Quantity::Rate => quantity.si(counts).to_degrees(),
@@ -102,11 +120,11 @@ pub fn unit(quantity: Quantity) -> &'static str {
     }
 }
 
-/// Cells for a value: counts, and in [`unit`] with two decimals, which is a count or less for every sensor.
+/// Cells for a value: counts, and in [`unit()`] with two decimals, which is a count or less for every sensor.
 pub fn cells(quantity: Quantity, counts: Option<i16>) -> [String; 2] {
     match counts {
         None => ["--".into(), "--".into()],
-        Some(MAGNETOMETER_OVERFLOW) if quantity == Quantity::Field => ["ovf".into(), "ovf".into()],
+        Some(OVERFLOW) if quantity == Quantity::Field => ["ovf".into(), "ovf".into()],
         Some(counts) => [counts.to_string(), format!("{:.2}", value(quantity, counts))],
     }
 }
@@ -170,5 +188,15 @@ mod tests {
     #[test]
     fn sizes_are_short() {
         assert_eq!([9_999, 12_345, 12_345_678].map(size), ["9999 B", "12.3 kB", "12.3 MB"]);
+    }
+
+    #[test]
+    fn failed_sensors_are_named_by_kind_and_plate() {
+        let check = |errors, names: &str| assert_eq!(failed_names(Errors(errors)), names);
+        check(0, "");
+        check(0x8001, "acc 1, temp 4");
+        check(0x020F, "acc 1-4, gyro 2");
+        check(0x0060, "mag 2 3");
+        check(0xFFFF, "acc 1-4, mag 1-4, gyro 1-4, temp 1-4");
     }
 }

@@ -1,13 +1,13 @@
 //! The umbilical console: one screen for the engineer at the launch pad.
 //!
-//! In: a [`line`] to the unit (a serial port, or a unit that flies in another thread), keys or lines of text. Out: the
+//! In: a [`mod@line`] to the unit (a serial port, or a unit that flies in another thread), keys or lines of text. Out: the
 //! unit's replies, all sensors live, and a recording of every byte received. Data flows one way:
 //!
 //! ```text
 //! line -> recording -> stream -> model -> view -> terminal          keys -> input -> line
 //! ```
 //!
-//! [`stream`], [`model`], [`input`], [`keys`] and [`view`] are functions of their arguments; only [`line`], [`serial`],
+//! [`stream`], [`model`], [`input`], [`keys`] and [`view`] are functions of their arguments; only [`mod@line`], [`serial`],
 //! [`recording`], [`screen`] and [`plain`] touch the world, and [`session`] is where they meet.
 
 use std::{
@@ -39,8 +39,14 @@ use recording::Recording;
 use serial::SerialLine;
 use session::Session;
 
-/// `ground console`: talk to the unit over its umbilical, see all sensors, keep everything it says.
+/// `ground console`: talk to the unit over its umbilical, see all sensors live, keep everything it says
+///
+/// Opens the port at 115200 8N1, and opens it again when it was unplugged. Commands are sent as typed; `?` shows the keys
+/// and the unit's commands. The recording holds the received bytes as they came: `ground decode` reads it.
 #[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ground console /dev/ttyUSB0 --record pad.log\n  echo G_ST | ground console /dev/ttyUSB0 --plain"
+)]
 pub struct Arguments {
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3); it may be plugged in later
     pub port: String,

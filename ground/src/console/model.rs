@@ -10,11 +10,10 @@ use std::{collections::VecDeque, time::Duration};
 use emems::{
     command::{COMMANDS, Command},
     mode::Mode,
-    sample::{Errors, Kind, Reading, SENSORS},
+    sample::Reading,
 };
 
 use super::{
-    display::short_name,
     history::History,
     stream::{Found, Item},
 };
@@ -222,24 +221,6 @@ fn mode_reported(reply: &str) -> Option<Mode> {
     [Mode::Wait, Mode::Flight].into_iter().find(|mode| mode.name() == name)
 }
 
-/// The failed sensors, thesis' plate numbers: "acc 1-4, gyro 2".
-pub fn failed_names(errors: Errors) -> String {
-    let groups = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer];
-    let named = groups.iter().filter_map(|kind| {
-        let failed = SENSORS
-            .iter()
-            .enumerate()
-            .filter(|(slot, sensor)| sensor.kind == *kind && errors.contains(*slot));
-        let plates: Vec<_> = failed.map(|(_, sensor)| (sensor.plate + 1).to_string()).collect();
-        match plates.len() {
-            0 => None,
-            4 => Some(format!("{} 1-4", short_name(*kind))),
-            _ => Some(format!("{} {}", short_name(*kind), plates.join(" "))),
-        }
-    });
-    named.collect::<Vec<_>>().join(", ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -343,16 +324,6 @@ mod tests {
         assert!(model.receiving());
         model.now = AT + STOPPED_AFTER;
         assert!(!model.receiving());
-    }
-
-    #[test]
-    fn failed_sensors_are_named_by_kind_and_plate() {
-        let check = |errors, names: &str| assert_eq!(failed_names(Errors(errors)), names);
-        check(0, "");
-        check(0x8001, "acc 1, temp 4");
-        check(0x020F, "acc 1-4, gyro 2");
-        check(0x0060, "mag 2 3");
-        check(0xFFFF, "acc 1-4, mag 1-4, gyro 1-4, temp 1-4");
     }
 
     #[test]

@@ -10,8 +10,8 @@ use ratatui::{
 };
 
 use super::{
-    display::size,
-    model::{Link, Model, failed_names},
+    display::{failed_names, size},
+    model::{Link, Model},
 };
 
 /// All of it.
