@@ -3,7 +3,7 @@
 use embedded_hal_async::{i2c::I2c, spi::SpiDevice};
 use embedded_io_async::{Read, Write};
 
-use crate::{crash::CrashRecord, mode::Resume, recorder::Recorder};
+use crate::{crash::CrashRecord, recorder::Recorder, resume::Resume};
 
 /// The set of types a board provides. One implementation per board file; none of them is named in `src/`.
 pub trait Board {

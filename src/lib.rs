@@ -13,9 +13,14 @@
 #![forbid(unsafe_code)]
 
 pub mod board;
+pub mod command;
 pub mod crash;
+pub mod derived;
+pub mod geometry;
+pub mod increments;
 pub mod mode;
 pub mod packet;
 pub mod recorder;
+pub mod resume;
 pub mod sample;
 pub mod sensor;

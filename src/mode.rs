@@ -1,4 +1,18 @@
-//! WAIT and FLIGHT, and what survives a reset of them.
+//! WAIT and FLIGHT: which command is accepted when, what it starts, and what survives a reset.
+//!
+//! In: commands, lift-off, time. Out: a [`Verdict`] for the console and an [`Action`] for whoever does the work.
+//!
+//! One flipped bit turns G_ME (to WAIT) into G_MA (erase) or G_MG (record), and G_MT (send packets) into G_MV (to
+//! FLIGHT). So nothing that matters hangs on one word: G_MV and G_ME take effect when sent twice in a row, G_MA when
+//! followed by the different G_CA, each within [`CONFIRM_WITHIN_US`]; any other word in between withdraws them.
+//!
+//! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
+
+use crate::command::Command;
+pub use crate::resume::Resume;
+
+/// [us] time within which a confirmation counts.
+pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
 
 /// The unit's mode (thesis: ESPERA, VOO; App. A.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,16 +25,364 @@ pub enum Mode {
     Flight,
 }
 
-/// What the unit was doing when a reset struck.
+impl Mode {
+    /// Its name on the console.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Wait => "WAIT",
+            Mode::Flight => "FLIGHT",
+        }
+    }
+}
+
+/// What the umbilical is busy with in WAIT. Reading sensors and telemetry never stop and are no tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Resume {
-    /// Mode to return to.
+pub enum Task {
+    /// Nothing.
+    #[default]
+    Idle,
+    /// New packets go to the umbilical.
+    SendPackets,
+    /// Records `next..end` go to the umbilical.
+    Dump {
+        /// Number of the next record.
+        next: u32,
+        /// Number after the last.
+        end: u32,
+    },
+}
+
+/// What a command makes the unit do besides changing this state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Action {
+    /// Nothing more.
+    None,
+    /// Erase the recorder.
+    Erase,
+    /// Report.
+    Report(Command),
+    /// Run the sensors' self-test.
+    SelfTest,
+}
+
+/// Why a command was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Refusal {
+    /// It belongs to the other mode.
+    Mode(Mode),
+    /// Nothing to confirm, or too late.
+    NothingToConfirm,
+    /// The lift-off line is asserted.
+    LiftOff,
+}
+
+/// What became of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Verdict {
+    /// Accepted.
+    Done(Action),
+    /// Send this command within [`CONFIRM_WITHIN_US`] to make it so.
+    Confirm(Command),
+    /// Refused.
+    Refused(Refusal),
+}
+
+/// Mode, task and what waits for confirmation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    /// Mode.
     pub mode: Mode,
-    /// Whether packets were being recorded.
+    /// Task.
+    pub task: Task,
+    /// Packets are being recorded.
     pub recording: bool,
-    /// Counter of the next packet.
-    pub next_counter: u16,
-    /// Resets since power-on.
-    pub resets: u16,
+    /// Derived frames are on.
+    pub derived: bool,
+    pending: Option<(Command, u64)>,
+    lift_off: bool,
+}
+
+impl State {
+    /// The state after a start: FLIGHT and recording go on where a reset struck them.
+    pub fn resumed(resume: Option<Resume>) -> Self {
+        let Resume { mode, recording, .. } = resume.unwrap_or_default();
+        State {
+            mode,
+            recording,
+            ..State::default()
+        }
+    }
+
+    /// Takes a command that came at `now_us`.
+    pub fn command(&mut self, command: Command, now_us: u64) -> Verdict {
+        let pending = self.pending.take().filter(|(_, until_us)| now_us <= *until_us);
+        let confirmed = pending.is_some_and(|(awaited, _)| awaited == command);
+        match command {
+            Command::Flight | Command::Wait if !confirmed => self.confirm(command, now_us),
+            Command::Flight => self.enter(Mode::Flight),
+            Command::Wait => self.enter(Mode::Wait),
+            Command::Status | Command::Version | Command::Help => Verdict::Done(Action::Report(command)),
+            Command::DerivedOn | Command::DerivedOff => {
+                self.derived = command == Command::DerivedOn;
+                Verdict::Done(Action::None)
+            }
+            Command::Record => self.only_in(Mode::Flight, |state| {
+                state.recording = true;
+                Verdict::Done(Action::None)
+            }),
+            Command::Erase => self.only_in(Mode::Wait, |state| {
+                if state.lift_off {
+                    return Verdict::Refused(Refusal::LiftOff);
+                }
+                state.confirm(Command::ConfirmErase, now_us)
+            }),
+            Command::ConfirmErase => self.only_in(Mode::Wait, |state| {
+                if !confirmed {
+                    return Verdict::Refused(Refusal::NothingToConfirm);
+                }
+                state.task = Task::Idle;
+                Verdict::Done(Action::Erase)
+            }),
+            Command::SendPackets => self.start(Task::SendPackets),
+            Command::Dump => self.start(Task::Dump { next: 0, end: u32::MAX }),
+            Command::DumpRange { first, count } => self.start(Task::Dump {
+                next: first,
+                end: first.saturating_add(count),
+            }),
+            Command::Stop => self.start(Task::Idle),
+            Command::SelfTest => self.only_in(Mode::Wait, |_| Verdict::Done(Action::SelfTest)),
+        }
+    }
+
+    /// Takes the debounced lift-off line. Its rising edge, and its level at start, begin FLIGHT and recording; a line
+    /// that is stuck asserted does not hold the unit there against G_ME.
+    pub fn lift_off(&mut self, asserted: bool) -> bool {
+        let begins = asserted && !self.lift_off;
+        self.lift_off = asserted;
+        if begins {
+            self.pending = None;
+            self.enter(Mode::Flight);
+            self.recording = true;
+        }
+        begins
+    }
+
+    fn enter(&mut self, mode: Mode) -> Verdict {
+        if self.mode != mode {
+            self.mode = mode;
+            self.task = Task::Idle;
+            self.recording = false;
+        }
+        Verdict::Done(Action::None)
+    }
+
+    fn start(&mut self, task: Task) -> Verdict {
+        self.only_in(Mode::Wait, |state| {
+            state.task = task;
+            Verdict::Done(Action::None)
+        })
+    }
+
+    fn confirm(&mut self, with: Command, now_us: u64) -> Verdict {
+        self.pending = Some((with, now_us.saturating_add(CONFIRM_WITHIN_US)));
+        Verdict::Confirm(with)
+    }
+
+    fn only_in(&mut self, mode: Mode, accept: impl FnOnce(&mut Self) -> Verdict) -> Verdict {
+        if self.mode == mode {
+            accept(self)
+        } else {
+            Verdict::Refused(Refusal::Mode(mode))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::command::{COMMANDS, Heard, Parser};
+
+    const WAITING: State = State {
+        mode: Mode::Wait,
+        task: Task::Idle,
+        recording: false,
+        derived: false,
+        pending: None,
+        lift_off: false,
+    };
+    const FLYING: State = State {
+        mode: Mode::Flight,
+        ..WAITING
+    };
+
+    /// The state after the bytes, and whether anything was erased.
+    fn after(mut state: State, bytes: &[u8]) -> (State, bool) {
+        let mut parser = Parser::default();
+        let mut erased = false;
+        for (at, byte) in bytes.iter().enumerate() {
+            if let Some(Heard::Command(command)) = parser.hear(*byte, 1000 * at as u64) {
+                erased |= state.command(command, 1000 * at as u64) == Verdict::Done(Action::Erase);
+            }
+        }
+        (state, erased)
+    }
+
+    /// Every way the seven commands of App. A.3 and ours are given: the words that carry one out.
+    fn deeds() -> Vec<Vec<u8>> {
+        let once = COMMANDS.iter().map(|entry| match entry.command {
+            Command::DumpRange { .. } => b"G_LR000000000010".to_vec(),
+            _ => entry.word.to_vec(),
+        });
+        once.chain([b"G_MVG_MV".to_vec(), b"G_MEG_ME".to_vec(), b"G_MAG_CA".to_vec()])
+            .collect()
+    }
+
+    /// Checks the `garbled` forms of every deed, and of every two deeds in a row: none erases unless G_CA was sent, none
+    /// leads to a mode whose word was not sent.
+    fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
+        let says = |sent: &[u8], word: &[u8]| sent.windows(word.len()).any(|letters| letters == word);
+        for state in [WAITING, FLYING] {
+            for first in deeds() {
+                for second in [Vec::new()].into_iter().chain(deeds()) {
+                    let sent = [first.as_slice(), &second].concat();
+                    for bytes in garble(&sent) {
+                        let (got, erased) = after(state, &bytes);
+                        let text = std::string::String::from_utf8_lossy(&bytes).into_owned();
+                        assert!(!erased || says(&sent, b"G_CA"), "{state:?}: {text} erases");
+                        let word = if got.mode == Mode::Flight { b"G_MV" } else { b"G_ME" };
+                        assert!(
+                            got.mode == state.mode || says(&sent, word),
+                            "{state:?}: {text} leads to {:?}",
+                            got.mode
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_one_bit_error_erases_or_changes_to_a_mode_that_was_not_sent() {
+        check(|sent| {
+            let flip = |bit: usize| {
+                let mut bytes = sent.to_vec();
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                bytes
+            };
+            (0..8 * sent.len()).map(flip).collect()
+        });
+    }
+
+    #[test]
+    fn no_lost_doubled_or_swapped_byte_erases_or_changes_to_a_mode_that_was_not_sent() {
+        check(|sent| {
+            let mut garbled = Vec::new();
+            for at in 0..sent.len() {
+                let mut lost = sent.to_vec();
+                lost.remove(at);
+                let mut doubled = sent.to_vec();
+                doubled.insert(at, sent[at]);
+                garbled.extend([lost, doubled]);
+                if at + 1 < sent.len() {
+                    let mut swapped = sent.to_vec();
+                    swapped.swap(at, at + 1);
+                    garbled.push(swapped);
+                }
+            }
+            garbled
+        });
+    }
+
+    #[test]
+    fn no_two_bit_error_in_one_deed_erases() {
+        for sent in deeds() {
+            for first in 0..8 * sent.len() {
+                for second in 0..first {
+                    let mut bytes = sent.clone();
+                    bytes[first / 8] ^= 1 << (first % 8);
+                    bytes[second / 8] ^= 1 << (second % 8);
+                    assert!(!after(WAITING, &bytes).1, "{bytes:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_mode_change_takes_the_word_twice_within_ten_seconds() {
+        let mut state = WAITING;
+        assert_eq!(state.command(Command::Flight, 0), Verdict::Confirm(Command::Flight));
+        assert_eq!(
+            state.command(Command::Status, 1),
+            Verdict::Done(Action::Report(Command::Status))
+        );
+        assert_eq!(state.command(Command::Flight, 2), Verdict::Confirm(Command::Flight));
+        assert_eq!(
+            state.command(Command::Flight, CONFIRM_WITHIN_US + 3),
+            Verdict::Confirm(Command::Flight)
+        );
+        assert_eq!(
+            state.command(Command::Flight, CONFIRM_WITHIN_US + 4),
+            Verdict::Done(Action::None)
+        );
+        assert_eq!(state.mode, Mode::Flight);
+    }
+
+    #[test]
+    fn an_erase_takes_a_second_different_word_and_no_lift_off() {
+        let mut state = WAITING;
+        assert_eq!(
+            state.command(Command::ConfirmErase, 0),
+            Verdict::Refused(Refusal::NothingToConfirm)
+        );
+        assert_eq!(
+            state.command(Command::Erase, 0),
+            Verdict::Confirm(Command::ConfirmErase)
+        );
+        assert_eq!(
+            state.command(Command::Erase, 1),
+            Verdict::Confirm(Command::ConfirmErase)
+        );
+        assert_eq!(state.command(Command::ConfirmErase, 2), Verdict::Done(Action::Erase));
+        let mut flying = FLYING;
+        assert_eq!(
+            flying.command(Command::Erase, 0),
+            Verdict::Refused(Refusal::Mode(Mode::Wait))
+        );
+        state.lift_off = true;
+        assert_eq!(state.command(Command::Erase, 3), Verdict::Refused(Refusal::LiftOff));
+    }
+
+    #[test]
+    fn a_task_of_the_other_mode_is_refused() {
+        let mut state = WAITING;
+        assert_eq!(
+            state.command(Command::Record, 0),
+            Verdict::Refused(Refusal::Mode(Mode::Flight))
+        );
+        let mut flying = FLYING;
+        for command in [Command::SendPackets, Command::Dump, Command::Stop, Command::SelfTest] {
+            assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
+        }
+        assert_eq!(flying.command(Command::Record, 0), Verdict::Done(Action::None));
+        assert!(flying.recording);
+    }
+
+    #[test]
+    fn lift_off_starts_flight_and_recording_once() {
+        let mut state = WAITING;
+        assert!(state.lift_off(true));
+        assert_eq!((state.mode, state.recording), (Mode::Flight, true));
+        state.command(Command::Wait, 0);
+        state.command(Command::Wait, 1);
+        assert!(!state.lift_off(true), "a line stuck asserted does not undo G_ME");
+        assert_eq!((state.mode, state.recording), (Mode::Wait, false));
+    }
 }

@@ -3,6 +3,13 @@
 //! Both boards drive them byte by byte: the emulated one as the STM32's peripherals clock them, the host one as it
 //! plays an `embedded-hal` transaction. Time is always an argument, in nanoseconds since power-on.
 
+pub mod adis16265;
+pub mod hmc5883l;
+pub mod lis331hh;
+pub mod signal;
+pub mod tca9548a;
+pub mod tmp102;
+
 use std::sync::Arc;
 
 /// [ns] since power-on.
@@ -37,4 +44,38 @@ pub trait SpiPart: Send {
     fn deselect(&mut self, now: Nanos);
     /// Power returns: registers take their defaults.
     fn power_on(&mut self, now: Nanos);
+}
+
+#[cfg(test)]
+mod testing {
+    //! Register conversations with one part.
+
+    use super::{
+        I2cPart, Nanos,
+        signal::{Noise, Specimen},
+    };
+
+    impl<const N: usize> Specimen<N> {
+        /// No bias, no noise, conversions at whole periods.
+        pub fn ideal() -> Self {
+            let mut specimen = Specimen::draw(Noise::new(0), 0.0, 0.0);
+            specimen.phase = 0.0;
+            specimen
+        }
+    }
+
+    /// START, bytes, STOP.
+    pub fn write(part: &mut dyn I2cPart, bytes: &[u8], now: Nanos) {
+        assert!(part.start(false, now));
+        assert!(bytes.iter().all(|&byte| part.write(byte, now)));
+        part.stop(now);
+    }
+
+    /// Register pointer, repeated START, `N` bytes, STOP.
+    pub fn read<const N: usize>(part: &mut dyn I2cPart, register: u8, now: Nanos) -> [u8; N] {
+        assert!(part.start(false, now) && part.write(register, now) && part.start(true, now));
+        let bytes = core::array::from_fn(|_| part.read(now));
+        part.stop(now);
+        bytes
+    }
 }

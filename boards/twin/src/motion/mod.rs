@@ -1,0 +1,160 @@
+//! How the unit moves: attitude and acceleration of its centre as pure functions of time.
+//!
+//! One motion a file. A motion knows nothing of gravity, Earth rate or field; [`World`] adds those. Analytic motions are
+//! built of [`Profile`]s and [`Attitude`] turns and so have exact derivatives. [`LIST`] names them for the command line.
+
+mod attitude;
+#[cfg(test)]
+mod check;
+mod profile;
+mod rate_table;
+
+mod rotation_test;
+mod sounding_rocket;
+
+mod still;
+mod tumble;
+
+use nalgebra::Vector3;
+
+pub use attitude::Attitude;
+pub use profile::{Jet, Profile};
+pub use rate_table::{Axis, Plateau, Position, RateTable, TABLE_4_1};
+
+pub use rotation_test::RotationTest;
+pub use sounding_rocket::SoundingRocket;
+pub use still::Still;
+pub use tumble::Tumble;
+
+use crate::environment::{Environment, World};
+use crate::truth::TruthSource;
+
+/// Where the unit is in its motion at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Attitude with its derivatives.
+    pub attitude: Attitude,
+    /// [m/s2] acceleration of the unit's centre relative to n, in n.
+    pub acc_n: Vector3<f64>,
+    /// [degC] temperature of the unit, where the motion knows it.
+    pub temperature_c: Option<f64>,
+    /// Lift-off line, `true` = asserted.
+    pub lift_off: bool,
+    /// Micro-gravity line, `true` = asserted.
+    pub micro_g: bool,
+}
+
+impl Pose {
+    /// Turning about a centre that does not move, with both lines idle.
+    pub fn turning(attitude: Attitude) -> Self {
+        Self {
+            attitude,
+            acc_n: Vector3::zeros(),
+            temperature_c: None,
+            lift_off: false,
+            micro_g: false,
+        }
+    }
+}
+
+/// A motion of the unit.
+pub trait Motion: Send + Sync {
+    /// Pose at `t_s` seconds after power-on. Defined for every time: before the start it is the start, after the end the
+    /// end.
+    fn at(&self, t_s: f64) -> Pose;
+    /// [s] when it ends; `None` for a motion without an end.
+    fn duration_s(&self) -> Option<f64>;
+}
+
+/// A motion the command line offers.
+pub struct Named {
+    /// What to type.
+    pub name: &'static str,
+    /// What it is, in one line.
+    pub about: &'static str,
+    truth: fn() -> Box<dyn TruthSource>,
+}
+
+/// [s] on the pad before lift-off, long enough for alignment and gyro bias at rest.
+const PAD_WAIT_S: f64 = 30.0;
+
+/// All motions, each at its default site.
+pub const LIST: [Named; 6] = [
+    Named {
+        name: "still",
+        about: "at rest, level, in the laboratory",
+        truth: || laboratory(Still::level()),
+    },
+    Named {
+        name: "rate-table",
+        about: "the twelve positions of the gyro calibration (Table 4.1), 200 deg/s each way",
+        truth: || laboratory(RateTable::calibration()),
+    },
+    Named {
+        name: "tumble",
+        about: "10 s rest, then all three axes at once",
+        truth: || laboratory(Tumble::new()),
+    },
+    Named {
+        name: "rotation-1",
+        about: "rotation test 1 of chapter 6: each axis on its own",
+        truth: || laboratory(RotationTest::first()),
+    },
+    Named {
+        name: "rotation-2",
+        about: "rotation test 2 of chapter 6: yaw 40, pitch 35, roll 45 and -30 deg, and back",
+        truth: || laboratory(RotationTest::second()),
+    },
+    Named {
+        name: "rocket",
+        about: "a VSB-30 flight from Alcantara: 30 s on the pad, boost, 6 min of micro-gravity, re-entry",
+        truth: || {
+            let site = Environment::alcantara();
+            Box::new(World {
+                motion: SoundingRocket::new(PAD_WAIT_S, site.gravity),
+                environment: site,
+            })
+        },
+    },
+];
+
+/// The motion of that name at its default site; `None` if there is none.
+pub fn by_name(name: &str) -> Option<Box<dyn TruthSource>> {
+    LIST.iter()
+        .find(|named| named.name == name)
+        .map(|named| (named.truth)())
+}
+
+fn laboratory<M: Motion + 'static>(motion: M) -> Box<dyn TruthSource> {
+    Box::new(World {
+        motion,
+        environment: Environment::laboratory(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_named_motion_begins_at_rest() {
+        for named in &LIST {
+            let truth = by_name(named.name).expect(named.name).at(1.0);
+            assert!(
+                truth.rate_b.norm() < 1e-4,
+                "{} turns faster than the Earth at its start",
+                named.name
+            );
+            assert!(
+                (truth.force_b.norm() - 9.78).abs() < 0.01,
+                "{} is not at one g",
+                named.name
+            );
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_none() {
+        assert!(by_name("stil").is_none());
+    }
+}

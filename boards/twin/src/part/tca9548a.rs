@@ -1,0 +1,259 @@
+//! TCA9548A: the switch between the controller and the plates, with everything behind it.
+//!
+//! The one target the controller sees: it answers for its own address and passes the rest to the parts on the selected
+//! channels. A write reaches every part that acknowledged; what several parts drive at once is the wired AND. A channel
+//! is switched at the STOP after the control register was written (datasheet, control register), and the reset line
+//! deselects all.
+
+use super::{I2cPart, Nanos};
+
+/// 7-bit address with A2, A1, A0 low.
+pub const ADDRESS: u8 = 0x70;
+
+/// What a controller reads where nobody drives the line.
+const RELEASED: u8 = 0xFF;
+
+/// A part in its place on a channel, which may be empty or dead.
+struct Socket {
+    part: Box<dyn I2cPart>,
+    silent: bool,
+    addressed: bool,
+}
+
+/// The switch and its eight channels.
+pub struct Tca9548a {
+    channels: [Vec<Socket>; 8],
+    /// Channels connected now, one bit each.
+    connected: u8,
+    /// Control register; takes effect at STOP.
+    control: u8,
+    addressed: bool,
+    silent: bool,
+}
+
+impl Tca9548a {
+    /// A switch with `channels[n]` on channel n, powered at time 0: nothing is selected. Channels beyond 7 are left out.
+    pub fn new(channels: impl IntoIterator<Item = Vec<Box<dyn I2cPart>>>) -> Self {
+        let mut sockets = channels.into_iter().map(|parts| {
+            let socket = |part| Socket {
+                part,
+                silent: false,
+                addressed: false,
+            };
+            parts.into_iter().map(socket).collect()
+        });
+        Tca9548a {
+            channels: core::array::from_fn(|_| sockets.next().unwrap_or_default()),
+            connected: 0,
+            control: 0,
+            addressed: false,
+            silent: false,
+        }
+    }
+
+    fn selected(&mut self) -> impl Iterator<Item = &mut Socket> {
+        let connected = if self.silent { 0 } else { self.connected };
+        self.channels
+            .iter_mut()
+            .enumerate()
+            .filter(move |(channel, _)| connected >> channel & 1 == 1)
+            .flat_map(|(_, sockets)| sockets)
+    }
+
+    fn addressed(&mut self) -> impl Iterator<Item = &mut Socket> {
+        self.selected().filter(|socket| socket.addressed)
+    }
+
+    /// START (or repeated START) and an address; `read` is the direction bit. Returns whether anyone acknowledges.
+    pub fn start(&mut self, address: u8, read: bool, now: Nanos) -> bool {
+        self.addressed = address == ADDRESS && !self.silent;
+        let mut acknowledged = self.addressed;
+        for socket in self.selected() {
+            let called = !socket.silent && socket.part.address() == address;
+            socket.addressed = called && socket.part.start(read, now);
+            acknowledged |= socket.addressed;
+        }
+        acknowledged
+    }
+
+    /// A byte from the controller; returns whether anyone acknowledges.
+    pub fn write(&mut self, byte: u8, now: Nanos) -> bool {
+        if self.addressed {
+            self.control = byte;
+        }
+        self.addressed().fold(false, |acknowledged, socket| {
+            socket.part.write(byte, now) | acknowledged
+        }) | self.addressed
+    }
+
+    /// A byte for the controller.
+    pub fn read(&mut self, now: Nanos) -> u8 {
+        let own = if self.addressed { self.control } else { RELEASED };
+        self.addressed().fold(own, |line, socket| line & socket.part.read(now))
+    }
+
+    /// STOP.
+    pub fn stop(&mut self, now: Nanos) {
+        for socket in self.addressed() {
+            socket.addressed = false;
+            socket.part.stop(now);
+        }
+        self.addressed = false;
+        self.connected = self.control;
+    }
+
+    /// The reset line is pulled: no channel is selected, the transfer under way is over.
+    pub fn reset(&mut self) {
+        for socket in self.channels.iter_mut().flatten() {
+            socket.addressed = false;
+        }
+        self.addressed = false;
+        self.control = 0;
+        self.connected = 0;
+    }
+
+    /// The switch is gone (`true`), and all behind it out of reach, or is back, deselected.
+    pub fn silence(&mut self, silent: bool) {
+        self.reset();
+        self.silent = silent;
+    }
+
+    /// The part at `address` on `channel` is dead (`true`), or is back with its power-on registers. A place without a
+    /// part is left alone.
+    pub fn silence_part(&mut self, channel: usize, address: u8, silent: bool, now: Nanos) {
+        let sockets = self.channels.get_mut(channel).into_iter().flatten();
+        for socket in sockets.filter(|socket| socket.part.address() == address) {
+            socket.silent = silent;
+            socket.addressed = false;
+            if !silent {
+                socket.part.power_on(now);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One register at one address: the last byte written to it.
+    struct Register {
+        address: u8,
+        value: u8,
+    }
+
+    impl I2cPart for Register {
+        fn address(&self) -> u8 {
+            self.address
+        }
+        fn start(&mut self, _read: bool, _now: Nanos) -> bool {
+            true
+        }
+        fn write(&mut self, byte: u8, _now: Nanos) -> bool {
+            self.value = byte;
+            true
+        }
+        fn read(&mut self, _now: Nanos) -> u8 {
+            self.value
+        }
+        fn stop(&mut self, _now: Nanos) {}
+        fn power_on(&mut self, _now: Nanos) {
+            self.value = 0;
+        }
+    }
+
+    const A: u8 = 0x18;
+
+    fn tree() -> Tca9548a {
+        Tca9548a::new(
+            [0x11, 0x22, 0x33].map(|value| vec![Box::new(Register { address: A, value }) as Box<dyn I2cPart>]),
+        )
+    }
+
+    fn select(mux: &mut Tca9548a, control: u8) {
+        assert!(mux.start(ADDRESS, false, 0) && mux.write(control, 0));
+        mux.stop(0);
+    }
+
+    fn read(mux: &mut Tca9548a, address: u8) -> Option<u8> {
+        let byte = mux.start(address, true, 0).then(|| mux.read(0));
+        mux.stop(0);
+        byte
+    }
+
+    #[test]
+    fn at_power_on_nothing_is_selected() {
+        let mut mux = tree();
+        assert_eq!([read(&mut mux, ADDRESS), read(&mut mux, A)], [Some(0x00), None]);
+    }
+
+    #[test]
+    fn each_channel_leads_to_its_own_parts() {
+        let mut mux = tree();
+        for (control, value) in [(1, 0x11), (2, 0x22), (4, 0x33)] {
+            select(&mut mux, control);
+            assert_eq!(
+                [read(&mut mux, ADDRESS), read(&mut mux, A)],
+                [Some(control), Some(value)]
+            );
+        }
+        assert_eq!(read(&mut mux, 0x19), None);
+    }
+
+    #[test]
+    fn a_channel_is_switched_at_the_stop() {
+        let mut mux = tree();
+        assert!(mux.start(ADDRESS, false, 0) && mux.write(1, 0));
+        assert!(!mux.start(A, true, 0));
+        mux.stop(0);
+        assert!(mux.start(A, true, 0));
+    }
+
+    #[test]
+    fn a_write_reaches_every_selected_part_and_reads_are_a_wired_and() {
+        let mut mux = tree();
+        select(&mut mux, 3);
+        assert_eq!(read(&mut mux, A), Some(0x00));
+        assert!(mux.start(A, false, 0) && mux.write(0x5A, 0));
+        mux.stop(0);
+        for (control, value) in [(1, 0x5A), (2, 0x5A), (4, 0x33)] {
+            select(&mut mux, control);
+            assert_eq!(read(&mut mux, A), Some(value));
+        }
+    }
+
+    #[test]
+    fn the_reset_line_deselects_in_mid_transfer() {
+        let mut mux = tree();
+        select(&mut mux, 1);
+        assert!(mux.start(A, true, 0));
+        mux.reset();
+        assert_eq!(mux.read(0), 0xFF);
+        mux.stop(0);
+        assert_eq!([read(&mut mux, ADDRESS), read(&mut mux, A)], [Some(0x00), None]);
+    }
+
+    #[test]
+    fn a_silent_part_leaves_the_others_alone_and_comes_back_with_its_defaults() {
+        let mut mux = tree();
+        select(&mut mux, 1);
+        mux.silence_part(0, A, true, 0);
+        assert_eq!(read(&mut mux, A), None);
+        select(&mut mux, 2);
+        assert_eq!(read(&mut mux, A), Some(0x22));
+        mux.silence_part(0, A, false, 0);
+        mux.silence_part(9, A, true, 0);
+        select(&mut mux, 1);
+        assert_eq!(read(&mut mux, A), Some(0x00));
+    }
+
+    #[test]
+    fn a_silent_switch_takes_everything_with_it_and_comes_back_deselected() {
+        let mut mux = tree();
+        select(&mut mux, 1);
+        mux.silence(true);
+        assert_eq!([read(&mut mux, ADDRESS), read(&mut mux, A)], [None, None]);
+        mux.silence(false);
+        assert_eq!([read(&mut mux, ADDRESS), read(&mut mux, A)], [Some(0x00), None]);
+    }
+}

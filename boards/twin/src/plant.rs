@@ -1,0 +1,197 @@
+//! The plant: four plates of parts in a world, as the controller's pins find them.
+//!
+//! Truth in, register bytes and line levels out. Each part sees truth from its own place: turned into its plate's
+//! frame, and for the accelerometer carried along the lever arm, f + w' x r + w x (w x r). Parts differ by a seed:
+//! the phase of their clocks, their biases, their noise; the same seed is the same unit, to the last bit.
+//!
+//! Noise is that of the thesis' unit (sections 4.1 and 4.2: 1.53 LSB, 2.68 LSB) and of the datasheets, bias what
+//! is left after calibration. Scale and misalignment are nominal.
+
+mod gyro;
+mod sensor_bus;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use emems::sample::{Kind, SENSORS};
+
+pub use self::{gyro::Gyro, sensor_bus::SensorBus};
+use crate::{
+    geometry::{self, PLATES},
+    part::{
+        I2cPart, Input, Nanos,
+        adis16265::{Adis16265, Measurand},
+        hmc5883l::{self, Hmc5883l},
+        lis331hh::{self, Lis331hh},
+        signal::{Noise, Specimen},
+        tca9548a::Tca9548a,
+        tmp102::{self, Tmp102},
+    },
+    run::Fault,
+    truth::{Truth, TruthSource},
+};
+
+/// Standard deviations of a channel: of its white noise, and of its bias from unit to unit.
+struct Spread {
+    noise: f64,
+    bias: f64,
+}
+
+/// [m/s2] 650 ug/rtHz in 50 Hz.
+const ACCELEROMETER: Spread = Spread {
+    noise: 0.045,
+    bias: 0.02,
+};
+/// [uT] 2 mG.
+const MAGNETOMETER: Spread = Spread { noise: 0.2, bias: 0.1 };
+/// [rad/s] 0.044 deg/s/rtHz in 20 Hz.
+const GYRO: Spread = Spread {
+    noise: 0.00344,
+    bias: 0.0015,
+};
+/// [degC] thermometer in the gyro.
+const GYRO_THERMOMETER: Spread = Spread {
+    noise: 0.12,
+    bias: 0.06,
+};
+/// [degC] TMP102.
+const THERMOMETER: Spread = Spread {
+    noise: 0.05,
+    bias: 0.03,
+};
+
+/// How good the parts are, as factors on their nominal spread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// On the noise.
+    pub noise: f64,
+    /// On the biases.
+    pub bias: f64,
+}
+
+impl Quality {
+    /// As the parts are.
+    pub const NOMINAL: Quality = Quality { noise: 1.0, bias: 1.0 };
+    /// Parts without noise or bias, for tests of everything else.
+    pub const IDEAL: Quality = Quality { noise: 0.0, bias: 0.0 };
+
+    fn draw<const N: usize>(self, spread: Spread, stream: Noise) -> Specimen<N> {
+        Specimen::draw(stream, spread.noise * self.noise, spread.bias * self.bias)
+    }
+}
+
+/// The four plates, the vehicle's two lines, and what befalls them.
+pub struct Plant {
+    /// The plates' I2C parts.
+    pub bus: SensorBus,
+    /// The plates' gyros.
+    pub gyros: [Gyro; PLATES],
+    source: Arc<dyn TruthSource>,
+}
+
+impl Plant {
+    /// The unit of this seed in this world, powered at time 0.
+    pub fn new(source: Arc<dyn TruthSource>, seed: u64) -> Self {
+        Plant::with(source, seed, Quality::NOMINAL)
+    }
+
+    /// A unit without noise or bias.
+    pub fn ideal(source: Arc<dyn TruthSource>) -> Self {
+        Plant::with(source, 0, Quality::IDEAL)
+    }
+
+    /// The unit of this seed, better or worse than nominal.
+    pub fn with(source: Arc<dyn TruthSource>, seed: u64, quality: Quality) -> Self {
+        let seeds = Noise::new(seed);
+        let plates = (0..PLATES).map(|plate| i2c_parts(plate, &source, seeds.stream(plate as u64), quality));
+        Plant {
+            bus: SensorBus::new(Tca9548a::new(plates)),
+            gyros: core::array::from_fn(|plate| gyro(plate, &source, seeds.stream((PLATES + plate) as u64), quality)),
+            source,
+        }
+    }
+
+    /// Lift-off line at `now`, `true` = asserted.
+    pub fn lift_off(&self, now: Nanos) -> bool {
+        self.truth(now).lift_off
+    }
+
+    /// Micro-gravity line at `now`, `true` = asserted.
+    pub fn micro_g(&self, now: Nanos) -> bool {
+        self.truth(now).micro_g
+    }
+
+    fn truth(&self, now: Nanos) -> Truth {
+        self.source.at(now as f64 * 1e-9)
+    }
+
+    /// Lets a fault strike. A slot or plate the unit does not have is left alone, and so is [`Fault::Reset`], which
+    /// is the controller's.
+    pub fn apply(&mut self, fault: Fault, now: Nanos) {
+        match fault {
+            Fault::Silent(slot) => self.silence(slot, true, now),
+            Fault::Restored(slot) => self.silence(slot, false, now),
+            Fault::MuxSilent(silent) => self.bus.switch.silence(silent),
+            Fault::SdaHeld => self.bus.hold_sda(),
+            Fault::BusStuck(stuck) => self.bus.stick(stuck),
+            Fault::GyroGarbage(plate, babbling) => {
+                if let Some(gyro) = self.gyros.get_mut(plate) {
+                    gyro.babble(babbling);
+                }
+            }
+            Fault::Reset => {}
+        }
+    }
+
+    fn silence(&mut self, slot: usize, silent: bool, now: Nanos) {
+        let Some(sensor) = SENSORS.get(slot) else {
+            return;
+        };
+        let address = match sensor.kind {
+            Kind::Gyro => return self.gyros[sensor.plate].silence(silent, now),
+            Kind::Accelerometer => lis331hh::ADDRESS,
+            Kind::Magnetometer => hmc5883l::ADDRESS,
+            Kind::Thermometer => tmp102::ADDRESS,
+        };
+        self.bus.switch.silence_part(sensor.plate, address, silent, now);
+    }
+}
+
+/// What a part sees of the truth.
+fn seen<T>(source: &Arc<dyn TruthSource>, view: impl Fn(Truth) -> T + Send + Sync + 'static) -> Input<T> {
+    let source = Arc::clone(source);
+    Arc::new(move |t_s| view(source.at(t_s)))
+}
+
+fn i2c_parts(plate: usize, source: &Arc<dyn TruthSource>, seeds: Noise, quality: Quality) -> Vec<Box<dyn I2cPart>> {
+    let dcm_pb = geometry::dcm_bp(plate).transpose();
+    let place_b = geometry::accelerometer_place_b(plate);
+    let force_p = seen(source, move |truth| {
+        let Truth {
+            rate_b,
+            rate_dot_b,
+            force_b,
+            ..
+        } = truth;
+        dcm_pb * (force_b + rate_dot_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b)))
+    });
+    let field_p_ut = seen(source, move |truth| dcm_pb * truth.field_b_ut);
+    let temperature_c = seen(source, |truth| truth.temperature_c);
+    vec![
+        Box::new(Lis331hh::new(force_p, quality.draw(ACCELEROMETER, seeds.stream(0)))),
+        Box::new(Hmc5883l::new(field_p_ut, quality.draw(MAGNETOMETER, seeds.stream(1)))),
+        Box::new(Tmp102::new(temperature_c, quality.draw(THERMOMETER, seeds.stream(2)))),
+    ]
+}
+
+fn gyro(plate: usize, source: &Arc<dyn TruthSource>, seeds: Noise, quality: Quality) -> Gyro {
+    let axis_b = geometry::gyro_axis_b(plate);
+    let measurand = Measurand {
+        rate: seen(source, move |truth| axis_b.dot(&truth.rate_b)),
+        temperature_c: seen(source, |truth| truth.temperature_c),
+        rate_specimen: quality.draw(GYRO, seeds.stream(0)),
+        temperature_specimen: quality.draw(GYRO_THERMOMETER, seeds.stream(1)),
+    };
+    Gyro::new(Adis16265::new(measurand), seeds.stream(2))
+}

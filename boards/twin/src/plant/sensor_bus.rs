@@ -1,0 +1,87 @@
+//! The sensor bus as the controller finds it: its two wires, the switch, and what holds SDA.
+//!
+//! Bytes of I2C transfers in, acknowledges and bytes out. A controller asks [`SensorBus::sda_held`] before it sends a
+//! START, for with SDA low it cannot; if it goes on regardless it is not acknowledged and reads zeros.
+
+use crate::part::{Nanos, tca9548a::Tca9548a};
+
+/// Clock pulses after which a part that was cut off in mid-byte lets go of SDA (UM10204, section 3.1.16).
+const PULSES_TO_FREE: u8 = 9;
+
+/// Who holds SDA low.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hold {
+    Nobody,
+    /// A part, for this many more clock pulses.
+    Part(u8),
+    /// A fault of the wire.
+    Stuck,
+}
+
+/// The sensor bus.
+pub struct SensorBus {
+    pub(super) switch: Tca9548a,
+    hold: Hold,
+}
+
+impl SensorBus {
+    pub(super) fn new(switch: Tca9548a) -> Self {
+        SensorBus {
+            switch,
+            hold: Hold::Nobody,
+        }
+    }
+
+    /// START (or repeated START) and an address; `read` is the direction bit. Returns whether anyone acknowledges.
+    pub fn start(&mut self, address: u8, read: bool, now: Nanos) -> bool {
+        !self.sda_held() && self.switch.start(address, read, now)
+    }
+
+    /// A byte from the controller; returns whether anyone acknowledges.
+    pub fn write(&mut self, byte: u8, now: Nanos) -> bool {
+        !self.sda_held() && self.switch.write(byte, now)
+    }
+
+    /// A byte for the controller; 0xFF if nobody sends.
+    pub fn read(&mut self, now: Nanos) -> u8 {
+        if self.sda_held() { 0x00 } else { self.switch.read(now) }
+    }
+
+    /// STOP.
+    pub fn stop(&mut self, now: Nanos) {
+        self.switch.stop(now);
+    }
+
+    /// The switch's reset line is pulled: no channel is selected.
+    pub fn reset_switch(&mut self) {
+        self.switch.reset();
+    }
+
+    /// Whether SDA is low with nobody sending.
+    pub fn sda_held(&self) -> bool {
+        self.hold != Hold::Nobody
+    }
+
+    /// One pulse on SCL outside a transfer.
+    pub fn clock_pulse(&mut self) {
+        if let Hold::Part(pulses) = self.hold {
+            self.hold = if pulses > 1 {
+                Hold::Part(pulses - 1)
+            } else {
+                Hold::Nobody
+            };
+        }
+    }
+
+    /// A part was cut off in mid-byte and holds SDA.
+    pub(super) fn hold_sda(&mut self) {
+        if self.hold == Hold::Nobody {
+            self.hold = Hold::Part(PULSES_TO_FREE);
+        }
+    }
+
+    /// The wire is stuck, or no longer.
+    pub(super) fn stick(&mut self, stuck: bool) {
+        self.hold = if stuck { Hold::Stuck } else { Hold::Nobody };
+    }
+}

@@ -1,0 +1,312 @@
+//! Umbilical words, letter by letter, to commands.
+//!
+//! In: bytes and the time each came. Out: a [`Command`], or what was heard instead. Words are matched exactly and case
+//! counts: G_MT and G_Mt differ by one bit, G_Ml looks like G_MI (thesis, App. A.3). Outside a word every byte is
+//! passed over until a `G`; inside one a `G` starts anew unless it completes a word. A half word is forgotten after
+//! [`HALF_WORD_TIMEOUT_US`]. Each byte costs one bounded step.
+//!
+//! What a word may do when is [`crate::mode`]'s business.
+
+use heapless::Vec;
+
+use crate::packet::hex_value;
+
+/// Letters of a word.
+pub const WORD_BYTES: usize = 4;
+
+/// [us] pause after which a half word is forgotten.
+pub const HALF_WORD_TIMEOUT_US: u64 = 2_000_000;
+
+/// Digits after [`Command::DumpRange`]'s word: six for the first record, six for how many.
+const RANGE_DIGITS: usize = 12;
+
+/// A word as it stands on the line.
+pub type Word = [u8; WORD_BYTES];
+
+/// What may be asked of the unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Command {
+    /// To FLIGHT.
+    Flight,
+    /// To WAIT.
+    Wait,
+    /// Packets to the umbilical.
+    SendPackets,
+    /// Erase the recorder.
+    Erase,
+    /// Confirm [`Command::Erase`].
+    ConfirmErase,
+    /// Read the recorder.
+    Dump,
+    /// Read a part of the recorder.
+    DumpRange {
+        /// Number of the first record.
+        first: u32,
+        /// How many.
+        count: u32,
+    },
+    /// Stop the running task.
+    Stop,
+    /// Record packets.
+    Record,
+    /// Report mode, task, sensors, recorder, resets.
+    Status,
+    /// Report firmware version and board.
+    Version,
+    /// List the words.
+    Help,
+    /// Derived frames on.
+    DerivedOn,
+    /// Derived frames off.
+    DerivedOff,
+    /// Test every sensor with its own stimulus.
+    SelfTest,
+}
+
+/// One row of the help: a word, its command (with an empty range where it takes one) and its meaning.
+pub struct Entry {
+    /// The word.
+    pub word: &'static Word,
+    /// The command it stands for.
+    pub command: Command,
+    /// What it does, for the help.
+    pub meaning: &'static str,
+}
+
+const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> Entry {
+    Entry { word, command, meaning }
+}
+
+/// Every word of the unit: the seven of App. A.3, then ours.
+pub const COMMANDS: [Entry; 15] = [
+    entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
+    entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
+    entry(b"G_MT", Command::SendPackets, "WAIT: packets to the umbilical"),
+    entry(b"G_MA", Command::Erase, "WAIT: erase the recorder (then G_CA)"),
+    entry(b"G_CA", Command::ConfirmErase, "WAIT: confirm G_MA, within 10 s"),
+    entry(b"G_Ml", Command::Dump, "WAIT: read the recorder"),
+    entry(
+        b"G_LR",
+        Command::DumpRange { first: 0, count: 0 },
+        "WAIT: read records, G_LRffffffcccccc (hex first, count)",
+    ),
+    entry(b"G_Mt", Command::Stop, "WAIT: stop the running task"),
+    entry(b"G_MG", Command::Record, "FLIGHT: record packets"),
+    entry(b"G_ST", Command::Status, "status"),
+    entry(b"G_VE", Command::Version, "version"),
+    entry(b"G_HE", Command::Help, "this list"),
+    entry(b"G_DL", Command::DerivedOn, "derived frames on"),
+    entry(b"G_DD", Command::DerivedOff, "derived frames off"),
+    entry(b"G_AT", Command::SelfTest, "WAIT: self-test of the sensors"),
+];
+
+/// The word of a command.
+pub fn word_of(command: Command) -> &'static Word {
+    let same = |entry: &&Entry| core::mem::discriminant(&entry.command) == core::mem::discriminant(&command);
+    COMMANDS.iter().find(same).map_or(b"G_HE", |entry| entry.word)
+}
+
+/// What was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Heard {
+    /// A command.
+    Command(Command),
+    /// Four letters beginning with `G_` that are no word.
+    Unknown(Word),
+    /// A word whose digits are not twelve upper-case hexadecimal ones: at which digit, and the byte there.
+    BadDigit {
+        /// The word.
+        word: Word,
+        /// Which digit, from 0.
+        digit: u8,
+        /// What came instead.
+        found: u8,
+    },
+}
+
+/// The listener on the umbilical.
+#[derive(Clone, Debug, Default)]
+pub struct Parser {
+    letters: Vec<u8, { WORD_BYTES + RANGE_DIGITS }>,
+    last_us: u64,
+    /// Bytes that belonged to no word, line ends and blanks excepted.
+    pub passed_over: u32,
+}
+
+impl Parser {
+    /// Takes the byte that came at `now_us`.
+    pub fn hear(&mut self, byte: u8, now_us: u64) -> Option<Heard> {
+        if now_us.saturating_sub(self.last_us) > HALF_WORD_TIMEOUT_US {
+            self.forget();
+        }
+        self.last_us = now_us;
+        match self.letters.len() {
+            0 => self.begin(byte),
+            1 if byte == b'_' => self.take(byte),
+            1 => {
+                self.forget();
+                self.begin(byte);
+            }
+            // A `G` here is the start of a word after a cut one: no word has it as its third letter.
+            2 if byte == b'G' => {
+                self.forget();
+                self.begin(byte);
+            }
+            2 => self.take(byte),
+            3 => {
+                self.take(byte);
+                return self.whole_word();
+            }
+            _ => return self.digit(byte),
+        }
+        None
+    }
+
+    fn begin(&mut self, byte: u8) {
+        match byte {
+            b'G' => self.take(byte),
+            b'\r' | b'\n' | b' ' => {}
+            _ => self.passed_over = self.passed_over.saturating_add(1),
+        }
+    }
+
+    fn take(&mut self, byte: u8) {
+        // Never full: `hear` empties the letters at the last one.
+        let _ = self.letters.push(byte);
+    }
+
+    fn forget(&mut self) {
+        self.passed_over = self.passed_over.saturating_add(self.letters.len() as u32);
+        self.letters.clear();
+    }
+
+    fn word(&self) -> Word {
+        self.letters.first_chunk().copied().unwrap_or_default()
+    }
+
+    fn whole_word(&mut self) -> Option<Heard> {
+        let word = self.word();
+        let found = COMMANDS.iter().find(|entry| *entry.word == word);
+        if let Some(Entry {
+            command: Command::DumpRange { .. },
+            ..
+        }) = found
+        {
+            return None;
+        }
+        self.letters.clear();
+        Some(found.map_or(Heard::Unknown(word), |entry| Heard::Command(entry.command)))
+    }
+
+    fn digit(&mut self, byte: u8) -> Option<Heard> {
+        if hex_value(byte).is_none() {
+            let heard = Heard::BadDigit {
+                word: self.word(),
+                digit: (self.letters.len() - WORD_BYTES) as u8,
+                found: byte,
+            };
+            self.letters.clear();
+            self.begin(byte);
+            return Some(heard);
+        }
+        self.take(byte);
+        if self.letters.len() < WORD_BYTES + RANGE_DIGITS {
+            return None;
+        }
+        let number = |from: usize| {
+            let digits = self.letters.iter().skip(WORD_BYTES + from).take(RANGE_DIGITS / 2);
+            digits.fold(0, |value, digit| value << 4 | u32::from(hex_value(*digit).unwrap_or(0)))
+        };
+        let command = Command::DumpRange {
+            first: number(0),
+            count: number(RANGE_DIGITS / 2),
+        };
+        self.letters.clear();
+        Some(Heard::Command(command))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// What a fresh parser hears when the bytes come one a millisecond.
+    fn heard(bytes: &[u8]) -> Vec<Heard> {
+        let mut parser = Parser::default();
+        bytes
+            .iter()
+            .enumerate()
+            .filter_map(|(at, byte)| parser.hear(*byte, 1000 * at as u64))
+            .collect()
+    }
+
+    #[test]
+    fn every_word_is_its_own_command() {
+        for entry in &COMMANDS {
+            if entry.command != (Command::DumpRange { first: 0, count: 0 }) {
+                assert_eq!(heard(entry.word), [Heard::Command(entry.command)]);
+            }
+            assert_eq!(word_of(entry.command), entry.word);
+        }
+    }
+
+    #[test]
+    fn case_counts() {
+        assert_eq!(heard(b"G_MT"), [Heard::Command(Command::SendPackets)]);
+        assert_eq!(heard(b"G_Mt"), [Heard::Command(Command::Stop)]);
+        assert_eq!(heard(b"G_MI"), [Heard::Unknown(*b"G_MI")]);
+        assert_eq!(heard(b"g_MT"), []);
+    }
+
+    #[test]
+    fn a_word_is_found_after_a_cut_one() {
+        for cut in [&b"G"[..], b"G_", b"xyz", b"\r\n", b"GG", b"_M", b"G_G_", b"M"] {
+            let bytes = [cut, b"G_ST"].concat();
+            assert_eq!(heard(&bytes), [Heard::Command(Command::Status)], "{cut:?}");
+        }
+    }
+
+    #[test]
+    fn a_half_word_is_forgotten_after_two_seconds() {
+        let mut parser = Parser::default();
+        for (at, byte) in b"G_M".iter().enumerate() {
+            assert_eq!(parser.hear(*byte, at as u64), None);
+        }
+        assert_eq!(parser.hear(b'V', HALF_WORD_TIMEOUT_US + 3), None);
+        assert_eq!(parser.passed_over, 4);
+    }
+
+    #[test]
+    fn a_range_takes_twelve_digits_and_names_a_wrong_one() {
+        assert_eq!(
+            heard(b"G_LR00001000000A"),
+            [Heard::Command(Command::DumpRange { first: 16, count: 10 })]
+        );
+        let wrong = Heard::BadDigit {
+            word: *b"G_LR",
+            digit: 3,
+            found: b'G',
+        };
+        assert_eq!(heard(b"G_LR000G_ST"), [wrong, Heard::Command(Command::Status)]);
+    }
+
+    proptest! {
+        #[test]
+        fn a_word_is_heard_after_any_bytes_and_a_pause(noise in proptest::collection::vec(any::<u8>(), 0..64)) {
+            let mut parser = Parser::default();
+            for byte in noise {
+                parser.hear(byte, 0);
+            }
+            let later = HALF_WORD_TIMEOUT_US + 1;
+            let words: Vec<_> = b"G_HE".iter().filter_map(|byte| parser.hear(*byte, later)).collect();
+            prop_assert_eq!(words, [Heard::Command(Command::Help)]);
+        }
+    }
+}

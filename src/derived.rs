@@ -1,0 +1,321 @@
+//! The derived frame: what a packet has no room for.
+//!
+//! In: a [`Derived`]; out: 225 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
+//! neither `@` nor `#`, so a reader of 156-byte packets passes over it; it is off unless asked for (G_DL).
+//!
+//! Between `$` and `*` stand upper-case hexadecimal fields, fixed width, most significant digit first; `CCCC` is
+//! CRC-16/CCITT-FALSE over them. Layout, with the digits of each field:
+//!
+//! ```text
+//! version 2 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
+//! covered_us 6 | angle_b 8 x 3 (IEEE 754) | for each gyro: integral 8 (IEEE 754), least 4, most 4, count 2
+//! ```
+
+use core::fmt;
+
+use crc::{CRC_16_IBM_3740, Crc};
+
+use crate::{
+    increments::{Channel, Increments},
+    mode::Mode,
+    packet::hex_value,
+    sample::{NO_SLOT, SENSOR_COUNT},
+};
+
+/// First byte of a derived frame.
+pub const DERIVED_START: u8 = b'$';
+
+/// Bytes of a derived frame.
+pub const DERIVED_BYTES: usize = 1 + FIELD_DIGITS + 1 + 4 + 1;
+
+const VERSION: u64 = 1;
+const FIELD_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT + 6 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
+const NO_SLOT_CODE: u64 = 0xF_FFFF;
+
+/// CRC-16/CCITT-FALSE, which the catalogue calls IBM-3740; "123456789" gives 29B1.
+const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+
+/// Health of the unit in one cycle, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Health(pub u32);
+
+impl Health {
+    /// The sensor bus was recovered.
+    pub const BUS_RECOVERED: Health = Health(1 << 16);
+    /// The deadline closed the cycle before every sensor had its turn.
+    pub const DEADLINE: Health = Health(1 << 17);
+    /// Packets are being recorded.
+    pub const RECORDING: Health = Health(1 << 18);
+    /// The recorder refused the last packet.
+    pub const RECORDER_REFUSED: Health = Health(1 << 19);
+    /// A magnetometer axis overflowed.
+    pub const MAGNETOMETER_OVERFLOW: Health = Health(1 << 20);
+    /// A gyro reported an alarm.
+    pub const GYRO_ALARM: Health = Health(1 << 21);
+    /// A gyro stands at the end of its range.
+    pub const GYRO_SATURATED: Health = Health(1 << 22);
+    /// A sensor had lost its configuration and got it back.
+    pub const RECONFIGURED: Health = Health(1 << 23);
+
+    /// With these bits set too. Bits 0 to 15 are the packet's error identifier.
+    pub fn with(self, more: Health) -> Health {
+        Health(self.0 | more.0)
+    }
+
+    /// With these bits set too if `condition`.
+    pub fn with_if(self, more: Health, condition: bool) -> Health {
+        if condition { self.with(more) } else { self }
+    }
+
+    /// Whether all these bits are set.
+    pub fn contains(self, other: Health) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+/// What a derived frame says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Derived {
+    /// Counter of the packet it belongs to.
+    pub counter: u16,
+    /// [us] start of the cycle, since the unit's clock started.
+    pub start_us: u64,
+    /// Mode of the unit.
+    pub mode: Mode,
+    /// Health, error identifier included.
+    pub health: Health,
+    /// [us] from the start of the cycle to the closing of its packet.
+    pub cycle_us: u32,
+    /// [us] when each sensor was sampled after `start_us`, reading order; [`NO_SLOT`] if it was not.
+    pub slots_us: [u32; SENSOR_COUNT],
+    /// The gyros since the packet before.
+    pub increments: Increments,
+}
+
+/// Why bytes are not a derived frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum DerivedError {
+    /// They are not [`DERIVED_BYTES`] long.
+    Length(usize),
+    /// The byte at this offset belongs to no frame.
+    Byte(usize),
+    /// The checksum does not fit.
+    Checksum {
+        /// Sent.
+        sent: u16,
+        /// Of the fields as received.
+        computed: u16,
+    },
+    /// A version this reader does not know.
+    Version(u8),
+}
+
+impl fmt::Display for DerivedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DerivedError::Length(found) => write!(f, "{found} bytes where a derived frame has {DERIVED_BYTES}"),
+            DerivedError::Byte(at) => write!(f, "byte {at} belongs to no derived frame"),
+            DerivedError::Checksum { sent, computed } => {
+                write!(f, "checksum {sent:04X} was sent, the fields give {computed:04X}")
+            }
+            DerivedError::Version(found) => write!(f, "version {found}; this reader knows {VERSION}: update it"),
+        }
+    }
+}
+
+impl core::error::Error for DerivedError {}
+
+/// The frame of a cycle.
+pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
+    let mut frame = [0; DERIVED_BYTES];
+    let mut fields = Writer {
+        frame: &mut frame,
+        at: 1,
+    };
+    fields.put(VERSION, 2);
+    fields.put(derived.counter.into(), 4);
+    fields.put(derived.start_us, 16);
+    fields.put((derived.mode == Mode::Flight).into(), 1);
+    fields.put(derived.health.0.into(), 8);
+    fields.put(u64::from(derived.cycle_us).min(NO_SLOT_CODE), 5);
+    for slot_us in derived.slots_us {
+        fields.put(
+            if slot_us == NO_SLOT {
+                NO_SLOT_CODE
+            } else {
+                u64::from(slot_us).min(NO_SLOT_CODE - 1)
+            },
+            5,
+        );
+    }
+    fields.put(u64::from(derived.increments.covered_us).min(0xFF_FFFF), 6);
+    for angle in derived.increments.angle_b {
+        fields.put(angle.to_bits().into(), 8);
+    }
+    for channel in derived.increments.gyro {
+        fields.put(channel.integral_counts_s.to_bits().into(), 8);
+        fields.put((channel.least as u16).into(), 4);
+        fields.put((channel.most as u16).into(), 4);
+        fields.put(channel.count.into(), 2);
+    }
+    let crc = CRC.checksum(&frame[1..1 + FIELD_DIGITS]);
+    let mut end = Writer {
+        frame: &mut frame,
+        at: 2 + FIELD_DIGITS,
+    };
+    end.put(crc.into(), 4);
+    frame[0] = DERIVED_START;
+    frame[1 + FIELD_DIGITS] = b'*';
+    frame[DERIVED_BYTES - 1] = b'\n';
+    frame
+}
+
+/// What a frame says.
+pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
+    let frame: &[u8; DERIVED_BYTES] = bytes.try_into().map_err(|_| DerivedError::Length(bytes.len()))?;
+    let fits = |(at, byte): &(usize, &u8)| match *at {
+        0 => **byte == DERIVED_START,
+        at if at == 1 + FIELD_DIGITS => **byte == b'*',
+        at if at == DERIVED_BYTES - 1 => **byte == b'\n',
+        _ => hex_value(**byte).is_some(),
+    };
+    if let Some((at, _)) = frame.iter().enumerate().find(|entry| !fits(entry)) {
+        return Err(DerivedError::Byte(at));
+    }
+    let sent = Reader {
+        frame,
+        at: 2 + FIELD_DIGITS,
+    }
+    .word();
+    let computed = CRC.checksum(&frame[1..1 + FIELD_DIGITS]);
+    if sent != computed {
+        return Err(DerivedError::Checksum { sent, computed });
+    }
+    let mut fields = Reader { frame, at: 1 };
+    let version = fields.take(2);
+    if version != VERSION {
+        return Err(DerivedError::Version(version as u8));
+    }
+    Ok(Derived {
+        counter: fields.word(),
+        start_us: fields.take(16),
+        mode: if fields.take(1) == 1 { Mode::Flight } else { Mode::Wait },
+        health: Health(fields.take(8) as u32),
+        cycle_us: fields.take(5) as u32,
+        slots_us: core::array::from_fn(|_| match fields.take(5) {
+            NO_SLOT_CODE => NO_SLOT,
+            slot_us => slot_us as u32,
+        }),
+        increments: Increments {
+            covered_us: fields.take(6) as u32,
+            angle_b: core::array::from_fn(|_| fields.real()),
+            gyro: core::array::from_fn(|_| Channel {
+                integral_counts_s: fields.real(),
+                least: fields.word() as i16,
+                most: fields.word() as i16,
+                count: fields.take(2) as u8,
+            }),
+        },
+    })
+}
+
+struct Writer<'a> {
+    frame: &'a mut [u8; DERIVED_BYTES],
+    at: usize,
+}
+
+impl Writer<'_> {
+    fn put(&mut self, value: u64, digits: usize) {
+        for digit in (0..digits).rev() {
+            self.frame[self.at] = b"0123456789ABCDEF"[(value >> (4 * digit) & 0xF) as usize];
+            self.at += 1;
+        }
+    }
+}
+
+/// Reads fields whose digits have been checked.
+struct Reader<'a> {
+    frame: &'a [u8; DERIVED_BYTES],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn take(&mut self, digits: usize) -> u64 {
+        let field = &self.frame[self.at..self.at + digits];
+        self.at += digits;
+        field
+            .iter()
+            .fold(0, |value, digit| value << 4 | u64::from(hex_value(*digit).unwrap_or(0)))
+    }
+
+    fn word(&mut self) -> u16 {
+        self.take(4) as u16
+    }
+
+    fn real(&mut self) -> f32 {
+        f32::from_bits(self.take(8) as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet;
+
+    fn derived() -> Derived {
+        let channel = |count| Channel {
+            integral_counts_s: -1.25,
+            least: -300,
+            most: 12,
+            count,
+        };
+        let mut slots_us = core::array::from_fn(|slot| 225 * slot as u32);
+        slots_us[7] = NO_SLOT;
+        Derived {
+            counter: 0xBEEF,
+            start_us: 86_400_000_000,
+            mode: Mode::Flight,
+            health: Health(0x80).with(Health::RECORDING),
+            cycle_us: 3_700,
+            slots_us,
+            increments: Increments {
+                angle_b: [0.1, -0.2, 1.0e-7],
+                covered_us: 200_000,
+                gyro: [channel(20), channel(19), channel(0), channel(255)],
+            },
+        }
+    }
+
+    #[test]
+    fn a_frame_says_what_it_was_given() {
+        assert_eq!(decode(&encode(&derived())), Ok(derived()));
+        assert_eq!(DERIVED_BYTES, 225);
+    }
+
+    #[test]
+    fn the_checksum_is_ccitt_false() {
+        assert_eq!(CRC.checksum(b"123456789"), 0x29B1);
+    }
+
+    #[test]
+    fn a_reader_of_packets_never_sees_one_begin_or_end_in_it() {
+        assert!(
+            !encode(&derived())
+                .iter()
+                .any(|byte| matches!(*byte, packet::START | packet::END))
+        );
+    }
+
+    #[test]
+    fn every_one_bit_error_is_refused() {
+        for bit in 0..8 * DERIVED_BYTES {
+            let mut frame = encode(&derived());
+            frame[bit / 8] ^= 1 << (bit % 8);
+            assert!(decode(&frame).is_err(), "bit {bit}");
+        }
+        assert_eq!(decode(b"$"), Err(DerivedError::Length(1)));
+    }
+}

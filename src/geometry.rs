@@ -1,0 +1,102 @@
+//! Where the sensors point: plate rotations and gyro axes in the right-handed body frame b (forward, right, down).
+//!
+//! The plates stand on the faces of a nearly regular tetrahedron, tilted by atan(1/3) (thesis, section 3.2; the exact
+//! angle is 18.4349 deg, its 18.4345 a slip). The thesis' frame e is left-handed: `x_b = z_e, y_b = y_e, z_b = x_e`; it
+//! does not appear here. Gyro `i` senses the right-handed rate about `-z` of plate `i`.
+
+use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix, Vector3, Vector4};
+
+/// cos atan(1/3) = 3/sqrt(10).
+const C: f32 = 0.948_683_3;
+/// sin atan(1/3) = 1/sqrt(10).
+const S: f32 = 0.316_227_77;
+/// sin 60 deg.
+const H: f32 = 0.866_025_4;
+
+/// Rotation of plate `plate` (0 to 3) to b: `v_b = dcm_bp * v_p`. Determinant +1.
+pub fn dcm_bp(plate: usize) -> Matrix3<f32> {
+    match plate {
+        0 => Matrix3::new(-S, 0.0, C, 0.0, -1.0, 0.0, C, 0.0, S),
+        1 => Matrix3::new(S / 2.0, H, -C / 2.0, -S * H, 0.5, C * H, C, 0.0, S),
+        2 => Matrix3::new(S / 2.0, -H, -C / 2.0, S * H, 0.5, -C * H, C, 0.0, S),
+        _ => Matrix3::new(-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0),
+    }
+}
+
+/// Sense axes of the four gyros in b, one a row: `gyro = gyro_axes_b() * omega_b`.
+pub fn gyro_axes_b() -> Matrix4x3<f32> {
+    let axis = |plate: usize| -> RowVector3<f32> { -dcm_bp(plate).column(2).transpose() };
+    Matrix4x3::from_rows(&[axis(0), axis(1), axis(2), axis(3)])
+}
+
+/// Least-squares rate from the gyros whose bit in `present` is set (bit 0 is plate 1): `omega_b = matrix * gyro`, with
+/// columns of zeros for the absent ones. `None` for fewer than three: three axes of the tetrahedron span space, two
+/// do not.
+pub fn rate_from_gyros(present: u8) -> Option<SMatrix<f32, 3, 4>> {
+    let mut axes_b = gyro_axes_b();
+    for plate in 0..4 {
+        if present >> plate & 1 == 0 {
+            axes_b.set_row(plate, &RowVector3::zeros());
+        }
+    }
+    if (present & 0xF).count_ones() < 3 {
+        return None;
+    }
+    let normal = axes_b.transpose() * axes_b;
+    Some(normal.try_inverse()? * axes_b.transpose())
+}
+
+/// The rate seen by four gyros [same unit], all present.
+pub fn rate_b(gyro: Vector4<f32>) -> Vector3<f32> {
+    rate_from_gyros(0xF).map_or(Vector3::zeros(), |matrix| matrix * gyro)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// f32 rounding of products of three numbers below one.
+    const ROUNDING: f32 = 3e-7;
+
+    #[test]
+    fn plates_are_right_handed_rotations() {
+        for plate in 0..4 {
+            let dcm = dcm_bp(plate);
+            assert!((dcm.determinant() - 1.0).abs() < ROUNDING, "plate {plate}");
+            assert!(
+                (dcm * dcm.transpose() - Matrix3::identity()).norm() < 4.0 * ROUNDING,
+                "plate {plate}"
+            );
+        }
+    }
+
+    #[test]
+    fn gyro_axes_are_those_of_the_thesis_in_b() {
+        let expected = Matrix4x3::new(-C, 0.0, -S, C / 2.0, -C * H, -S, C / 2.0, C * H, -S, 0.0, 0.0, 1.0);
+        assert!((gyro_axes_b() - expected).norm() < ROUNDING);
+    }
+
+    #[test]
+    fn four_gyros_give_the_exact_pseudo_inverse() {
+        // M_GIRO in b: rows 3, 2, 1 of the exact matrix behind Eq 3.36.
+        #[rustfmt::skip]
+        let expected = SMatrix::<f32, 3, 4>::new(
+            -0.702_728_37, 0.351_364_18, 0.351_364_18, 0.0,
+            0.0, -0.608_580_62, 0.608_580_62, 0.0,
+            -0.243_252_13, -0.243_252_13, -0.243_252_13, 0.769_230_77,
+        );
+        assert!((rate_from_gyros(0xF).unwrap() - expected).norm() < 1e-6);
+    }
+
+    #[test]
+    fn any_three_gyros_give_the_rate_and_two_do_not() {
+        let omega_b = Vector3::new(0.1, -0.2, 0.3);
+        let gyro = gyro_axes_b() * omega_b;
+        for present in [0b0111, 0b1011, 0b1101, 0b1110, 0b1111] {
+            let found = rate_from_gyros(present).unwrap() * gyro;
+            assert!((found - omega_b).norm() < 1e-6, "{present:04b}");
+        }
+        assert_eq!(rate_from_gyros(0b0011), None);
+        assert_eq!(rate_from_gyros(0), None);
+    }
+}

@@ -1,0 +1,253 @@
+//! The gyros between two packets: integrated rates with coning correction.
+//!
+//! In: the four gyros in counts and the instant of each fast sample. Out, once a cycle: the rotation increment of b,
+//! and for each gyro the integral, smallest and largest count and how many samples.
+//!
+//! A 5 Hz filter on single rate samples loses what happened between them; on increments it loses nothing. The increment
+//! is a rotation vector: `phi = sum d_k + 1/2 sum (a_{k-1} + d_{k-1}/6) x d_k` with `d_k` the angle of interval `k`
+//! (trapezoid) and `a_{k-1}` the sum before it (P. Savage, "Strapdown inertial navigation integration algorithm design,
+//! part 1", J. Guid. Control Dyn. 21(1), 1998, Eq 48: coning of the accumulated angle plus the two-sample term).
+//! Without the second sum a coning motion is mistaken for no motion at all along the cone's axis.
+//!
+//! Refuses intervals that are not later than the one before or longer than [`LONGEST_INTERVAL_S`]: they count as gaps.
+//! With fewer than three gyros there is no rate: the interval is a gap too.
+
+use nalgebra::{SMatrix, Vector3, Vector4};
+
+use crate::{geometry::rate_from_gyros, sample::NOT_READ};
+
+/// [rad/s] a count of an ADIS16265 in its 320 deg/s range: 0.07326 deg/s (data sheet, Table 1).
+pub const RAD_S_PER_COUNT: f32 = 0.07326 * core::f32::consts::PI / 180.0;
+
+/// [s] an interval longer than this is a gap: rates between its ends are not known.
+pub const LONGEST_INTERVAL_S: f32 = 0.1;
+
+/// What the fast samples of one cycle gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Increments {
+    /// [rad] rotation vector of b over the cycle, in b.
+    pub angle_b: [f32; 3],
+    /// [us] time the increment covers; shorter than the cycle by its gaps.
+    pub covered_us: u32,
+    /// Each gyro.
+    pub gyro: [Channel; 4],
+}
+
+/// One gyro over a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Channel {
+    /// [counts s] integral of the rate.
+    pub integral_counts_s: f32,
+    /// [counts] smallest sample; [`NOT_READ`] without samples.
+    pub least: i16,
+    /// [counts] largest sample; [`NOT_READ`] without samples.
+    pub most: i16,
+    /// Samples.
+    pub count: u8,
+}
+
+const EMPTY: Increments = Increments {
+    angle_b: [0.0; 3],
+    covered_us: 0,
+    gyro: [Channel {
+        integral_counts_s: 0.0,
+        least: NOT_READ,
+        most: NOT_READ,
+        count: 0,
+    }; 4],
+};
+
+/// The running integration.
+#[derive(Clone, Debug)]
+pub struct Integrator {
+    sum: Increments,
+    coning_b: Vector3<f32>,
+    last_angle_b: Vector3<f32>,
+    last: Option<Fast>,
+    present: u8,
+    rate_from_counts: Option<SMatrix<f32, 3, 4>>,
+}
+
+/// One fast sample of the four gyros.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Fast {
+    /// [us] when.
+    pub at_us: u64,
+    /// [counts] each gyro; [`NOT_READ`] where it was not read.
+    pub counts: [i16; 4],
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Integrator {
+            sum: EMPTY,
+            coning_b: Vector3::zeros(),
+            last_angle_b: Vector3::zeros(),
+            last: None,
+            present: 0,
+            rate_from_counts: None,
+        }
+    }
+}
+
+impl Integrator {
+    /// Takes a fast sample.
+    pub fn add(&mut self, fast: Fast) {
+        for (channel, counts) in self.sum.gyro.iter_mut().zip(fast.counts) {
+            channel.note(counts);
+        }
+        let Some(last) = self.last.replace(fast) else { return };
+        let dt_s = fast.at_us.saturating_sub(last.at_us) as f32 * 1e-6;
+        if dt_s <= 0.0 || dt_s > LONGEST_INTERVAL_S {
+            return;
+        }
+        let mut mean_counts = Vector4::zeros();
+        let mut present = 0;
+        for (plate, (now, before)) in fast.counts.into_iter().zip(last.counts).enumerate() {
+            if now != NOT_READ && before != NOT_READ {
+                present |= 1 << plate;
+                mean_counts[plate] = 0.5 * (f32::from(now) + f32::from(before));
+                self.sum.gyro[plate].integral_counts_s += mean_counts[plate] * dt_s;
+            }
+        }
+        if present != self.present {
+            self.present = present;
+            self.rate_from_counts = rate_from_gyros(present).map(|matrix| matrix * RAD_S_PER_COUNT);
+        }
+        if let Some(rate_from_counts) = self.rate_from_counts {
+            self.rotate(rate_from_counts * mean_counts * dt_s);
+            self.sum.covered_us += (fast.at_us - last.at_us) as u32;
+        }
+    }
+
+    fn rotate(&mut self, angle_b: Vector3<f32>) {
+        let before_b = Vector3::from(self.sum.angle_b);
+        self.coning_b += (before_b + self.last_angle_b / 6.0).cross(&angle_b) / 2.0;
+        self.last_angle_b = angle_b;
+        self.sum.angle_b = (before_b + angle_b).into();
+    }
+
+    /// What came since it was last asked; the next interval begins where this one ended.
+    pub fn take(&mut self) -> Increments {
+        let mut taken = core::mem::replace(&mut self.sum, EMPTY);
+        taken.angle_b = (Vector3::from(taken.angle_b) + core::mem::take(&mut self.coning_b)).into();
+        taken
+    }
+}
+
+impl Channel {
+    fn note(&mut self, counts: i16) {
+        if counts == NOT_READ {
+            return;
+        }
+        let first = self.count == 0;
+        self.least = if first { counts } else { self.least.min(counts) };
+        self.most = if first { counts } else { self.most.max(counts) };
+        self.count = self.count.saturating_add(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{ComplexField, UnitQuaternion};
+
+    use super::*;
+    use crate::geometry::gyro_axes_b;
+
+    fn counts(omega_b: Vector3<f32>) -> [i16; 4] {
+        let gyro = gyro_axes_b() * omega_b / RAD_S_PER_COUNT;
+        core::array::from_fn(|plate| ComplexField::round(gyro[plate]) as i16)
+    }
+
+    #[test]
+    fn a_constant_rate_gives_rate_times_time() {
+        let mut integrator = Integrator::default();
+        let omega_b = Vector3::new(0.5, -1.0, 2.0);
+        for sample in 0..21 {
+            integrator.add(Fast {
+                at_us: 10_000 * sample,
+                counts: counts(omega_b),
+            });
+        }
+        let increments = integrator.take();
+        // Half a count on each gyro over 0.2 s.
+        let rounding = RAD_S_PER_COUNT * 0.2;
+        assert!((Vector3::from(increments.angle_b) - omega_b * 0.2).norm() < rounding);
+        assert_eq!((increments.covered_us, increments.gyro[3].count), (200_000, 21));
+        assert_eq!(increments.gyro[3].least, increments.gyro[3].most);
+    }
+
+    /// Half-angle 10 deg, 1 Hz: the body's axis sweeps a cone, and a body that does not spin along it seems to turn.
+    fn coned(corrected: bool) -> f32 {
+        const HALF_ANGLE: f32 = 0.175;
+        const OMEGA: f32 = core::f32::consts::TAU;
+        let attitude = |t_s: f32| {
+            let axis = Vector3::new(ComplexField::cos(OMEGA * t_s), ComplexField::sin(OMEGA * t_s), 0.0);
+            UnitQuaternion::from_scaled_axis(axis * HALF_ANGLE)
+        };
+        let rate_b = |t_s: f32| {
+            let (sin, cos) = (ComplexField::sin(HALF_ANGLE), ComplexField::cos(HALF_ANGLE));
+            let (sin_t, cos_t) = (ComplexField::sin(OMEGA * t_s), ComplexField::cos(OMEGA * t_s));
+            OMEGA * Vector3::new(-sin * sin_t, sin * cos_t, -(1.0 - cos))
+        };
+        let mut integrator = Integrator::default();
+        let mut found = attitude(0.0);
+        for sample in 0..=1000 {
+            let at_us = 10_000 * sample;
+            integrator.add(Fast {
+                at_us,
+                counts: counts(rate_b(at_us as f32 * 1e-6)),
+            });
+            if sample > 0 && sample % 20 == 0 {
+                let coning_b = integrator.coning_b;
+                let angle_b = Vector3::from(integrator.take().angle_b);
+                found *= UnitQuaternion::from_scaled_axis(if corrected { angle_b } else { angle_b - coning_b });
+            }
+        }
+        found.angle_to(&attitude(10.0))
+    }
+
+    #[test]
+    fn coning_is_followed_and_would_not_be_without_the_correction() {
+        // Half a count for ten seconds: the rate along the cone's axis is constant, so its rounding adds up.
+        let rounding = 0.5 * RAD_S_PER_COUNT * 10.0;
+        assert!(coned(true) < rounding, "{}", coned(true));
+        assert!(coned(false) > 10.0 * rounding, "{}", coned(false));
+    }
+
+    #[test]
+    fn gaps_and_time_going_back_are_not_integrated() {
+        let mut integrator = Integrator::default();
+        let omega_b = Vector3::new(0.0, 0.0, 1.0);
+        for at_us in [0, 10_000, 5_000, 15_000, 600_000, 610_000] {
+            integrator.add(Fast {
+                at_us,
+                counts: counts(omega_b),
+            });
+        }
+        assert_eq!(integrator.take().covered_us, 30_000);
+    }
+
+    #[test]
+    fn one_silent_gyro_costs_nothing_and_two_make_a_gap() {
+        let mut integrator = Integrator::default();
+        let omega_b = Vector3::new(0.3, 0.2, 1.0);
+        let mut three = counts(omega_b);
+        three[1] = NOT_READ;
+        let mut two = three;
+        two[2] = NOT_READ;
+        for (sample, counts) in [three, three, two, two].into_iter().enumerate() {
+            integrator.add(Fast {
+                at_us: 10_000 * sample as u64,
+                counts,
+            });
+        }
+        let increments = integrator.take();
+        assert_eq!((increments.covered_us, increments.gyro[1].count), (10_000, 0));
+        assert_eq!(increments.gyro[1].least, NOT_READ);
+        assert!((Vector3::from(increments.angle_b) - omega_b * 0.01).norm() < 0.01 * RAD_S_PER_COUNT);
+    }
+}

@@ -1,0 +1,370 @@
+//! HMC5883L: three-axis magnetometer, 12 bits, gain selectable.
+//!
+//! In: an I2C bus. Out: x, y, z in counts (-2048 to 2047), each with its overflow mark. Source: Honeywell HMC5883L
+//! datasheet (form 900405), register tables 2 to 20. The output registers come in the order X, Z, Y, and are locked from
+//! the first byte read until all six are: every path here ends with all six read. Refuses another part, settings that
+//! were not kept, codes the part cannot produce, and a lock that does not open; the first set after a change of settings
+//! was measured with the old gain and is withheld.
+
+use embedded_hal_async::i2c::{I2c, Operation};
+
+use super::{Error, Register};
+
+pub mod self_test;
+
+/// Bus address (datasheet, I2C communication protocol).
+pub const ADDRESS: u8 = 0x1E;
+
+/// Code of an axis that overflowed (datasheet, data output registers).
+pub const OVERFLOW: i16 = -4096;
+
+const CONFIGURATION_A: Register = register("Configuration A", 0x00);
+const CONFIGURATION_B: Register = register("Configuration B", 0x01);
+const MODE: Register = register("Mode", 0x02);
+const DATA_X: Register = register("Data Output X", 0x03);
+const DATA_Z: Register = register("Data Output Z", 0x05);
+const DATA_Y: Register = register("Data Output Y", 0x07);
+const STATUS: Register = register("Status", 0x09);
+const IDENTIFICATION_A: Register = register("Identification A", 0x0A);
+const IDENTIFICATION_B: Register = register("Identification B", 0x0B);
+const IDENTIFICATION_C: Register = register("Identification C", 0x0C);
+
+/// Status: a set is in the output registers.
+const RDY: u8 = 0x01;
+/// Status: the output registers were read in part, or the mode register was read, and are locked (table 17).
+const LOCK: u8 = 0x02;
+
+const fn register(name: &'static str, address: u8) -> Register {
+    let part = "HMC5883L";
+    Register { part, name, address }
+}
+
+/// Gain, by its counts a gauss (datasheet table 9, GN2 to GN0). The field that fits is the inverse: 0.88 to 8.1 gauss.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Gain {
+    PerGauss1370 = 0,
+    #[default]
+    PerGauss1090 = 1,
+    PerGauss820 = 2,
+    PerGauss660 = 3,
+    PerGauss440 = 4,
+    PerGauss390 = 5,
+    PerGauss330 = 6,
+    PerGauss230 = 7,
+}
+
+impl Gain {
+    /// [counts/gauss]; one gauss is 100 uT.
+    pub const fn counts_per_gauss(self) -> u16 {
+        [1370, 1090, 820, 660, 440, 390, 330, 230][self as usize]
+    }
+}
+
+/// Measurements a second in continuous mode (datasheet table 5, DO2 to DO0).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Rate {
+    Hz0_75 = 0,
+    Hz1_5 = 1,
+    Hz3 = 2,
+    Hz7_5 = 3,
+    Hz15 = 4,
+    Hz30 = 5,
+    #[default]
+    Hz75 = 6,
+}
+
+/// Measurements averaged into one set (datasheet table 4, MA1 MA0).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Average {
+    #[default]
+    Of1 = 0,
+    Of2 = 1,
+    Of4 = 2,
+    Of8 = 3,
+}
+
+/// Settings; the mode is always continuous.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Config {
+    /// Gain of all axes.
+    pub gain: Gain,
+    /// Output rate.
+    pub rate: Rate,
+    /// Averaging.
+    pub average: Average,
+}
+
+impl Config {
+    /// Configuration A, Configuration B, Mode.
+    const fn registers(self) -> [u8; 3] {
+        const CONTINUOUS: u8 = 0;
+        let a = (self.average as u8) << 5 | (self.rate as u8) << 2;
+        [a, (self.gain as u8) << 5, CONTINUOUS]
+    }
+}
+
+/// One set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// [counts, 1 / [`Gain::counts_per_gauss`] each] x, y, z in the part's axes; [`OVERFLOW`] where it overflowed.
+    pub counts: [i16; 3],
+    /// Which of x, y, z overflowed.
+    pub overflow: [bool; 3],
+    /// The part had finished writing the set (RDY).
+    pub ready: bool,
+}
+
+/// A magnetometer on its bus.
+pub struct Hmc5883l<I2C> {
+    bus: I2C,
+    /// The next set was measured with earlier settings.
+    withhold: bool,
+}
+
+impl<I2C: I2c> Hmc5883l<I2C> {
+    /// Nothing is sent.
+    pub fn new(bus: I2C) -> Self {
+        Hmc5883l { bus, withhold: true }
+    }
+
+    /// Asks for the identity, "H43".
+    pub async fn probe(&mut self) -> Result<(), Error<I2C::Error>> {
+        let mut read = [0; 3];
+        self.bus
+            .write_read(ADDRESS, &[IDENTIFICATION_A.address], &mut read)
+            .await
+            .map_err(|e| Error::Bus(IDENTIFICATION_A, e))?;
+        let identity = [
+            (IDENTIFICATION_A, b'H'),
+            (IDENTIFICATION_B, b'4'),
+            (IDENTIFICATION_C, b'3'),
+        ];
+        for ((register, expected), read) in identity.into_iter().zip(read) {
+            Error::unless_identity(register, expected.into(), read.into())?;
+        }
+        Ok(())
+    }
+
+    /// Writes the settings and reads them back; the next set read is withheld.
+    pub async fn configure(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
+        self.probe().await?;
+        self.write(config.registers()).await?;
+        self.verify(config).await
+    }
+
+    /// Reads the settings back: finds a part that has restarted by itself.
+    pub async fn verify(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
+        let (mut kept, mut data) = ([0; 3], [0; 6]);
+        // Reading the mode register locks the outputs (table 17); reading all of them opens the lock.
+        self.two_reads((CONFIGURATION_A, &mut kept), &mut data).await?;
+        let registers = [CONFIGURATION_A, CONFIGURATION_B, MODE];
+        for ((register, wrote), read) in registers.into_iter().zip(config.registers()).zip(kept) {
+            Error::unless_kept(register, wrote.into(), read.into())?;
+        }
+        Ok(())
+    }
+
+    /// Takes the newest set. `None`: it was withheld, being the first since the settings changed; the next is good if it
+    /// is read one measurement later.
+    pub async fn read(&mut self) -> Result<Option<Sample>, Error<I2C::Error>> {
+        let sample = self.newest().await?;
+        Ok((!core::mem::take(&mut self.withhold)).then_some(sample))
+    }
+
+    async fn newest(&mut self) -> Result<Sample, Error<I2C::Error>> {
+        let (mut status, mut data) = self.status_and_data().await?;
+        if status & LOCK != 0 {
+            // The set was held since an earlier, incomplete reading; this reading of all six bytes has released it.
+            (status, data) = self.status_and_data().await?;
+        }
+        if status & LOCK != 0 {
+            let (register, read) = (STATUS, status.into());
+            return Err(Error::Stuck { register, read });
+        }
+        let [xh, xl, zh, zl, yh, yl] = data;
+        let counts = [
+            code(DATA_X, [xh, xl])?,
+            code(DATA_Y, [yh, yl])?,
+            code(DATA_Z, [zh, zl])?,
+        ];
+        Ok(Sample {
+            counts,
+            overflow: counts.map(|c| c == OVERFLOW),
+            ready: status & RDY != 0,
+        })
+    }
+
+    async fn write(&mut self, [a, b, mode]: [u8; 3]) -> Result<(), Error<I2C::Error>> {
+        self.withhold = true;
+        self.bus
+            .write(ADDRESS, &[CONFIGURATION_A.address, a, b, mode])
+            .await
+            .map_err(|e| Error::Bus(CONFIGURATION_A, e))
+    }
+
+    async fn status_and_data(&mut self) -> Result<(u8, [u8; 6]), Error<I2C::Error>> {
+        let (mut status, mut data) = ([0], [0; 6]);
+        self.two_reads((STATUS, &mut status), &mut data).await?;
+        Ok((status[0], data))
+    }
+
+    /// Reads some registers and then all six data bytes in one transaction. The data address is sent, since whether the
+    /// pointer runs on from register 8 to 9 or back to 3 differs between the part's datasheet revisions.
+    async fn two_reads(
+        &mut self,
+        (first, bytes): (Register, &mut [u8]),
+        data: &mut [u8; 6],
+    ) -> Result<(), Error<I2C::Error>> {
+        let mut operations = [
+            Operation::Write(&[first.address]),
+            Operation::Read(bytes),
+            Operation::Write(&[DATA_X.address]),
+            Operation::Read(data),
+        ];
+        self.bus
+            .transaction(ADDRESS, &mut operations)
+            .await
+            .map_err(|e| Error::Bus(first, e))
+    }
+}
+
+/// The codes of one axis: 12 bits, sign-extended by the part, or [`OVERFLOW`].
+fn code<E>(register: Register, bytes: [u8; 2]) -> Result<i16, Error<E>> {
+    match i16::from_be_bytes(bytes) {
+        counts @ (-2048..=2047 | OVERFLOW) => Ok(counts),
+        other => {
+            let read = other.cast_unsigned();
+            Err(Error::Garbage { register, read })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::{vec, vec::Vec};
+
+    use embassy_futures::block_on;
+    use embedded_hal_async::i2c::{ErrorKind, NoAcknowledgeSource};
+    use embedded_hal_mock::eh1::i2c::{Mock, Transaction as T};
+
+    use super::*;
+
+    /// Runs `act` on a part whose settings were in force before.
+    pub(super) fn with<R>(expected: &[Vec<T>], act: impl AsyncFnOnce(&mut Hmc5883l<Mock>) -> R) -> R {
+        let mut mock = Mock::new(&expected.concat());
+        let mut part = Hmc5883l::new(mock.clone());
+        part.withhold = false;
+        let result = block_on(act(&mut part));
+        mock.done();
+        result
+    }
+
+    fn reads(first: u8, bytes: &[u8], data: [u8; 6]) -> Vec<T> {
+        vec![
+            T::transaction_start(0x1E),
+            T::write(0x1E, vec![first]),
+            T::read(0x1E, bytes.to_vec()),
+            T::write(0x1E, vec![0x03]),
+            T::read(0x1E, data.to_vec()),
+            T::transaction_end(0x1E),
+        ]
+    }
+
+    pub(super) fn set(status: u8, data: [u8; 6]) -> Vec<T> {
+        reads(0x09, &[status], data)
+    }
+
+    fn identity(bytes: &[u8; 3]) -> Vec<T> {
+        vec![T::write_read(0x1E, vec![0x0A], bytes.to_vec())]
+    }
+
+    pub(super) fn configuration(wrote: [u8; 3], kept: [u8; 3]) -> Vec<T> {
+        let write = T::write(0x1E, [&[0x00][..], &wrote].concat());
+        [identity(b"H43"), vec![write], reads(0x00, &kept, [0; 6])].concat()
+    }
+
+    #[test]
+    fn registers_come_as_x_z_y_and_leave_as_x_y_z() {
+        let check = |data, counts, overflow| {
+            let sample = with(&[set(0x01, data)], async |part| part.read().await);
+            let ready = true;
+            assert_eq!(
+                sample,
+                Ok(Some(Sample {
+                    counts,
+                    overflow,
+                    ready
+                }))
+            );
+        };
+        check([0x00, 0x78, 0xFF, 0x2E, 0xFF, 0xDD], [120, -35, -210], [false; 3]);
+        check([0xF8, 0x00, 0x07, 0xFF, 0xFF, 0xFF], [-2048, -1, 2047], [false; 3]);
+        check(
+            [0x00, 0x01, 0xF0, 0x00, 0x00, 0x02],
+            [1, 2, -4096],
+            [false, false, true],
+        );
+    }
+
+    #[test]
+    fn a_code_beyond_twelve_bits_is_garbage() {
+        let garbage = set(0x01, [0x00, 0x01, 0x00, 0x01, 0x08, 0x00]);
+        let (register, read) = (DATA_Y, 0x0800);
+        let result = with(&[garbage], async |part| part.read().await);
+        assert_eq!(result, Err(Error::Garbage { register, read }));
+    }
+
+    #[test]
+    fn a_lock_left_by_a_partial_reading_is_opened_and_the_held_set_not_used() {
+        let (held, new) = ([0, 1, 0, 1, 0, 1], [0, 2, 0, 2, 0, 2]);
+        let sample = with(&[set(0x03, held), set(0x00, new)], async |part| part.read().await);
+        let sample = sample.unwrap().unwrap();
+        assert_eq!((sample.counts, sample.ready), ([2; 3], false));
+
+        let stuck = with(&[set(0x03, held), set(0x03, held)], async |part| part.read().await);
+        let (register, read) = (STATUS, 3);
+        assert_eq!(stuck, Err(Error::Stuck { register, read }));
+    }
+
+    #[test]
+    fn the_first_set_after_configuring_is_withheld() {
+        let wrote = [0x78, 0xA0, 0x00];
+        let (gain, rate, average) = (Gain::PerGauss390, Rate::Hz75, Average::Of8);
+        let config = Config { gain, rate, average };
+        let expected = [configuration(wrote, wrote), set(0x01, [0; 6]), set(0x01, [0; 6])];
+        with(&expected, async |part| {
+            part.configure(config).await.unwrap();
+            assert_eq!(part.read().await, Ok(None));
+            assert!(part.read().await.unwrap().is_some());
+        });
+    }
+
+    #[test]
+    fn a_part_that_restarted_is_found_and_its_outputs_are_unlocked() {
+        // Power-on values: 15 Hz, 1090 counts a gauss, single measurement.
+        let power_on = reads(0x00, &[0x10, 0x20, 0x01], [0; 6]);
+        let result = with(&[power_on], async |part| part.verify(Config::default()).await);
+        let (register, wrote, read) = (CONFIGURATION_A, 0x18, 0x10);
+        assert_eq!(result, Err(Error::NotKept { register, wrote, read }));
+    }
+
+    #[test]
+    fn another_part_or_none_is_refused() {
+        let result = with(&[identity(b"H53")], async |part| part.probe().await);
+        let wrong = Error::WrongIdentity {
+            register: IDENTIFICATION_B,
+            expected: b'4'.into(),
+            read: b'5'.into(),
+        };
+        assert_eq!(result, Err(wrong));
+
+        let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+        let silent = vec![identity(b"H43").remove(0).with_error(nack)];
+        let result = with(&[silent], async |part| part.configure(Config::default()).await);
+        assert_eq!(result, Err(Error::Bus(IDENTIFICATION_A, nack)));
+    }
+}

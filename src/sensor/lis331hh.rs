@@ -1,0 +1,366 @@
+//! LIS331HH: three-axis accelerometer, +-6, 12 or 24 g, 12 bits.
+//!
+//! In: an I2C bus. Out: x, y, z in right-justified counts (-2048 to 2047; the registers are left-justified), with the
+//! part's own data-ready and overrun flags. Source: STMicroelectronics LIS331HH datasheet, section 7 (registers), section
+//! 5.1.1 (bit 7 of the sub-address steps it on). Refuses another part, settings that were not kept, a high-pass filter
+//! left on (gravity would disappear), and words the part cannot produce.
+
+use embedded_hal_async::{delay::DelayNs, i2c::I2c};
+
+use super::{Error, Register};
+
+/// Bus address with SA0 low (datasheet section 5.1.1).
+pub const ADDRESS: u8 = 0x18;
+
+/// Content of WHO_AM_I (datasheet section 7.1).
+const IDENTITY: u8 = 0x32;
+/// Bit 7 of the sub-address: step on after each byte.
+const STEP: u8 = 0x80;
+/// CTRL_REG4: output registers change only as a whole between readings.
+const BDU: u8 = 0x80;
+/// CTRL_REG4: self-test, positive sign.
+const ST: u8 = 0x02;
+/// STATUS_REG: all axes were overwritten before they were read.
+const ZYXOR: u8 = 0x80;
+/// STATUS_REG: all axes are new.
+const ZYXDA: u8 = 0x08;
+
+/// [counts at 6 g] by how much self-test may move x, y, z (datasheet, mechanical characteristics, Vst at 6 g). Upper limits and all of z are the
+/// datasheet's; its lower limit of x and y is taken from the sister part LIS331DLH (120 of at most 550 mg), whose upper
+/// limit is this one's too.
+const SELF_TEST_COUNTS: [(i16, i16); 3] = [(40, 180), (40, 180), (220, 370)];
+/// [ms] five samples at the slowest rate: the new state has passed the filter (datasheet, turn-on time: 1/ODR + 1 ms).
+const SETTLING_MS: u32 = 100;
+
+const fn register(name: &'static str, address: u8) -> Register {
+    let part = "LIS331HH";
+    Register { part, name, address }
+}
+
+/// Registers (datasheet section 6). The five settings and the seven bytes from STATUS_REG on are each read in one go.
+const WHO_AM_I: Register = register("WHO_AM_I", 0x0F);
+const CTRL_REG1: Register = register("CTRL_REG1", 0x20);
+const CTRL_REG2: Register = register("CTRL_REG2", 0x21);
+const CTRL_REG3: Register = register("CTRL_REG3", 0x22);
+const CTRL_REG4: Register = register("CTRL_REG4", 0x23);
+const CTRL_REG5: Register = register("CTRL_REG5", 0x24);
+const STATUS_REG: Register = register("STATUS_REG", 0x27);
+const OUT_X: Register = register("OUT_X", 0x28);
+const OUT_Y: Register = register("OUT_Y", 0x2A);
+const OUT_Z: Register = register("OUT_Z", 0x2C);
+
+/// Full scale (datasheet, CTRL_REG4 description, FS1 FS0).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum FullScale {
+    #[default]
+    G6 = 0b00,
+    G12 = 0b01,
+    G24 = 0b11,
+}
+
+impl FullScale {
+    /// [mg/count] sensitivity (datasheet, mechanical characteristics, So).
+    pub const fn mg_per_count(self) -> f32 {
+        match self {
+            FullScale::G6 => 3.0,
+            FullScale::G12 => 6.0,
+            FullScale::G24 => 12.0,
+        }
+    }
+}
+
+/// Output data rate (datasheet, CTRL_REG1 description, DR1 DR0). The low-pass filter follows it: 37, 74, 292, 780 Hz.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Rate {
+    #[default]
+    Hz50 = 0b00,
+    Hz100 = 0b01,
+    Hz400 = 0b10,
+    Hz1000 = 0b11,
+}
+
+/// Settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Config {
+    /// Full scale.
+    pub full_scale: FullScale,
+    /// Output data rate.
+    pub rate: Rate,
+}
+
+impl Config {
+    /// CTRL_REG1 to CTRL_REG5: normal power, all axes on; no filter but the low-pass; no interrupts; block data update.
+    const fn registers(self) -> [(Register, u8); 5] {
+        const NORMAL_POWER_ALL_AXES: u8 = 0b001_00_111;
+        [
+            (CTRL_REG1, NORMAL_POWER_ALL_AXES | (self.rate as u8) << 3),
+            (CTRL_REG2, 0),
+            (CTRL_REG3, 0),
+            (CTRL_REG4, BDU | (self.full_scale as u8) << 4),
+            (CTRL_REG5, 0),
+        ]
+    }
+}
+
+/// One sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// [counts, [`FullScale::mg_per_count`] each] x, y, z in the part's axes; -2048 to 2047.
+    pub counts: [i16; 3],
+    /// The part had a set that was not read before (ZYXDA).
+    pub fresh: bool,
+    /// Older sets were overwritten unread (ZYXOR): usual when the part runs faster than it is read.
+    pub overrun: bool,
+}
+
+/// An accelerometer on its bus.
+pub struct Lis331hh<I2C> {
+    bus: I2C,
+}
+
+impl<I2C: I2c> Lis331hh<I2C> {
+    /// Nothing is sent.
+    pub fn new(bus: I2C) -> Self {
+        Lis331hh { bus }
+    }
+
+    /// Asks for the identity.
+    pub async fn probe(&mut self) -> Result<(), Error<I2C::Error>> {
+        let mut read = [0];
+        self.read_from(WHO_AM_I, &mut read).await?;
+        Error::unless_identity(WHO_AM_I, IDENTITY.into(), read[0].into())
+    }
+
+    /// Writes the settings and reads them back. The part must answer to its identity first.
+    pub async fn configure(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
+        self.probe().await?;
+        let [r1, r2, r3, r4, r5] = config.registers().map(|(_, value)| value);
+        self.write(CTRL_REG1, &[CTRL_REG1.address | STEP, r1, r2, r3, r4, r5])
+            .await?;
+        self.verify(config).await
+    }
+
+    /// Reads the settings back: finds a part that has restarted by itself.
+    pub async fn verify(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
+        let mut kept = [0; 5];
+        self.read_from(CTRL_REG1, &mut kept).await?;
+        for ((register, wrote), read) in config.registers().into_iter().zip(kept) {
+            Error::unless_kept(register, wrote.into(), read.into())?;
+        }
+        Ok(())
+    }
+
+    /// Takes the newest sample; status and all axes in one transaction, so they belong together.
+    pub async fn read(&mut self) -> Result<Sample, Error<I2C::Error>> {
+        let mut bytes = [0; 7];
+        self.read_from(STATUS_REG, &mut bytes).await?;
+        let [status, xl, xh, yl, yh, zl, zh] = bytes;
+        Ok(Sample {
+            counts: [
+                right_justified(OUT_X, [xl, xh])?,
+                right_justified(OUT_Y, [yl, yh])?,
+                right_justified(OUT_Z, [zl, zh])?,
+            ],
+            fresh: status & ZYXDA != 0,
+            overrun: status & ZYXOR != 0,
+        })
+    }
+
+    /// Moves the proof mass by the part's own force and returns the change of x, y, z [counts at 6 g]. Takes 0.2 s, in
+    /// which the part must be still; `config` is in force again afterwards, whatever the result.
+    pub async fn self_test(&mut self, config: Config, delay: &mut impl DelayNs) -> Result<[i16; 3], Error<I2C::Error>> {
+        let moved = self.self_test_change(delay).await;
+        self.configure(config).await?;
+        let moved = moved?;
+        for ((axis, change), limits) in [OUT_X, OUT_Y, OUT_Z].into_iter().zip(moved).zip(SELF_TEST_COUNTS) {
+            Error::unless_within(axis, change, limits)?;
+        }
+        Ok(moved)
+    }
+
+    async fn self_test_change(&mut self, delay: &mut impl DelayNs) -> Result<[i16; 3], Error<I2C::Error>> {
+        // The limits hold at 6 g only (mechanical characteristics, Vst).
+        let mut samples = [[0; 3]; 2];
+        for (sample, ctrl_reg4) in samples.iter_mut().zip([BDU, BDU | ST]) {
+            self.write(CTRL_REG4, &[CTRL_REG4.address, ctrl_reg4]).await?;
+            delay.delay_ms(SETTLING_MS).await;
+            *sample = self.read().await?.counts;
+        }
+        let [[x0, y0, z0], [x, y, z]] = samples;
+        Ok([x - x0, y - y0, z - z0])
+    }
+
+    async fn read_from(&mut self, first: Register, bytes: &mut [u8]) -> Result<(), Error<I2C::Error>> {
+        self.bus
+            .write_read(ADDRESS, &[first.address | STEP], bytes)
+            .await
+            .map_err(|e| Error::Bus(first, e))
+    }
+
+    async fn write(&mut self, first: Register, bytes: &[u8]) -> Result<(), Error<I2C::Error>> {
+        self.bus.write(ADDRESS, bytes).await.map_err(|e| Error::Bus(first, e))
+    }
+}
+
+/// The four bits below a 12-bit code are zero; a floating or held bus, or another part, seldom keeps that.
+fn right_justified<E>(register: Register, bytes: [u8; 2]) -> Result<i16, Error<E>> {
+    let word = i16::from_le_bytes(bytes);
+    if word & 0xF == 0 {
+        Ok(word >> 4)
+    } else {
+        Err(Error::Garbage {
+            register,
+            read: u16::from_le_bytes(bytes),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::{vec, vec::Vec};
+
+    use embassy_futures::block_on;
+    use embedded_hal_async::i2c::{ErrorKind, NoAcknowledgeSource};
+    use embedded_hal_mock::eh1::{
+        delay::NoopDelay,
+        i2c::{Mock, Transaction},
+    };
+
+    use super::*;
+
+    const FAST_24G: Config = Config {
+        full_scale: FullScale::G24,
+        rate: Rate::Hz1000,
+    };
+
+    fn with<T>(expected: &[Transaction], act: impl AsyncFnOnce(&mut Lis331hh<Mock>) -> T) -> T {
+        let mut mock = Mock::new(expected);
+        let result = block_on(act(&mut Lis331hh::new(mock.clone())));
+        mock.done();
+        result
+    }
+
+    fn whoami(answer: u8) -> Transaction {
+        Transaction::write_read(0x18, vec![0x8F], vec![answer])
+    }
+
+    fn settings(kept: [u8; 5]) -> Transaction {
+        Transaction::write_read(0x18, vec![0xA0], kept.to_vec())
+    }
+
+    fn sample(bytes: [u8; 7]) -> Transaction {
+        Transaction::write_read(0x18, vec![0xA7], bytes.to_vec())
+    }
+
+    fn configuration(wrote: [u8; 5], kept: [u8; 5]) -> Vec<Transaction> {
+        let write = Transaction::write(0x18, [&[0xA0][..], &wrote].concat());
+        vec![whoami(0x32), write, settings(kept)]
+    }
+
+    #[test]
+    fn settings_are_written_in_one_transaction_and_read_back() {
+        let check = |config, wrote| {
+            let result = with(&configuration(wrote, wrote), async |part| part.configure(config).await);
+            assert_eq!(result, Ok(()));
+        };
+        check(Config::default(), [0x27, 0, 0, 0x80, 0]);
+        check(FAST_24G, [0x3F, 0, 0, 0xB0, 0]);
+    }
+
+    #[test]
+    fn a_high_pass_filter_left_on_is_an_error() {
+        let expected = configuration([0x27, 0, 0, 0x80, 0], [0x27, 0x10, 0, 0x80, 0]);
+        let error = with(&expected, async |part| part.configure(Config::default()).await).unwrap_err();
+        let (register, wrote, read) = (CTRL_REG2, 0, 0x10);
+        assert_eq!(error, Error::NotKept { register, wrote, read });
+    }
+
+    #[test]
+    fn verify_finds_a_part_that_restarted() {
+        // Power-on values (datasheet section 6): power-down, 50 Hz, axes on.
+        let power_on = settings([0x07, 0, 0, 0, 0]);
+        let error = with(&[power_on], async |part| part.verify(FAST_24G).await).unwrap_err();
+        let (register, wrote, read) = (CTRL_REG1, 0x3F, 0x07);
+        assert_eq!(error, Error::NotKept { register, wrote, read });
+    }
+
+    #[test]
+    fn another_part_is_refused_by_its_identity_and_not_written_to() {
+        let error = with(&[whoami(0x33)], async |part| part.configure(FAST_24G).await).unwrap_err();
+        let wrong = Error::WrongIdentity {
+            register: WHO_AM_I,
+            expected: 0x32,
+            read: 0x33,
+        };
+        assert_eq!(error, wrong);
+    }
+
+    #[test]
+    fn a_sample_is_right_justified_and_keeps_its_sign() {
+        let check = |bytes, counts, fresh, overrun| {
+            let read = with(&[sample(bytes)], async |part| part.read().await).unwrap();
+            assert_eq!((read.counts, read.fresh, read.overrun), (counts, fresh, overrun));
+        };
+        // The first row of thesis table 4.7, plate 1: -315, 2, -98.
+        check([0x0F, 0x50, 0xEC, 0x20, 0x00, 0xE0, 0xF9], [-315, 2, -98], true, false);
+        check(
+            [0xFF, 0x00, 0x80, 0xF0, 0x7F, 0xF0, 0xFF],
+            [-2048, 2047, -1],
+            true,
+            true,
+        );
+        check([0x00, 0, 0, 0, 0, 0, 0], [0, 0, 0], false, false);
+        // The flags of single axes do not stand for the set.
+        check([0x77, 0x10, 0, 0, 0, 0, 0], [1, 0, 0], false, false);
+    }
+
+    #[test]
+    fn a_word_with_low_bits_set_is_garbage() {
+        let check = |bytes, register, read| {
+            let error = with(&[sample(bytes)], async |part| part.read().await).unwrap_err();
+            assert_eq!(error, Error::Garbage { register, read });
+        };
+        check([0xFF; 7], OUT_X, 0xFFFF);
+        check([0x0F, 0x50, 0xEC, 0x21, 0x00, 0xE0, 0xF9], OUT_Y, 0x0021);
+        check([0x0F, 0x50, 0xEC, 0x20, 0x00, 0xE8, 0xF9], OUT_Z, 0xF9E8);
+    }
+
+    #[test]
+    fn a_part_that_does_not_acknowledge_is_a_bus_error() {
+        let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+        let silent = sample([0; 7]).with_error(nack);
+        let error = with(&[silent], async |part| part.read().await).unwrap_err();
+        assert_eq!(error, Error::Bus(STATUS_REG, nack));
+    }
+
+    /// Self-test of a part that a user of it measured (157, 96, 455 counts), with z as given.
+    fn self_test(z: i16) -> Result<[i16; 3], Error<ErrorKind>> {
+        let bytes = |counts: [i16; 3]| {
+            let [[xl, xh], [yl, yh], [zl, zh]] = counts.map(|c| (c << 4).to_le_bytes());
+            sample([0x0F, xl, xh, yl, yh, zl, zh])
+        };
+        let mut expected = vec![
+            Transaction::write(0x18, vec![0x23, 0x80]),
+            bytes([20, 35, 373]),
+            Transaction::write(0x18, vec![0x23, 0x82]),
+            bytes([177, 131, 373 + z]),
+        ];
+        expected.extend(configuration([0x3F, 0, 0, 0xB0, 0], [0x3F, 0, 0, 0xB0, 0]));
+        let mut delay = NoopDelay::new();
+        with(&expected, async |part| part.self_test(FAST_24G, &mut delay).await)
+    }
+
+    #[test]
+    fn self_test_judges_each_axis_and_restores_the_settings() {
+        assert_eq!(self_test(300), Ok([157, 96, 300]));
+        let too_far = Error::SelfTest {
+            register: OUT_Z,
+            change: 455,
+            limits: (220, 370),
+        };
+        assert_eq!(self_test(455), Err(too_far));
+    }
+}
