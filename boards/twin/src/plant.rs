@@ -84,9 +84,9 @@ impl Quality {
 /// The four plates, the vehicle's two lines, and what befalls them.
 pub struct Plant {
     /// The plates' I2C parts.
-    pub bus: SensorBus,
+    pub i2c: SensorBus,
     /// The plates' gyros.
-    pub gyros: [Gyro; PLATES],
+    pub gyro: [Gyro; PLATES],
     source: Arc<dyn TruthSource>,
 }
 
@@ -106,24 +106,26 @@ impl Plant {
         let seeds = Noise::new(seed);
         let plates = (0..PLATES).map(|plate| i2c_parts(plate, &source, seeds.stream(plate as u64), quality));
         Plant {
-            bus: SensorBus::new(Tca9548a::new(plates)),
-            gyros: core::array::from_fn(|plate| gyro(plate, &source, seeds.stream((PLATES + plate) as u64), quality)),
+            i2c: SensorBus::new(Tca9548a::new(plates)),
+            gyro: core::array::from_fn(|plate| gyro(plate, &source, seeds.stream((PLATES + plate) as u64), quality)),
             source,
         }
     }
 
-    /// Lift-off line at `now`, `true` = asserted.
-    pub fn lift_off(&self, now: Nanos) -> bool {
-        self.truth(now).lift_off
+    /// The vehicle's lines at `now`, `true` = asserted: lift-off, micro-gravity.
+    pub fn discretes(&self, now: Nanos) -> (bool, bool) {
+        let truth = self.source.at(now as f64 * 1e-9);
+        (truth.lift_off, truth.micro_g)
     }
 
-    /// Micro-gravity line at `now`, `true` = asserted.
-    pub fn micro_g(&self, now: Nanos) -> bool {
-        self.truth(now).micro_g
+    /// Whether SDA is low with nobody sending: ask before a START.
+    pub fn sda_held(&self) -> bool {
+        self.i2c.is_held()
     }
 
-    fn truth(&self, now: Nanos) -> Truth {
-        self.source.at(now as f64 * 1e-9)
+    /// One pulse on SCL outside a transfer.
+    pub fn clock_pulse(&mut self) {
+        self.i2c.clock_pulse();
     }
 
     /// Lets a fault strike. A slot or plate the unit does not have is left alone, and so is [`Fault::Reset`], which
@@ -132,11 +134,11 @@ impl Plant {
         match fault {
             Fault::Silent(slot) => self.silence(slot, true, now),
             Fault::Restored(slot) => self.silence(slot, false, now),
-            Fault::MuxSilent(silent) => self.bus.switch.silence(silent),
-            Fault::SdaHeld => self.bus.hold_sda(),
-            Fault::BusStuck(stuck) => self.bus.stick(stuck),
+            Fault::MuxSilent(silent) => self.i2c.switch.silence(silent),
+            Fault::SdaHeld => self.i2c.hold_sda(),
+            Fault::BusStuck(stuck) => self.i2c.stick(stuck),
             Fault::GyroGarbage(plate, babbling) => {
-                if let Some(gyro) = self.gyros.get_mut(plate) {
+                if let Some(gyro) = self.gyro.get_mut(plate) {
                     gyro.babble(babbling);
                 }
             }
@@ -149,12 +151,12 @@ impl Plant {
             return;
         };
         let address = match sensor.kind {
-            Kind::Gyro => return self.gyros[sensor.plate].silence(silent, now),
+            Kind::Gyro => return self.gyro[sensor.plate].silence(silent, now),
             Kind::Accelerometer => lis331hh::ADDRESS,
             Kind::Magnetometer => hmc5883l::ADDRESS,
             Kind::Thermometer => tmp102::ADDRESS,
         };
-        self.bus.switch.silence_part(sensor.plate, address, silent, now);
+        self.i2c.switch.silence_part(sensor.plate, address, silent, now);
     }
 }
 

@@ -131,7 +131,7 @@ impl Adis16265 {
     /// Registers are written one byte at a time, the low one at the even address.
     fn write(&mut self, address: u8, value: u8, now: Nanos) {
         let register = address & !1;
-        if register == GLOB_CMD && address == GLOB_CMD && value & 0x80 != 0 {
+        if address == GLOB_CMD && value & 0x80 != 0 {
             self.power_on(now);
             return;
         }
@@ -299,6 +299,20 @@ mod tests {
         assert_eq!(ask(&mut part, 0x3600, 301 * MS), 0x0081);
         let new = [304, 320, 332, 334].map(|ms| ask(&mut part, 0x0400, ms * MS) >> 15);
         assert_eq!(new, [1, 0, 0, 1]);
+    }
+
+    #[test]
+    fn a_new_sample_rate_leaves_the_last_sample_as_it_is() {
+        let mut part = part(|t| 1000.0 * t);
+        let now = 80 * SAMPLE + 1;
+        let before = ask(&mut part, 0x0400, now) & 0x3FFF;
+        frame(&mut part, 0xB681, now + 2 * STALL_NS);
+        // The next sample at the new rate is complete at 333.3 ms.
+        let after = [now + 4 * STALL_NS, 333 * MS, 334 * MS].map(|now| ask(&mut part, 0x0400, now) & 0x3FFF);
+        assert!(
+            after[0] == before && after[1] == before && after[2] > before,
+            "{before} {after:?}"
+        );
     }
 
     #[test]

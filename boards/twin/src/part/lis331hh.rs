@@ -356,5 +356,6 @@ mod tests {
         assert_eq!(axes(&mut part, 900 * MS), [10 << 4; 3]);
         part.power_on(900 * MS);
         assert_eq!(read(&mut part, 0xA0, 900 * MS), [0x07, 0x00]);
+        assert_eq!(axes(&mut part, 900 * MS), [0; 3]);
     }
 }

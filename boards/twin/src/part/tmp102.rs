@@ -195,6 +195,14 @@ mod tests {
     }
 
     #[test]
+    fn a_conversion_under_way_is_begun_anew_by_a_new_setting() {
+        let mut part = part(|_| 25.0);
+        write(&mut part, &[0x01, 0x60, 0xA0], 240 * MS);
+        assert_eq!(read(&mut part, 0x00, 260 * MS), [0x00, 0x00]);
+        assert_eq!(read(&mut part, 0x00, 510 * MS), [0x19, 0x00]);
+    }
+
+    #[test]
     fn negative_and_extreme_temperatures_are_those_of_the_datasheet_table() {
         let code = |temperature_c| read::<2>(&mut part(move |_| temperature_c), 0x00, 300 * MS);
         assert_eq!(code(-25.0), [0xE7, 0x00]);

@@ -1,7 +1,7 @@
 //! The sensor bus as the controller finds it: its two wires, the switch, and what holds SDA.
 //!
-//! Bytes of I2C transfers in, acknowledges and bytes out. A controller asks [`SensorBus::sda_held`] before it sends a
-//! START, for with SDA low it cannot; if it goes on regardless it is not acknowledged and reads zeros.
+//! Bytes of I2C transfers in, acknowledges and bytes out. A controller asks [`super::Plant::sda_held`] before it
+//! sends a START, for with SDA low it cannot; if it goes on regardless it is not acknowledged and reads zeros.
 
 use crate::part::{Nanos, tca9548a::Tca9548a};
 
@@ -34,17 +34,17 @@ impl SensorBus {
 
     /// START (or repeated START) and an address; `read` is the direction bit. Returns whether anyone acknowledges.
     pub fn start(&mut self, address: u8, read: bool, now: Nanos) -> bool {
-        !self.sda_held() && self.switch.start(address, read, now)
+        !self.is_held() && self.switch.start(address, read, now)
     }
 
     /// A byte from the controller; returns whether anyone acknowledges.
     pub fn write(&mut self, byte: u8, now: Nanos) -> bool {
-        !self.sda_held() && self.switch.write(byte, now)
+        !self.is_held() && self.switch.write(byte, now)
     }
 
     /// A byte for the controller; 0xFF if nobody sends.
     pub fn read(&mut self, now: Nanos) -> u8 {
-        if self.sda_held() { 0x00 } else { self.switch.read(now) }
+        if self.is_held() { 0x00 } else { self.switch.read(now) }
     }
 
     /// STOP.
@@ -53,17 +53,17 @@ impl SensorBus {
     }
 
     /// The switch's reset line is pulled: no channel is selected.
-    pub fn reset_switch(&mut self) {
+    pub fn reset_pin(&mut self) {
         self.switch.reset();
     }
 
     /// Whether SDA is low with nobody sending.
-    pub fn sda_held(&self) -> bool {
+    pub(super) fn is_held(&self) -> bool {
         self.hold != Hold::Nobody
     }
 
     /// One pulse on SCL outside a transfer.
-    pub fn clock_pulse(&mut self) {
+    pub(super) fn clock_pulse(&mut self) {
         if let Hold::Part(pulses) = self.hold {
             self.hold = if pulses > 1 {
                 Hold::Part(pulses - 1)

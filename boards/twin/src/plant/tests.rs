@@ -68,16 +68,16 @@ fn select(plant: &mut Plant, control: u8, now: Nanos) {
 }
 
 fn write(plant: &mut Plant, address: u8, bytes: &[u8], now: Nanos) {
-    assert!(plant.bus.start(address, false, now));
-    assert!(bytes.iter().all(|&byte| plant.bus.write(byte, now)));
-    plant.bus.stop(now);
+    assert!(plant.i2c.start(address, false, now));
+    assert!(bytes.iter().all(|&byte| plant.i2c.write(byte, now)));
+    plant.i2c.stop(now);
 }
 
 fn read<const N: usize>(plant: &mut Plant, plate: usize, address: u8, register: u8, now: Nanos) -> Option<[u8; N]> {
     select(plant, 1 << plate, now);
-    let answers = plant.bus.start(address, false, now) && plant.bus.write(register, now);
-    let bytes = (answers && plant.bus.start(address, true, now)).then(|| core::array::from_fn(|_| plant.bus.read(now)));
-    plant.bus.stop(now);
+    let answers = plant.i2c.start(address, false, now) && plant.i2c.write(register, now);
+    let bytes = (answers && plant.i2c.start(address, true, now)).then(|| core::array::from_fn(|_| plant.i2c.read(now)));
+    plant.i2c.stop(now);
     bytes
 }
 
@@ -87,7 +87,7 @@ fn acc(plant: &mut Plant, plate: usize, now: Nanos) -> Option<[i16; 3]> {
 }
 
 fn frame(plant: &mut Plant, plate: usize, word: u16, now: Nanos) -> u16 {
-    let gyro = &mut plant.gyros[plate];
+    let gyro = &mut plant.gyro[plate];
     gyro.select(now);
     let answer = gyro.transfer(word, now);
     gyro.deselect(now);
@@ -222,7 +222,7 @@ fn the_reading_pattern_changes_no_value_and_the_seed_changes_all() {
 #[test]
 fn the_lines_follow_the_truth() {
     let plant = Plant::ideal(Arc::new(Swing));
-    let lines = [1_999, 2_000, 3_000].map(|ms| (plant.lift_off(ms * MS), plant.micro_g(ms * MS)));
+    let lines = [1_999, 2_000, 3_000].map(|ms| plant.discretes(ms * MS));
     assert_eq!(lines, [(false, false), (true, false), (true, true)]);
 }
 
@@ -267,7 +267,7 @@ fn without_the_switch_no_plate_answers_but_the_gyros_do() {
     assert!(
         [0x70, 0x18, 0x1E, 0x48]
             .iter()
-            .all(|&address| !plant.bus.start(address, false, SETTLED))
+            .all(|&address| !plant.i2c.start(address, false, SETTLED))
     );
     assert_eq!(ask_gyro(&mut plant, 0, 0x5600, SETTLED), 0x3F89);
     plant.apply(Fault::MuxSilent(false), SETTLED);
@@ -279,15 +279,15 @@ fn a_held_sda_is_freed_by_nine_pulses_and_a_stuck_one_by_nothing() {
     let mut plant = ideal(LEVEL);
     plant.apply(Fault::SdaHeld, SETTLED);
     for _ in 0..9 {
-        assert!(plant.bus.sda_held() && !plant.bus.start(0x70, false, SETTLED));
-        plant.bus.clock_pulse();
+        assert!(plant.sda_held() && !plant.i2c.start(0x70, false, SETTLED));
+        plant.clock_pulse();
     }
-    assert!(!plant.bus.sda_held());
+    assert!(!plant.sda_held());
     assert!(acc(&mut plant, 0, SETTLED).is_some());
 
     plant.apply(Fault::BusStuck(true), SETTLED);
-    (0..20).for_each(|_| plant.bus.clock_pulse());
-    assert!(plant.bus.sda_held());
+    (0..20).for_each(|_| plant.clock_pulse());
+    assert!(plant.sda_held());
     plant.apply(Fault::BusStuck(false), SETTLED);
     assert!(acc(&mut plant, 0, SETTLED).is_some());
 }
