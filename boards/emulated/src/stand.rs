@@ -118,11 +118,7 @@ impl Wired {
         };
         Ok(Wired {
             part,
-            sensor_port: SensorPort {
-                i2c,
-                plant: plant.clone(),
-                nack_next: false,
-            },
+            sensor_port: SensorPort::new(i2c, plant.clone()),
             bus_pins: BusPins::new(plant.clone()),
             discrete_pins: DiscretePins {
                 gpio: Gpio::default(),
@@ -299,5 +295,46 @@ impl Board for Stand {
             armv7m::MpuRegions::Eight,
         );
         vec![Target::new(NAME, &mut self.mcu, core)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use rigless::soc::Width;
+    use twin::{motion, plant::Plant};
+
+    use super::*;
+
+    const NOW: VirtualNanos = VirtualNanos(1_000);
+    const RCC_APB1ENR: u64 = 0x4002_3840;
+    const TIM5_EGR: u64 = 0x4000_0C14;
+    const TIM5_SR: u64 = 0x4000_0C10;
+    /// CC1IF to CC4IF.
+    const MATCHES: u64 = 0x1E;
+
+    fn matches_after_update(covers: Covers) -> u64 {
+        let still = motion::by_name("still").expect("the twin has it");
+        let plant = SharedPlant::new(Plant::ideal(Arc::from(still)));
+        let mut mcu = Stand::new(plant, covers).expect("rigless' own description").mcu;
+        for (address, value) in [(RCC_APB1ENR, 1 << 3), (TIM5_EGR, 1)] {
+            mcu.write(NOW, address, Width::W32, value).expect("a register of the part");
+        }
+        mcu.read(NOW, TIM5_SR, Width::W32).expect("a register of the part") & MATCHES
+    }
+
+    #[test]
+    fn a_stopped_timer_that_is_updated_has_matched_nothing() {
+        assert_eq!(matches_after_update(Covers::default()), 0);
+    }
+
+    #[test]
+    fn without_the_cover_it_has_matched_all_four() {
+        let bare = Covers {
+            timer_update: false,
+            ..Covers::default()
+        };
+        assert_eq!(matches_after_update(bare), MATCHES);
     }
 }

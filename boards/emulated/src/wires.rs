@@ -47,18 +47,41 @@ pub struct SensorPort {
     /// The DMA stream takes one more byte and `LAST` is set: RM0090 27.3.8 has the controller NACK it. Only the
     /// board sees the stream's count, so it sets this before each event.
     pub nack_next: bool,
+    held: bool,
 }
 
 impl SensorPort {
-    /// A held line reads as a busy bus of somebody else's; the model then keeps a START pending, as RM0090 27.3.3 has
-    /// it. Not while SWRST holds the registers at reset.
-    fn hold(&self, registers: &mut RegisterFile) -> bool {
-        let held = self.plant.lock().sda_held();
-        if held && !cr1::SWRST.is_set(registers.get(Register::Cr1)) {
-            let status = registers.get(Register::Sr2);
-            registers.set(Register::Sr2, sr2::MSL.set(sr2::BUSY.set(status, 1), 0));
+    pub fn new(i2c: I2c, plant: SharedPlant) -> Self {
+        SensorPort {
+            i2c,
+            plant,
+            nack_next: false,
+            held: false,
         }
-        held
+    }
+
+    /// Brings the registers to what the lines say, before anything else sees them; whether SDA is held.
+    ///
+    /// A held line is a busy bus of somebody else's, and the model keeps a START pending (RM0090 27.3.3), but not while
+    /// SWRST holds the registers at reset. SDA let go with SCL high is a STOP: the bus is free (27.6.7, BUSY), and a
+    /// pending START is carried out.
+    fn feel(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) -> bool {
+        let was_held = std::mem::replace(&mut self.held, self.plant.lock().sda_held());
+        let control = registers.get(Register::Cr1);
+        let status = registers.get(Register::Sr2);
+        if self.held && !cr1::SWRST.is_set(control) {
+            registers.set(Register::Sr2, sr2::MSL.set(sr2::BUSY.set(status, 1), 0));
+        } else if was_held && !self.held && !sr2::MSL.is_set(status) {
+            registers.set(Register::Sr2, sr2::BUSY.set(status, 0));
+            if cr1::START.is_set(control) {
+                // The model acts on START's rising edge.
+                for value in [cr1::START.set(control, 0), control] {
+                    registers.set(Register::Cr1, value);
+                    self.i2c.write(Register::Cr1, value, registers, context);
+                }
+            }
+        }
+        self.held
     }
 }
 
@@ -71,17 +94,17 @@ impl Device for SensorPort {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
-        self.hold(registers);
+        self.feel(registers, context);
         self.i2c.read(register, registers, context)
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        self.hold(registers);
+        self.feel(registers, context);
         self.i2c.write(register, value, registers, context);
     }
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        if self.hold(registers) {
+        if self.feel(registers, context) {
             // The byte on the wire never ends: nobody can clock it. Only a reset of the peripheral forgets it.
             return;
         }
@@ -219,3 +242,6 @@ impl Device for DiscretePins {
         self.gpio.reset_line(registers, context);
     }
 }
+
+#[cfg(test)]
+mod tests;
