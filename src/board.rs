@@ -85,8 +85,6 @@ pub trait Retained {
     fn keep(&mut self, resume: &Resume);
     /// The crash that caused this start, once: taking it clears it.
     fn take_crash(&mut self) -> Option<CrashRecord>;
-    /// Restarts the unit.
-    fn reset(&mut self) -> !;
 }
 
 /// Why the unit started.

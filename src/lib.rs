@@ -13,9 +13,11 @@
 #![forbid(unsafe_code)]
 
 pub mod board;
+pub mod budget;
 pub mod command;
 pub mod crash;
 pub mod derived;
+pub mod discrete;
 pub mod geometry;
 pub mod increments;
 pub mod mode;
@@ -24,3 +26,4 @@ pub mod recorder;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
+pub mod unit;

@@ -9,9 +9,9 @@ compile_error!("EMEMS_BOARD names no board: `obc` and `discovery` are in boards/
 #[cfg_attr(board = "discovery", path = "../boards/discovery.rs")]
 mod board;
 
+use emems::unit::{self, Settings};
+
 #[embassy_executor::main]
 async fn main(_spawner: embassy_executor::Spawner) {
-    stand_in::run(board::init()).await
+    unit::run(board::init(), Settings::NOMINAL).await
 }
-
-mod stand_in;

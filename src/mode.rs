@@ -9,7 +9,7 @@
 //! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
 
 use crate::command::Command;
-pub use crate::resume::Resume;
+use crate::resume::Resume;
 
 /// [us] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;

@@ -3,6 +3,8 @@
 //! The order of [`SENSORS`] is *the* reading order: of the acquisition, of the packet's fields (Tab. A.3) and of the
 //! error identifier, in which bit `k` (least significant first) is the `k`-th sensor read.
 
+use core::fmt;
+
 /// Sent for a value that was not read. No sensor of the unit produces it: their codes have at most 14 bits.
 pub const NOT_READ: i16 = i16::MIN;
 
@@ -31,6 +33,18 @@ pub struct Sensor {
     pub kind: Kind,
     /// Plate it sits on, 0 to 3 (the thesis' plates 1 to 4).
     pub plate: usize,
+}
+
+impl fmt::Display for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            Kind::Accelerometer => "accelerometer",
+            Kind::Magnetometer => "magnetometer",
+            Kind::Gyro => "gyro",
+            Kind::Thermometer => "thermometer",
+        };
+        write!(f, "{kind} {}", self.plate + 1)
+    }
 }
 
 /// The reading order (thesis, App. B.2: accelerometers first; Tab. A.3 for the rest).

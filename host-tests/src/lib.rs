@@ -1,1 +1,152 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
+
+use std::sync::Arc;
+
+use emems::{
+    derived::{self, DERIVED_BYTES, DERIVED_START, Derived},
+    packet,
+    sample::Reading,
+    unit::Settings,
+};
+use twin::{
+    host::{self, HostReport},
+    part::Nanos,
+    plant::Plant,
+    run::{Bench, Fault, Flow, Scheduled},
+    truth::TruthSource,
+};
+
+/// [ns] a millisecond.
+pub const MS: Nanos = 1_000_000;
+/// [ns] a second.
+pub const S: Nanos = 1_000 * MS;
+
+/// A flight to be made on the host board.
+pub struct Flight {
+    /// The parts and the world around them.
+    pub plant: Plant,
+    /// The unit's settings.
+    pub settings: Settings,
+    /// What befalls it.
+    pub faults: Vec<Scheduled>,
+    /// What is said on the umbilical, and when.
+    pub said: Vec<(Nanos, Vec<u8>)>,
+}
+
+impl Flight {
+    /// A nominal unit without noise in `world`.
+    pub fn ideal(world: Arc<dyn TruthSource>) -> Self {
+        Flight {
+            plant: Plant::ideal(world),
+            settings: Settings::NOMINAL,
+            faults: Vec::new(),
+            said: Vec::new(),
+        }
+    }
+
+    /// With a fault at an instant.
+    pub fn fault(mut self, at: Nanos, fault: Fault) -> Self {
+        self.faults.push(Scheduled { at, fault });
+        self
+    }
+
+    /// With words on the umbilical at an instant.
+    pub fn say(mut self, at: Nanos, words: &[u8]) -> Self {
+        self.said.push((at, words.to_vec()));
+        self
+    }
+
+    /// Flies for a while.
+    pub fn fly(self, duration: Nanos) -> Flown {
+        let mut flown = Flown {
+            said: self.said,
+            ..Flown::default()
+        };
+        flown.report = host::fly(self.plant, self.settings, &self.faults, duration, &mut flown);
+        flown
+    }
+}
+
+/// What came out of a flight.
+#[derive(Default)]
+pub struct Flown {
+    said: Vec<(Nanos, Vec<u8>)>,
+    /// Packets on the telemetry line, and when each was complete.
+    pub packets: Vec<(Nanos, Reading)>,
+    /// Derived frames on the telemetry line.
+    pub derived: Vec<Derived>,
+    /// Telemetry writes that are neither: there must be none.
+    pub strange: Vec<Vec<u8>>,
+    /// Everything the umbilical said.
+    pub umbilical: Vec<u8>,
+    /// What the host board says of the run.
+    pub report: HostReport,
+}
+
+impl Flown {
+    /// The console's reply lines.
+    pub fn replies(&self) -> Vec<String> {
+        let text = String::from_utf8_lossy(&self.umbilical).into_owned();
+        let lines = text.split("\r\n").filter_map(|line| line.split_once('>'));
+        lines.map(|(_, reply)| reply.to_string()).collect()
+    }
+
+    /// Whether some reply line contains `text`.
+    pub fn replied(&self, text: &str) -> bool {
+        self.replies().iter().any(|line| line.contains(text))
+    }
+
+    /// [ns] times between packets.
+    pub fn periods(&self) -> Vec<Nanos> {
+        self.packets.windows(2).map(|pair| pair[1].0 - pair[0].0).collect()
+    }
+
+    /// Packets of the second `n`, counted from power-on.
+    pub fn second(&self, n: u64) -> Vec<Reading> {
+        let within = |(at, _): &&(Nanos, Reading)| (n * S..(n + 1) * S).contains(at);
+        self.packets
+            .iter()
+            .filter(within)
+            .map(|(_, reading)| *reading)
+            .collect()
+    }
+}
+
+impl Bench for Flown {
+    fn telemetry(&mut self, at: Nanos, bytes: &[u8]) {
+        if let Ok(reading) = packet::decode(bytes) {
+            self.packets.push((at, reading));
+        } else if let (Some(&DERIVED_START), DERIVED_BYTES, Ok(derived)) =
+            (bytes.first(), bytes.len(), derived::decode(bytes))
+        {
+            self.derived.push(derived);
+        } else {
+            self.strange.push(bytes.to_vec());
+        }
+    }
+
+    fn umbilical(&mut self, _at: Nanos, bytes: &[u8]) {
+        self.umbilical.extend_from_slice(bytes);
+    }
+
+    fn log(&mut self, _at: Nanos, _line: &str) {}
+
+    fn commands(&mut self, now: Nanos) -> Vec<u8> {
+        let due = |said: &(Nanos, Vec<u8>)| said.0 <= now;
+        let (now_said, later) = std::mem::take(&mut self.said).into_iter().partition(due);
+        self.said = later;
+        let now_said: Vec<(Nanos, Vec<u8>)> = now_said;
+        now_said.into_iter().flat_map(|(_, words)| words).collect()
+    }
+
+    fn advanced(&mut self, _now: Nanos) -> Flow {
+        Flow::Continue
+    }
+}
+
+/// A motion of the twin at its default site.
+pub fn world(name: &str) -> Arc<dyn TruthSource> {
+    twin::motion::by_name(name)
+        .unwrap_or_else(|| panic!("the twin has no motion {name}"))
+        .into()
+}

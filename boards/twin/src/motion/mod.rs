@@ -8,10 +8,10 @@ mod attitude;
 mod check;
 mod profile;
 mod rate_table;
-
+mod recorded;
 mod rotation_test;
 mod sounding_rocket;
-
+mod spline;
 mod still;
 mod tumble;
 
@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 pub use attitude::Attitude;
 pub use profile::{Jet, Profile};
 pub use rate_table::{Axis, Plateau, Position, RateTable, TABLE_4_1};
-
+pub use recorded::Recorded;
 pub use rotation_test::RotationTest;
 pub use sounding_rocket::SoundingRocket;
 pub use still::Still;

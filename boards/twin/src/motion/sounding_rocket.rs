@@ -57,6 +57,7 @@ impl SoundingRocket {
         };
         let turns = |per_second: f64| per_second * TAU;
 
+        // Thrust takes over from the rail; it grows as propellant burns; drag brakes between the stages.
         let boost = until(on_pad(0.0).move_to(4.8 * G0, 0.4), 0.5).move_to(5.8 * G0, 6.0);
         let coast = until(boost, BURN_OUT_1_S)
             .move_to(-1.2 * G0, 0.8)
@@ -73,15 +74,18 @@ impl SoundingRocket {
             .move_to(gravity, 18.0);
         let upward = until(entry, PARACHUTE_S).move_to(4.0 * G0, 0.5).move_to(gravity, 4.0);
 
+        // Towards the Atlantic; gravity bends the path while fins hold the nose on it; then the attitude is free.
         let azimuth = until(on_pad(70.0_f64.to_radians()), ENTRY_S).ramp_to_rate(turns(0.2), 20.0);
         let elevation = on_pad(85.0_f64.to_radians()).move_to(78.0_f64.to_radians(), BURN_OUT_2_S);
         let elevation = until(elevation, ENTRY_S).move_to(0.1, 30.0);
 
+        // A spinning body cones; the yo-yo kicks it, rate control then damps it.
         let cone_phase = until(on_pad(0.0), 1.0).ramp_to_rate(turns(0.4), 3.0);
         let cone_phase = until(cone_phase, YO_YO_S).ramp_to_rate(turns(0.05), 1.0);
         let cone_half_angle = until(on_pad(0.0), 1.0).move_to(0.02, 5.0);
         let cone_half_angle = until(cone_half_angle, YO_YO_S).move_to(0.06, 1.0).move_to(0.002, 12.0);
 
+        // Spin motors just above the rail, then canted fins; the yo-yo takes the spin away.
         let spin = until(on_pad(0.0), 0.6).ramp_to_rate(turns(1.0), 1.5);
         let spin = spin.ramp_to_rate(turns(2.0), 9.5);
         let spin = until(spin, IGNITION_2_S).ramp_to_rate(turns(3.0), BURN_OUT_2_S - IGNITION_2_S);
@@ -157,7 +161,7 @@ mod tests {
                 let t = PAD_S + f64::from(i) * step;
                 let force_n = world.motion.at(t).attitude.q_nb * world.at(t).force_b;
                 // Inverse-square gravity; at 240 km it is 7 % less than at the pad.
-                let gravity = world.environment.gravity * (6.371e6 / (6.371e6 + height) as f64).powi(2);
+                let gravity = world.environment.gravity * (6.371e6 / (6.371e6_f64 + height)).powi(2);
                 speed += (-force_n.z - gravity) * step;
                 height += speed * step;
                 (t - PAD_S, height, speed)

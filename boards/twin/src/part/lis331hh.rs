@@ -343,9 +343,9 @@ mod tests {
         let mut part = part(|_| [10.0; 3]);
         write(&mut part, &[0x20, ON_50_HZ], 0);
         write(&mut part, &[0x23, 0x02], 0);
-        assert_eq!(axes(&mut part, 100 * MS), [110 << 4, 110 << 4, 127 << 4]);
+        assert_eq!(axes(&mut part, 100 * MS), [120 << 4, 120 << 4, 305 << 4]);
         write(&mut part, &[0x23, 0x0A], 100 * MS);
-        assert_eq!(axes(&mut part, 200 * MS), [-90 << 4, -90 << 4, -107 << 4]);
+        assert_eq!(axes(&mut part, 200 * MS), [-100 << 4, -100 << 4, -285 << 4]);
     }
 
     #[test]

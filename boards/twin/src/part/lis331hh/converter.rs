@@ -16,11 +16,12 @@ use super::super::{
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 /// [s] of the unit's nominal 25 Hz bandwidth.
 pub const TAU_S: f64 = 1.0 / (TAU * 25.0);
-/// [m/s2] deflection by the self-test actuator: typical 300, 300, 350 mg (of the LIS331DLH, whose element it shares).
+/// [m/s2] deflection by the self-test actuator: the middle of the data sheet's limits (table 3, Vst), 110, 110 and 295
+/// counts of 3 mg.
 const SELF_TEST: Vector3<f64> = Vector3::new(
-    0.30 * STANDARD_GRAVITY,
-    0.30 * STANDARD_GRAVITY,
-    0.35 * STANDARD_GRAVITY,
+    0.330 * STANDARD_GRAVITY,
+    0.330 * STANDARD_GRAVITY,
+    0.885 * STANDARD_GRAVITY,
 );
 
 /// The running converter.

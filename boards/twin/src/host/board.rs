@@ -1,0 +1,63 @@
+//! The host board's parts.
+
+use std::{cell::RefCell, rc::Rc};
+
+use emems::{
+    board::{Board, Parts, ResetCause},
+    recorder::MemoryRecorder,
+};
+
+use super::{
+    bus::{Gyro, SensorBus},
+    lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
+};
+use crate::plant::Plant;
+
+/// The type that names the host board's parts.
+pub struct Host;
+
+/// As many as the flight computer's interim recorder.
+const RECORDS: usize = 64;
+
+impl Board for Host {
+    type SensorBus = SensorBus;
+    type Gyro = Gyro;
+    type Telemetry = Transmitter;
+    type UmbilicalTx = Transmitter;
+    type UmbilicalRx = Receiver;
+    type Discretes = Inputs;
+    type Watchdog = Fed;
+    type Retained = Kept;
+    type Recorder = MemoryRecorder<RECORDS>;
+}
+
+/// The outside ends of the host board.
+#[derive(Default)]
+pub struct Ends {
+    /// What telemetry sent.
+    pub telemetry: Sent,
+    /// What the umbilical sent.
+    pub umbilical: Sent,
+    /// What the ground says.
+    pub spoken: Spoken,
+    /// The watchdog.
+    pub fed: Fed,
+    /// Memory that survives a reset.
+    pub kept: Kept,
+}
+
+/// The parts of a unit that starts because of `reset`.
+pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Parts<Host> {
+    Parts {
+        sensor_bus: SensorBus::new(plant.clone()),
+        gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate)),
+        telemetry: Transmitter(ends.telemetry.clone()),
+        umbilical_tx: Transmitter(ends.umbilical.clone()),
+        umbilical_rx: Receiver(ends.spoken.clone()),
+        discretes: Inputs(plant.clone()),
+        watchdog: ends.fed.clone(),
+        retained: ends.kept.clone(),
+        recorder: MemoryRecorder::new(),
+        reset,
+    }
+}

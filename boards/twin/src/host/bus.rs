@@ -1,0 +1,174 @@
+//! The sensor bus and the gyros' bus on the host: `embedded-hal` transactions played byte by byte to the parts.
+//!
+//! A transfer that is abandoned leaves the bus as the STM32F4 leaves it: every later one waits for ever, until
+//! [`RecoverBus::recover`].
+
+use std::{cell::RefCell, future::pending, rc::Rc};
+
+use embassy_time::{Instant, Timer};
+use embedded_hal::{
+    i2c::{self, ErrorKind, NoAcknowledgeSource},
+    spi,
+};
+use emems::board::RecoverBus;
+
+use super::{
+    clock,
+    timing::{I2C_BIT, I2C_OVERHEAD, SPI_OVERHEAD, SPI_WORD},
+};
+use crate::{
+    part::{Nanos, SpiPart},
+    plant::Plant,
+};
+
+/// [ns] nine clock pulses and a STOP by hand, the mux's reset, the peripheral set up again.
+const RECOVERY: Nanos = 200_000;
+
+/// Waits until `at` since power-on.
+async fn wait_until(at: Nanos) {
+    let ahead_us = at.saturating_sub(clock::since_power_on()).div_ceil(1000);
+    Timer::at(Instant::from_micros(Instant::now().as_micros() + ahead_us)).await;
+}
+
+/// The sensor bus.
+pub struct SensorBus {
+    plant: Rc<RefCell<Plant>>,
+    abandoned: bool,
+}
+
+impl SensorBus {
+    /// The bus of these parts.
+    pub fn new(plant: Rc<RefCell<Plant>>) -> Self {
+        SensorBus {
+            plant,
+            abandoned: false,
+        }
+    }
+
+    /// Plays a transaction from `now` on; when it is over, and whether it was acknowledged throughout.
+    fn play(&self, address: u8, operations: &mut [i2c::Operation<'_>], now: Nanos) -> (Nanos, Result<(), ErrorKind>) {
+        let mut plant = self.plant.borrow_mut();
+        let mut at = now + I2C_OVERHEAD;
+        let byte = 9 * I2C_BIT;
+        let mut direction = None;
+        for operation in operations {
+            let read = matches!(operation, i2c::Operation::Read(_));
+            if direction.replace(read) != Some(read) {
+                at += byte + I2C_BIT;
+                if !plant.i2c.start(address, read, at) {
+                    plant.i2c.stop(at);
+                    return (
+                        at + I2C_BIT,
+                        Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address)),
+                    );
+                }
+            }
+            match operation {
+                i2c::Operation::Read(bytes) => {
+                    for slot in bytes.iter_mut() {
+                        *slot = plant.i2c.read(at);
+                        at += byte;
+                    }
+                }
+                i2c::Operation::Write(bytes) => {
+                    for value in bytes.iter() {
+                        at += byte;
+                        if !plant.i2c.write(*value, at) {
+                            plant.i2c.stop(at);
+                            return (at + I2C_BIT, Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data)));
+                        }
+                    }
+                }
+            }
+        }
+        plant.i2c.stop(at);
+        (at + I2C_BIT, Ok(()))
+    }
+}
+
+impl i2c::ErrorType for SensorBus {
+    type Error = ErrorKind;
+}
+
+impl embedded_hal_async::i2c::I2c for SensorBus {
+    async fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Self::Error> {
+        let now = clock::since_power_on();
+        if self.abandoned || self.plant.borrow().sda_held() {
+            self.abandoned = true;
+            pending::<()>().await;
+        }
+        let (end, outcome) = self.play(address, operations, now);
+        self.abandoned = true;
+        wait_until(end).await;
+        self.abandoned = false;
+        outcome
+    }
+}
+
+impl RecoverBus for SensorBus {
+    async fn recover(&mut self) -> bool {
+        {
+            let mut plant = self.plant.borrow_mut();
+            for _ in 0..9 {
+                plant.clock_pulse();
+            }
+            plant.i2c.reset_pin();
+        }
+        wait_until(clock::since_power_on() + RECOVERY).await;
+        self.abandoned = false;
+        !self.plant.borrow().sda_held()
+    }
+}
+
+/// One gyro.
+pub struct Gyro {
+    plant: Rc<RefCell<Plant>>,
+    plate: usize,
+}
+
+impl Gyro {
+    /// The gyro of a plate.
+    pub fn new(plant: Rc<RefCell<Plant>>, plate: usize) -> Self {
+        Gyro { plant, plate }
+    }
+}
+
+impl spi::ErrorType for Gyro {
+    type Error = spi::ErrorKind;
+}
+
+impl embedded_hal_async::spi::SpiDevice<u16> for Gyro {
+    async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u16>]) -> Result<(), Self::Error> {
+        let mut at = clock::since_power_on() + SPI_OVERHEAD;
+        {
+            let mut plant = self.plant.borrow_mut();
+            let gyro = &mut plant.gyro[self.plate];
+            gyro.select(at);
+            for operation in operations {
+                let mut word = |mosi: u16| {
+                    at += SPI_WORD;
+                    gyro.transfer(mosi, at)
+                };
+                match operation {
+                    spi::Operation::Read(words) => words.iter_mut().for_each(|slot| *slot = word(0)),
+                    spi::Operation::Write(words) => words.iter().for_each(|mosi| {
+                        word(*mosi);
+                    }),
+                    spi::Operation::Transfer(read, write) => {
+                        for index in 0..read.len().max(write.len()) {
+                            let miso = word(write.get(index).copied().unwrap_or(0));
+                            if let Some(slot) = read.get_mut(index) {
+                                *slot = miso;
+                            }
+                        }
+                    }
+                    spi::Operation::TransferInPlace(words) => words.iter_mut().for_each(|slot| *slot = word(*slot)),
+                    spi::Operation::DelayNs(ns) => at += Nanos::from(*ns),
+                }
+            }
+            gyro.deselect(at);
+        }
+        wait_until(at).await;
+        Ok(())
+    }
+}

@@ -1,0 +1,113 @@
+//! UARTs, discrete inputs, watchdog and retained memory of the host board.
+
+use std::{
+    cell::{Cell, RefCell},
+    collections::VecDeque,
+    convert::Infallible,
+    future::poll_fn,
+    rc::Rc,
+    task::Poll,
+};
+
+use embassy_time::{Duration, Timer};
+use embedded_io_async::{ErrorType, Read, Write};
+use emems::{
+    board::{Discretes, Retained, Watchdog},
+    crash::CrashRecord,
+    resume::Resume,
+};
+
+use super::{clock, timing::UART_BYTE};
+use crate::{part::Nanos, plant::Plant};
+
+/// What a transmitter sent and nobody has heard yet.
+pub type Sent = Rc<RefCell<Vec<(Nanos, Vec<u8>)>>>;
+
+/// A transmitter: bytes are heard when the last of a write is complete.
+pub struct Transmitter(pub Sent);
+
+impl ErrorType for Transmitter {
+    type Error = Infallible;
+}
+
+impl Write for Transmitter {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        Timer::after(Duration::from_micros(bytes.len() as u64 * UART_BYTE / 1000)).await;
+        self.0.borrow_mut().push((clock::since_power_on(), bytes.to_vec()));
+        Ok(bytes.len())
+    }
+
+    async fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// What the ground said and the unit has not read yet.
+pub type Spoken = Rc<RefCell<VecDeque<u8>>>;
+
+/// A receiver.
+pub struct Receiver(pub Spoken);
+
+impl ErrorType for Receiver {
+    type Error = Infallible;
+}
+
+impl Read for Receiver {
+    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
+        // No waker is kept: the run polls everything again whenever the ground has spoken.
+        poll_fn(|_| {
+            let mut spoken = self.0.borrow_mut();
+            if spoken.is_empty() {
+                return Poll::Pending;
+            }
+            let count = bytes.len().min(spoken.len());
+            bytes
+                .iter_mut()
+                .zip(spoken.drain(..count))
+                .for_each(|(slot, byte)| *slot = byte);
+            Poll::Ready(Ok(count))
+        })
+        .await
+    }
+}
+
+/// The discrete inputs.
+pub struct Inputs(pub Rc<RefCell<Plant>>);
+
+impl Discretes for Inputs {
+    fn lift_off(&mut self) -> bool {
+        self.0.borrow().discretes(clock::since_power_on()).0
+    }
+
+    fn micro_g(&mut self) -> bool {
+        self.0.borrow().discretes(clock::since_power_on()).1
+    }
+}
+
+/// The watchdog: when it was last fed.
+#[derive(Clone, Default)]
+pub struct Fed(pub Rc<Cell<Nanos>>);
+
+impl Watchdog for Fed {
+    fn feed(&mut self) {
+        self.0.set(clock::since_power_on());
+    }
+}
+
+/// Memory that survives a reset of the host board.
+#[derive(Clone, Default)]
+pub struct Kept(pub Rc<Cell<Option<Resume>>>);
+
+impl Retained for Kept {
+    fn resume(&mut self) -> Option<Resume> {
+        self.0.get()
+    }
+
+    fn keep(&mut self, resume: &Resume) {
+        self.0.set(Some(*resume));
+    }
+
+    fn take_crash(&mut self) -> Option<CrashRecord> {
+        None
+    }
+}

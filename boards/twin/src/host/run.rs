@@ -1,0 +1,97 @@
+//! A run of the unit on the host board, watched from a [`Bench`].
+
+use std::{cell::RefCell, pin::pin, rc::Rc};
+
+use emems::{
+    board::ResetCause,
+    unit::{self, Settings},
+};
+
+use super::{
+    board::{Ends, parts},
+    clock,
+    timing::BOOT,
+};
+use crate::{
+    part::Nanos,
+    plant::Plant,
+    run::{Bench, Fault, Flow, Scheduled},
+};
+
+/// [ns] how often the bench is asked for commands.
+const STEP: Nanos = 20_000_000;
+
+/// [ns] the independent watchdog's nominal time.
+const WATCHDOG: Nanos = 1_000_000_000;
+
+/// What a host run says of itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct HostReport {
+    /// [ns] virtual time flown.
+    pub flown: Nanos,
+    /// Resets and when they struck.
+    pub resets: Vec<(Nanos, ResetCause)>,
+}
+
+/// Flies the unit from power-on for `duration`, or until the bench says stop.
+pub fn fly(
+    plant: Plant,
+    settings: Settings,
+    faults: &[Scheduled],
+    duration: Nanos,
+    bench: &mut dyn Bench,
+) -> HostReport {
+    let plant = Rc::new(RefCell::new(plant));
+    let ends = Ends::default();
+    let mut report = HostReport::default();
+    let mut faults: Vec<Scheduled> = faults.to_vec();
+    faults.sort_by_key(|scheduled| std::cmp::Reverse(scheduled.at));
+    let mut cause = ResetCause::PowerOn;
+    let mut now = 0;
+    while now < duration {
+        clock::start(now + BOOT);
+        ends.fed.0.set(now + BOOT);
+        let mut unit = pin!(unit::run(parts(&plant, &ends, cause), settings));
+        let reset = loop {
+            let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
+            let until = (now + STEP).min(fault).min(duration);
+            let _ = clock::advance(unit.as_mut(), until);
+            now = until;
+            hear(&ends, bench);
+            ends.spoken.borrow_mut().extend(bench.commands(now));
+            if bench.advanced(now) == Flow::Stop {
+                report.flown = now;
+                return report;
+            }
+            let mut struck = None;
+            while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
+                match faults.pop().map(|scheduled| scheduled.fault) {
+                    Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(fault) => plant.borrow_mut().apply(fault, now),
+                    None => {}
+                }
+            }
+            if now.saturating_sub(ends.fed.0.get()) > WATCHDOG {
+                struck = Some(ResetCause::Watchdog);
+            }
+            if now >= duration || struck.is_some() {
+                break struck;
+            }
+        };
+        if let Some(reset) = reset {
+            report.resets.push((now, reset));
+            cause = reset;
+        }
+    }
+    report.flown = now;
+    report
+}
+
+fn hear(ends: &Ends, bench: &mut dyn Bench) {
+    for (at, bytes) in ends.telemetry.borrow_mut().drain(..) {
+        bench.telemetry(at, &bytes);
+    }
+    for (at, bytes) in ends.umbilical.borrow_mut().drain(..) {
+        bench.umbilical(at, &bytes);
+    }
+}

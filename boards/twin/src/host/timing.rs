@@ -1,0 +1,20 @@
+//! How long the host board's lines take: the wire, plus what the firmware image spends around it.
+//!
+//! The wire times follow from the rates. The overheads are read off the image on the emulated board (its slot times in
+//! derived frames against those of the host run), so that both sample the world at the same instants; a test holds the
+//! two runs together.
+
+use crate::part::Nanos;
+
+/// [ns] a bit on the sensor bus at 400 kHz.
+pub const I2C_BIT: Nanos = 2_500;
+/// [ns] the firmware's work around one I2C transaction.
+pub const I2C_OVERHEAD: Nanos = 0;
+/// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
+pub const SPI_WORD: Nanos = 12_190;
+/// [ns] the firmware's work around one word.
+pub const SPI_OVERHEAD: Nanos = 0;
+/// [ns] a byte on a UART, 115200 8N1.
+pub const UART_BYTE: Nanos = 86_806;
+/// [ns] from reset to the start of the unit's clock.
+pub const BOOT: Nanos = 0;

@@ -1,0 +1,111 @@
+//! The umbilical: what is said, and what the unit answers and does.
+
+use emems::packet;
+use host_tests::world;
+use host_tests::{Flight, Flown, MS, S};
+
+fn still() -> Flight {
+    Flight::ideal(world("still"))
+}
+
+/// Packets that came over the umbilical.
+fn packets_in(flown: &Flown) -> usize {
+    flown
+        .umbilical
+        .split(|byte| *byte == packet::START)
+        .filter(|rest| {
+            rest.get(..packet::PACKET_BYTES - 1)
+                .is_some_and(|body| packet::decode(&[&[packet::START], body].concat()).is_ok())
+        })
+        .count()
+}
+
+#[test]
+fn help_lists_every_word_and_version_and_status_answer() {
+    let flown = still()
+        .say(S, b"G_HE")
+        .say(2 * S, b"G_VE")
+        .say(3 * S, b"G_ST")
+        .fly(4 * S);
+    let replies = flown.replies();
+    for entry in &emems::command::COMMANDS {
+        let line = format!("{} {}", String::from_utf8_lossy(entry.word), entry.meaning);
+        assert!(replies.contains(&line), "{line} in {replies:#?}");
+    }
+    assert!(flown.replied("G_VE: e-MEMS 0.1.0"), "{replies:#?}");
+    assert!(flown.replied("G_ST WAIT task none recording 0"), "{replies:#?}");
+}
+
+#[test]
+fn packets_go_to_the_umbilical_between_g_mt_and_g_mt_small() {
+    let flown = still().say(S, b"G_MT").say(3 * S, b"G_Mt").fly(5 * S);
+    assert_eq!(packets_in(&flown), 10);
+    assert!(flown.replied("G_MT ok"));
+}
+
+#[test]
+fn telemetry_never_stops_whatever_is_asked() {
+    let words: Vec<u8> = emems::command::COMMANDS.iter().flat_map(|entry| *entry.word).collect();
+    let mut flight = still();
+    for second in 1..20 {
+        flight = flight.say(second * S, &words).say(second * S + 300 * MS, b"G_AT");
+    }
+    let flown = flight.fly(22 * S);
+    assert!(
+        flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS),
+        "{:?}",
+        flown.periods()
+    );
+    assert!(flown.strange.is_empty());
+}
+
+#[test]
+fn a_flight_is_recorded_dumped_and_erased() {
+    let flown = still()
+        .say(S, b"G_MV")
+        .say(S + 100 * MS, b"G_MV")
+        .say(2 * S, b"G_MG")
+        .say(4 * S, b"G_MEG_ME")
+        .say(5 * S, b"G_Ml")
+        .say(7 * S, b"G_LR000002000003")
+        .say(8 * S, b"G_MA")
+        .say(9 * S, b"G_CA")
+        .say(10 * S, b"G_ST")
+        .fly(11 * S);
+    assert!(
+        flown.replied("G_MV: send G_MV within 10 s") && flown.replied("G_MV ok: FLIGHT"),
+        "{:?}",
+        flown.replies()
+    );
+    assert_eq!(packets_in(&flown), 10 + 3, "{:?}", flown.replies());
+    assert!(
+        flown.replied("G_CA ok: erasing 10 records") && flown.replied("recorder 0 of"),
+        "{:?}",
+        flown.replies()
+    );
+}
+
+#[test]
+fn refusals_give_the_reason() {
+    let flown = still()
+        .say(S, b"G_MG")
+        .say(2 * S, b"G_CA")
+        .say(3 * S, b"G_MX")
+        .say(4 * S, b"G_LR00Z")
+        .fly(5 * S);
+    for reply in [
+        "G_MG no: only in FLIGHT",
+        "G_CA no: nothing to confirm",
+        "G_MX no: unknown",
+        "G_LR no: digit 2 is 0x5A",
+    ] {
+        assert!(flown.replied(reply), "{reply} in {:?}", flown.replies());
+    }
+}
+
+#[test]
+fn every_sensor_passes_its_self_test_and_packets_go_on() {
+    let flown = still().say(2 * S, b"G_AT").fly(12 * S);
+    assert!(flown.replied("G_AT done: 16 of 16 passed"), "{:#?}", flown.replies());
+    assert!(flown.second(11).iter().all(|reading| reading.errors.0 == 0));
+}

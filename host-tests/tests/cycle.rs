@@ -1,0 +1,163 @@
+//! The read cycle: what a packet holds, when it comes, and what failures cost.
+
+use emems::{
+    derived::Health,
+    sample::{NO_SLOT, NOT_READ, SENSOR_COUNT},
+};
+use host_tests::world;
+use host_tests::{Flight, MS, S};
+use twin::run::Fault;
+
+/// [ns] the clock's microsecond, twice.
+const JITTER: u64 = 2_000;
+
+fn still() -> Flight {
+    Flight::ideal(world("still"))
+}
+
+#[test]
+fn a_packet_comes_every_200_ms_and_holds_all_sixteen_sensors() {
+    let flown = still().fly(10 * S);
+    assert!(flown.strange.is_empty());
+    assert!(
+        flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= JITTER),
+        "{:?}",
+        flown.periods()
+    );
+    let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
+    assert_eq!(counters, (0..counters.len() as u16).collect::<Vec<_>>());
+    assert!(counters.len() >= 48);
+    for (_, reading) in &flown.packets[2..] {
+        assert_eq!(reading.errors.0, 0, "{reading:?}");
+    }
+    // Level and still: plate 4 looks down its own z axis, 9.7864 m/s2 of 3 mg counts.
+    let (_, last) = flown.packets.last().expect("packets");
+    assert_eq!(last.acc_p[3], [0, 0, 333]);
+    assert_eq!(last.gyro, [0; 4]);
+}
+
+#[test]
+fn k_silent_sensors_cost_their_own_values_only() {
+    for k in 0..=SENSOR_COUNT {
+        let flight = (0..k).fold(still(), |flight, slot| flight.fault(3 * S, Fault::Silent(slot)));
+        let flown = flight.fly(6 * S);
+        assert!(
+            flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= JITTER),
+            "{k}"
+        );
+        for reading in &flown.second(5) {
+            assert_eq!(reading.errors.0.count_ones(), k as u32, "{k}: {:04X}", reading.errors.0);
+            assert!(
+                (0..SENSOR_COUNT).all(|slot| reading.errors.contains(slot) == (slot < k)),
+                "{k}"
+            );
+            assert_eq!(reading.acc_p[0] == [NOT_READ; 3], k > 0);
+            assert_eq!(reading.temperature[3] == NOT_READ, k == SENSOR_COUNT);
+        }
+    }
+}
+
+#[test]
+fn a_sensor_that_comes_back_is_configured_and_read_again() {
+    for slot in 0..SENSOR_COUNT {
+        let flown = still()
+            .fault(3 * S, Fault::Silent(slot))
+            .fault(4 * S, Fault::Restored(slot))
+            .fly(6 * S);
+        assert!(
+            flown.second(3)[1..].iter().all(|reading| reading.errors.contains(slot)),
+            "slot {slot}"
+        );
+        assert!(
+            flown.second(5).iter().all(|reading| reading.errors.0 == 0),
+            "slot {slot}"
+        );
+    }
+}
+
+#[test]
+fn a_stuck_bus_costs_no_packet_and_no_gyro_and_comes_back() {
+    let flown = still()
+        .fault(3 * S, Fault::BusStuck(true))
+        .fault(5 * S, Fault::BusStuck(false))
+        .fly(8 * S);
+    assert!(
+        flown.periods().iter().all(|period| *period <= 400 * MS),
+        "{:?}",
+        flown.periods()
+    );
+    for reading in &flown.second(4) {
+        assert_eq!(reading.errors.0, 0xF0FF, "every I2C part and no gyro");
+        assert_eq!(reading.gyro, [0; 4]);
+    }
+    assert!(flown.second(7).iter().all(|reading| reading.errors.0 == 0));
+    let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
+    assert_eq!(
+        counters,
+        (0..counters.len() as u16).collect::<Vec<_>>(),
+        "no packet is missing"
+    );
+}
+
+#[test]
+fn a_part_that_holds_sda_is_freed_by_clock_pulses() {
+    let flown = still().fault(3 * S, Fault::SdaHeld).say(1, b"G_DL").fly(6 * S);
+    assert!(
+        flown
+            .derived
+            .iter()
+            .any(|frame| frame.health.contains(Health::BUS_RECOVERED))
+    );
+    assert!(flown.second(5).iter().all(|reading| reading.errors.0 == 0));
+}
+
+#[test]
+fn the_multiplexer_gone_takes_the_i2c_parts_and_nothing_else() {
+    let flown = still()
+        .fault(3 * S, Fault::MuxSilent(true))
+        .fault(5 * S, Fault::MuxSilent(false))
+        .fly(8 * S);
+    assert!(
+        flown
+            .second(4)
+            .iter()
+            .all(|reading| reading.errors.0 == 0xF0FF && reading.gyro == [0; 4])
+    );
+    assert!(flown.second(7).iter().all(|reading| reading.errors.0 == 0));
+}
+
+#[test]
+fn derived_frames_say_when_each_sensor_was_read_and_come_only_when_asked_for() {
+    assert!(still().fly(3 * S).derived.is_empty());
+    let flown = still().say(S, b"G_DL").say(4 * S, b"G_DD").fly(6 * S);
+    assert!(flown.strange.is_empty());
+    assert!(
+        flown.derived.len() >= 14 && flown.derived.len() <= 16,
+        "{}",
+        flown.derived.len()
+    );
+    for frame in &flown.derived[2..] {
+        assert!(
+            frame.slots_us.is_sorted() && !frame.slots_us.contains(&NO_SLOT),
+            "{frame:?}"
+        );
+        assert!(frame.cycle_us <= 8_000, "{frame:?}");
+        assert_eq!(frame.increments.gyro[0].count, 20);
+        assert_eq!(frame.increments.covered_us, 200_000);
+    }
+}
+
+#[test]
+fn the_period_is_a_parameter_from_1_to_50_hz() {
+    for (period_ms, packets) in [(20, 100), (50, 40), (1000, 2)] {
+        let mut flight = still();
+        flight.settings.period_ms = period_ms;
+        let flown = flight.fly(5 * S);
+        let last_two: usize = flown.second(3).len() + flown.second(4).len();
+        assert!(last_two.abs_diff(packets) <= 1, "{period_ms} ms: {last_two}");
+        assert!(
+            flown.second(3).iter().all(|reading| reading.errors.0 == 0),
+            "{period_ms} ms"
+        );
+    }
+}

@@ -1,0 +1,119 @@
+//! The unit as one future over a [`Board`]: the same code on the STM32F407, on its emulation and on the host.
+//!
+//! ```text
+//! acquire --Cycle--> telemetry, umbilical, record
+//!               \--> estimate --Derived--> telemetry, umbilical
+//! umbilical --Command--> State <--lift-off-- inputs
+//! every part --vote--> watchdog
+//! ```
+//!
+//! The parts are joined, not spawned: tasks cannot be generic, and one future can be polled on a host in virtual time.
+//! They share [`Shared`], which lives in this future; nothing is global.
+
+mod acquire;
+mod estimate;
+mod gyros;
+mod inputs;
+mod plates;
+mod record;
+mod self_test;
+mod shared;
+mod telemetry;
+mod umbilical;
+mod vote;
+
+use embassy_futures::join;
+
+use crate::{
+    board::{Board, Parts, Retained},
+    sensor::{adis16265, hmc5883l, lis331hh, tca9548a::Switch},
+};
+
+use gyros::Gyros;
+use shared::Shared;
+
+/// What a laboratory may choose without touching the code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Settings {
+    /// [ms] from packet to packet, 20 to 1000. Short: more packets, less idle time. The thesis has 200.
+    pub period_ms: u64,
+    /// [Hz] fast samples of the gyros, 1 to 250. High: less aliasing and coning error, more work.
+    pub gyro_hz: u64,
+    /// Full scale of the accelerometers. Large: survives the boost unclipped. Small: finer counts.
+    pub acceleration: lis331hh::FullScale,
+    /// Gain of the magnetometers.
+    pub field: hmc5883l::Gain,
+    /// Range of the gyros.
+    pub rate: adis16265::Range,
+}
+
+impl Settings {
+    /// The thesis' unit: 5 Hz, 3 mg, 0.92 mG and 0.07326 deg/s a count.
+    pub const NOMINAL: Settings = Settings {
+        period_ms: 200,
+        gyro_hz: 100,
+        acceleration: lis331hh::FullScale::G6,
+        field: hmc5883l::Gain::PerGauss1090,
+        rate: adis16265::Range::DegPerS320,
+    };
+
+    /// The accelerometers': as many samples a second as cycles, or 50.
+    fn accelerometer(&self) -> lis331hh::Config {
+        let rate = if self.period_ms < 40 {
+            lis331hh::Rate::Hz100
+        } else {
+            lis331hh::Rate::Hz50
+        };
+        lis331hh::Config {
+            full_scale: self.acceleration,
+            rate,
+        }
+    }
+
+    /// The magnetometers': as fast as they go, so that a set is at most 13 ms old.
+    fn magnetometer(&self) -> hmc5883l::Config {
+        hmc5883l::Config {
+            gain: self.field,
+            rate: hmc5883l::Rate::Hz75,
+            average: hmc5883l::Average::Of1,
+        }
+    }
+
+    /// The gyros'.
+    fn gyro(&self) -> adis16265::Config {
+        adis16265::Config {
+            range: self.rate,
+            ..adis16265::Config::default()
+        }
+    }
+}
+
+/// Runs the unit for ever.
+pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
+    let resume = parts.retained.resume();
+    let crash = parts.retained.take_crash();
+    let shared = Shared::new(settings, parts.reset, resume, crash);
+    let switch = Switch::new(parts.sensor_bus);
+    let gyros = Gyros::new(parts.gyros, settings);
+    let votes = vote::Votes::default();
+    let link = join::join4(
+        telemetry::run::<B>(&shared, &votes, parts.telemetry),
+        umbilical::send::<B>(&shared, &votes, parts.umbilical_tx),
+        umbilical::listen::<B>(&shared, &votes, parts.umbilical_rx),
+        inputs::run::<B>(&shared, &votes, parts.discretes),
+    );
+    let data = join::join4(
+        acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.retained),
+        gyros::run::<B>(&shared, &votes, &gyros),
+        estimate::run(&shared, &votes),
+        record::run::<B>(&shared, &votes, parts.recorder),
+    );
+    let care = join::join(
+        self_test::run::<B>(&shared, &switch, &gyros),
+        vote::run::<B>(&votes, parts.watchdog),
+    );
+    join::join3(link, data, care).await;
+    // Every part runs for ever; should one end, the vote is missing and the watchdog restarts the unit.
+    core::future::pending().await
+}

@@ -1,0 +1,252 @@
+//! One read cycle of all sixteen sensors every period, in the order of [`SENSORS`]; the packet always closes.
+//!
+//! A sensor that answers is read within its share of the cycle ([`Budget`]). One that fails is marked in the error
+//! identifier and from then on probed cheaply, once a cycle, until it answers and is configured again. A read that ran
+//! out of time has left the bus in the middle of a transfer: the bus is freed at once, since it never frees itself.
+//!
+//! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
+//! as before, but with its power-on settings (fault S12).
+
+use core::fmt::Display;
+
+use embassy_time::{Duration, Instant, TimeoutError, Timer, with_timeout};
+
+use super::{
+    gyros::Gyros,
+    plates::{Plates, Taken},
+    shared::{Cycle, Shared},
+    vote::{Voter, Votes, WAKE_MS},
+};
+use crate::{
+    board::{Board, ResetCause, Retained},
+    budget::Budget,
+    derived::Health,
+    packet,
+    resume::Resume,
+    sample::{Kind, NO_SLOT, Reading, SENSOR_COUNT, SENSORS, Sample, Sensor},
+    sensor::tca9548a::Switch,
+};
+
+/// [ms] after power-on until the gyros answer (ADIS16265 data sheet, Table 1: 220 ms).
+const GYRO_START_MS: u64 = 250;
+
+/// What is known of a sensor.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Standing {
+    /// It failed, or was never configured.
+    Lost,
+    /// Configured; its next fresh sample is its first good one.
+    Configured,
+    /// It gives samples.
+    Reading,
+}
+
+/// Reads for ever.
+pub async fn run<B: Board>(
+    shared: &Shared,
+    votes: &Votes,
+    switch: &Switch<B::SensorBus>,
+    gyros: &Gyros<B::Gyro>,
+    mut retained: B::Retained,
+) {
+    let mut acquisition = Acquisition::<B> {
+        shared,
+        switch,
+        plates: Plates::new(switch, shared.settings),
+        gyros,
+        budget: Budget::of_period(shared.settings.period_ms * 1000),
+        standing: [Standing::Lost; SENSOR_COUNT],
+        health: Health::default(),
+    };
+    if shared.reset == ResetCause::PowerOn {
+        Timer::at(Instant::from_millis(GYRO_START_MS)).await;
+        votes.cast(Voter::Acquire);
+    }
+    for slot in 0..SENSOR_COUNT {
+        acquisition
+            .configure(slot, acquisition.budget.limit_us(0, 0, false))
+            .await;
+    }
+    let resume = shared.resume.unwrap_or_default();
+    let mut counter = resume.next_counter;
+    let resets = resume.resets.saturating_add(u16::from(shared.resume.is_some()));
+    let period = Duration::from_millis(shared.settings.period_ms);
+    let close = Duration::from_micros(acquisition.budget.close_us);
+    let mut start = Instant::now() + Duration::from_millis(1);
+    let mut verified = 0;
+    loop {
+        wait_until(start, votes).await;
+        let cycle = acquisition.cycle(counter, start).await;
+        wait_until(start + close, votes).await;
+        counter = counter.wrapping_add(1);
+        shared.publish_cycle(cycle);
+        let (mode, recording) = {
+            let state = shared.state.borrow();
+            (state.mode, state.recording)
+        };
+        retained.keep(&Resume {
+            mode,
+            recording,
+            next_counter: counter,
+            resets,
+        });
+        start += period;
+        let limit_us = acquisition.budget.limit_us(0, 0, true);
+        if Instant::now() + Duration::from_micros(2 * limit_us) < start {
+            acquisition.verify(verified, limit_us).await;
+            verified = (verified + 1) % SENSOR_COUNT;
+        }
+    }
+}
+
+/// Sleeps until `at`, voting meanwhile.
+async fn wait_until(at: Instant, votes: &Votes) {
+    loop {
+        votes.cast(Voter::Acquire);
+        let wake = at.min(Instant::now() + Duration::from_millis(WAKE_MS));
+        Timer::at(wake).await;
+        if wake == at {
+            return;
+        }
+    }
+}
+
+struct Acquisition<'a, B: Board> {
+    shared: &'a Shared,
+    switch: &'a Switch<B::SensorBus>,
+    plates: Plates<'a, B::SensorBus>,
+    gyros: &'a Gyros<B::Gyro>,
+    budget: Budget,
+    standing: [Standing; SENSOR_COUNT],
+    health: Health,
+}
+
+impl<B: Board> Acquisition<'_, B> {
+    /// One read cycle.
+    async fn cycle(&mut self, counter: u16, start: Instant) -> Cycle {
+        let mut reading = Reading::unread(counter);
+        let mut slots_us = [NO_SLOT; SENSOR_COUNT];
+        for slot in 0..SENSOR_COUNT {
+            let elapsed_us = start.elapsed().as_micros();
+            let waiting = (SENSOR_COUNT - 1 - slot) as u64;
+            let lost = self.standing[slot] == Standing::Lost;
+            let limit_us = self.budget.limit_us(elapsed_us, waiting, lost);
+            if self.shared.testing.get() == Some(slot) {
+                // Its output is not of this world; it is configured again when the test is over.
+                self.standing[slot] = Standing::Lost;
+            } else if limit_us == 0 {
+                self.health = self.health.with(Health::DEADLINE);
+            } else if lost {
+                self.configure(slot, limit_us).await;
+            } else if self.read(slot, limit_us, &mut reading).await {
+                slots_us[slot] = elapsed_us as u32;
+                reading.errors.remove(slot);
+            }
+        }
+        (reading.lift_off, reading.micro_g) = self.shared.discretes.get();
+        Cycle {
+            sample: Sample {
+                reading,
+                start_us: start.as_micros(),
+                slots_us,
+            },
+            packet: packet::encode(&reading),
+            increments: self.shared.integrator.borrow_mut().take(),
+            health: core::mem::take(&mut self.health).with(self.gyros.take_health()),
+            cycle_us: start.elapsed().as_micros() as u32,
+        }
+    }
+
+    /// Reads a sensor into the reading; whether it gave a good sample.
+    async fn read(&mut self, slot: usize, limit_us: u64, reading: &mut Reading) -> bool {
+        let limit = Duration::from_micros(limit_us);
+        let sensor = SENSORS[slot];
+        if sensor.kind == Kind::Gyro {
+            let taken = with_timeout(limit, self.gyros.read(sensor.plate)).await;
+            let Some((rate, temperature)) = self.settle(slot, taken).await else {
+                return false;
+            };
+            self.standing[slot] = Standing::Reading;
+            reading.gyro[sensor.plate] = rate;
+            reading.gyro_temperature[sensor.plate] = temperature;
+            return true;
+        }
+        let taken = with_timeout(limit, self.plates.read(sensor)).await;
+        let Some(taken): Option<Taken> = self.settle(slot, taken).await else {
+            return false;
+        };
+        if self.standing[slot] == Standing::Configured && !taken.fresh {
+            return false;
+        }
+        self.standing[slot] = Standing::Reading;
+        self.health = self.health.with_if(Health::MAGNETOMETER_OVERFLOW, taken.overflow);
+        taken.put(sensor, reading);
+        true
+    }
+
+    /// Identifies and configures a sensor that is lost.
+    async fn configure(&mut self, slot: usize, limit_us: u64) {
+        let limit = Duration::from_micros(limit_us);
+        let sensor = SENSORS[slot];
+        let known = match sensor.kind {
+            Kind::Gyro => {
+                let done = with_timeout(limit, self.gyros.configure(sensor.plate)).await;
+                self.settle(slot, done).await.is_some()
+            }
+            _ => {
+                let done = with_timeout(limit, self.plates.configure(sensor)).await;
+                self.settle(slot, done).await.is_some()
+            }
+        };
+        if known {
+            self.standing[slot] = Standing::Configured;
+        }
+    }
+
+    /// Compares a sensor's settings with what was written.
+    async fn verify(&mut self, slot: usize, limit_us: u64) {
+        let limit = Duration::from_micros(limit_us);
+        let sensor = SENSORS[slot];
+        if self.standing[slot] == Standing::Lost || self.shared.testing.get() == Some(slot) {
+            return;
+        }
+        let kept = match sensor.kind {
+            Kind::Gyro => {
+                let kept = with_timeout(limit, self.gyros.verify(sensor.plate)).await;
+                self.settle(slot, kept).await.is_some()
+            }
+            _ => {
+                let kept = with_timeout(limit, self.plates.verify(sensor)).await;
+                self.settle(slot, kept).await.is_some()
+            }
+        };
+        if !kept {
+            self.health = self.health.with(Health::RECONFIGURED);
+            self.configure(slot, limit_us).await;
+        }
+    }
+
+    /// The value, if there is one; otherwise the sensor is lost, and after a timeout the bus is freed.
+    async fn settle<T, E: Display>(&mut self, slot: usize, outcome: Result<Result<T, E>, TimeoutError>) -> Option<T> {
+        match outcome {
+            Ok(Ok(value)) => return Some(value),
+            Ok(Err(error)) => self.lose(slot, &error),
+            Err(TimeoutError) => {
+                self.lose(slot, &"no answer in time");
+                if SENSORS[slot].kind != Kind::Gyro {
+                    self.health = self.health.with(Health::BUS_RECOVERED);
+                    self.switch.recover().await;
+                }
+            }
+        }
+        None
+    }
+
+    fn lose(&mut self, slot: usize, why: &dyn Display) {
+        if self.standing[slot] != Standing::Lost {
+            self.standing[slot] = Standing::Lost;
+            let sensor: Sensor = SENSORS[slot];
+            self.shared.say(format_args!("{sensor} lost: {why}"));
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! What is derived from a cycle.
+
+use embassy_time::{Duration, with_timeout};
+
+use super::{
+    shared::{Cycle, Shared},
+    vote::{Voter, Votes, WAKE_MS},
+};
+use crate::{
+    derived::{Derived, Health},
+    mode::State,
+};
+
+/// Derives for ever.
+pub async fn run(shared: &Shared, votes: &Votes) {
+    let Some(mut cycles) = shared.cycle_reader() else {
+        return;
+    };
+    loop {
+        votes.cast(Voter::Estimate);
+        if let Ok(cycle) = with_timeout(Duration::from_millis(WAKE_MS), cycles.next_message_pure()).await {
+            let state = *shared.state.borrow();
+            shared.publish_derived(derive(&cycle, state, shared.recorder_refused.get()));
+        }
+    }
+}
+
+fn derive(cycle: &Cycle, state: State, recorder_refused: bool) -> Derived {
+    let reading = &cycle.sample.reading;
+    Derived {
+        counter: reading.counter,
+        start_us: cycle.sample.start_us,
+        mode: state.mode,
+        health: cycle
+            .health
+            .with(Health(reading.errors.0.into()))
+            .with_if(Health::RECORDING, state.recording)
+            .with_if(Health::RECORDER_REFUSED, recorder_refused),
+        cycle_us: cycle.cycle_us,
+        slots_us: cycle.sample.slots_us,
+        increments: cycle.increments,
+    }
+}

@@ -1,0 +1,125 @@
+//! The I2C parts of the four plates, behind the multiplexer: one sensor at a time, whichever part it is.
+
+use embedded_hal_async::i2c::I2c;
+
+use super::Settings;
+use crate::{
+    sample::{Kind, NOT_READ, Reading, Sensor},
+    sensor::{
+        Error,
+        hmc5883l::{self, Hmc5883l},
+        lis331hh::{self, Lis331hh},
+        tca9548a::{self, Channel, Switch},
+        tmp102::{self, Tmp102},
+    },
+};
+
+/// Why an I2C part failed.
+pub type PlateError<I2C> = Error<tca9548a::Error<<I2C as embedded_hal_async::i2c::ErrorType>::Error>>;
+
+/// What a part gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// [counts] x, y, z, or the temperature in x.
+    pub counts: [i16; 3],
+    /// The part had not given it before.
+    pub fresh: bool,
+    /// A magnetometer axis overflowed.
+    pub overflow: bool,
+}
+
+impl Taken {
+    /// Puts the counts where a reading has them.
+    pub fn put(&self, sensor: Sensor, reading: &mut Reading) {
+        match sensor.kind {
+            Kind::Accelerometer => reading.acc_p[sensor.plate] = self.counts,
+            Kind::Magnetometer => reading.mag_p[sensor.plate] = self.counts,
+            Kind::Thermometer => reading.temperature[sensor.plate] = self.counts[0],
+            Kind::Gyro => {}
+        }
+    }
+}
+
+/// The accelerometers, magnetometers and thermometers of plates 1 to 4.
+pub struct Plates<'a, I2C> {
+    accelerometers: [Lis331hh<Channel<'a, I2C>>; 4],
+    magnetometers: [Hmc5883l<Channel<'a, I2C>>; 4],
+    thermometers: [Tmp102<Channel<'a, I2C>>; 4],
+    acceleration: lis331hh::Config,
+    field: hmc5883l::Config,
+    temperature: tmp102::Rate,
+}
+
+impl<'a, I2C: I2c> Plates<'a, I2C> {
+    /// The parts behind a multiplexer, plate 1 on channel 0.
+    pub fn new(switch: &'a Switch<I2C>, settings: Settings) -> Self {
+        let channels = [0, 1, 2, 3];
+        Plates {
+            accelerometers: channels.map(|plate| Lis331hh::new(switch.channel(plate))),
+            magnetometers: channels.map(|plate| Hmc5883l::new(switch.channel(plate))),
+            thermometers: channels.map(|plate| Tmp102::new(switch.channel(plate))),
+            acceleration: settings.accelerometer(),
+            field: settings.magnetometer(),
+            temperature: tmp102::Rate::default(),
+        }
+    }
+
+    /// Identifies and configures a part.
+    pub async fn configure(&mut self, sensor: Sensor) -> Result<(), PlateError<I2C>> {
+        let plate = sensor.plate;
+        match sensor.kind {
+            Kind::Accelerometer => self.accelerometers[plate].configure(self.acceleration).await,
+            Kind::Magnetometer => self.magnetometers[plate].configure(self.field).await,
+            Kind::Thermometer => self.thermometers[plate].configure(self.temperature).await,
+            Kind::Gyro => Ok(()),
+        }
+    }
+
+    /// Finds a part that has lost its settings.
+    pub async fn verify(&mut self, sensor: Sensor) -> Result<(), PlateError<I2C>> {
+        let plate = sensor.plate;
+        match sensor.kind {
+            Kind::Accelerometer => self.accelerometers[plate].verify(self.acceleration).await,
+            Kind::Magnetometer => self.magnetometers[plate].verify(self.field).await,
+            Kind::Thermometer => self.thermometers[plate].verify(self.temperature).await,
+            Kind::Gyro => Ok(()),
+        }
+    }
+
+    /// Takes a part's newest sample.
+    pub async fn read(&mut self, sensor: Sensor) -> Result<Taken, PlateError<I2C>> {
+        let plate = sensor.plate;
+        let none = Taken {
+            counts: [NOT_READ; 3],
+            fresh: false,
+            overflow: false,
+        };
+        match sensor.kind {
+            Kind::Accelerometer => {
+                let sample = self.accelerometers[plate].read().await?;
+                Ok(Taken {
+                    counts: sample.counts,
+                    fresh: sample.fresh,
+                    overflow: false,
+                })
+            }
+            Kind::Magnetometer => Ok(match self.magnetometers[plate].read().await? {
+                Some(sample) => Taken {
+                    counts: sample.counts,
+                    fresh: sample.ready,
+                    overflow: sample.overflow.contains(&true),
+                },
+                None => none,
+            }),
+            Kind::Thermometer => {
+                let counts = self.thermometers[plate].read().await?;
+                Ok(Taken {
+                    counts: [counts, NOT_READ, NOT_READ],
+                    fresh: true,
+                    overflow: false,
+                })
+            }
+            Kind::Gyro => Ok(none),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! What the parts of the unit share: the state, the newest cycles and derived frames, and replies for the console.
+
+use core::cell::{Cell, RefCell};
+
+use embassy_sync::{
+    blocking_mutex::raw::NoopRawMutex,
+    channel::Channel,
+    pubsub::{PubSubChannel, Subscriber},
+    signal::Signal,
+};
+use heapless::String;
+
+use super::Settings;
+use crate::{
+    board::ResetCause,
+    crash::CrashRecord,
+    derived::{Derived, Health},
+    increments::{Increments, Integrator},
+    mode::State,
+    packet::PACKET_BYTES,
+    recorder::RecorderStatus,
+    resume::Resume,
+    sample::{Errors, Sample},
+};
+
+/// Everything one read cycle gave.
+#[derive(Clone)]
+pub struct Cycle {
+    /// What was measured, and when.
+    pub sample: Sample,
+    /// Its packet.
+    pub packet: [u8; PACKET_BYTES],
+    /// The gyros since the packet before.
+    pub increments: Increments,
+    /// What the packet has no bits for.
+    pub health: Health,
+    /// [us] from the start of the cycle to the closing of its packet.
+    pub cycle_us: u32,
+}
+
+/// Two: a reader may be busy with one while the next arrives. A reader that is later than that loses the oldest.
+const QUEUED: usize = 2;
+
+type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 2, 0>;
+
+/// A reader of the cycles.
+pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
+/// A reader of the derived frames.
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>;
+
+/// A line for the console, without its end.
+pub type Line = String<128>;
+
+/// How much of a dump has been read; the recorder's part fills it, the umbilical's empties it.
+pub type DumpedPacket = [u8; PACKET_BYTES];
+
+/// The shared state. Everything in it is touched between two awaits only.
+pub struct Shared {
+    /// What was chosen.
+    pub settings: Settings,
+    /// Why the unit started.
+    pub reset: ResetCause,
+    /// What it was doing before.
+    pub resume: Option<Resume>,
+    /// The crash before this start.
+    pub crash: Option<CrashRecord>,
+    /// Mode, task, confirmations.
+    pub state: RefCell<State>,
+    /// The gyros' running integration.
+    pub integrator: RefCell<Integrator>,
+    /// Debounced lift-off and micro-g.
+    pub discretes: Cell<(bool, bool)>,
+    /// The recorder, as of its last action.
+    pub recorder: Cell<RecorderStatus>,
+    /// The recorder refused the last packet.
+    pub recorder_refused: Cell<bool>,
+    /// An erase was ordered and has not begun.
+    pub erase_ordered: Cell<bool>,
+    /// A self-test was ordered.
+    pub self_test_ordered: Signal<NoopRawMutex, ()>,
+    /// The sensor under test, by reading order: not to be read.
+    pub testing: Cell<Option<usize>>,
+    /// Error identifier of the newest cycle.
+    pub errors: Cell<Errors>,
+    /// Bytes lost or passed over on the umbilical.
+    pub umbilical_noise: Cell<u32>,
+    cycles: Cycles,
+    derived: DerivedFrames,
+    /// Lines for the console.
+    pub replies: Channel<NoopRawMutex, Line, 8>,
+    /// Packets read from the recorder for the umbilical.
+    pub dumped: Channel<NoopRawMutex, DumpedPacket, 1>,
+}
+
+impl Shared {
+    /// The state at start.
+    pub fn new(settings: Settings, reset: ResetCause, resume: Option<Resume>, crash: Option<CrashRecord>) -> Self {
+        Shared {
+            settings,
+            reset,
+            resume,
+            crash,
+            state: RefCell::new(State::resumed(resume)),
+            integrator: RefCell::default(),
+            discretes: Cell::default(),
+            recorder: Cell::default(),
+            recorder_refused: Cell::default(),
+            erase_ordered: Cell::default(),
+            self_test_ordered: Signal::new(),
+            testing: Cell::default(),
+            errors: Cell::default(),
+            umbilical_noise: Cell::default(),
+            cycles: PubSubChannel::new(),
+            derived: PubSubChannel::new(),
+            replies: Channel::new(),
+            dumped: Channel::new(),
+        }
+    }
+
+    /// A reader of every cycle from now on. There are as many places as parts that call this, so it is never `None`.
+    pub fn cycle_reader(&self) -> Option<CycleReader<'_>> {
+        self.cycles.subscriber().ok()
+    }
+
+    /// A reader of every derived frame from now on.
+    pub fn derived_reader(&self) -> Option<DerivedReader<'_>> {
+        self.derived.subscriber().ok()
+    }
+
+    /// Gives a cycle to every reader; one that is behind loses its oldest.
+    pub fn publish_cycle(&self, cycle: Cycle) {
+        self.errors.set(cycle.sample.reading.errors);
+        self.cycles.immediate_publisher().publish_immediate(cycle);
+    }
+
+    /// Gives a derived frame to every reader.
+    pub fn publish_derived(&self, derived: Derived) {
+        self.derived.immediate_publisher().publish_immediate(derived);
+    }
+
+    /// Puts a line on the console, unless eight already wait: telemetry and reading come before talking.
+    pub fn say(&self, text: core::fmt::Arguments<'_>) {
+        let _ = self.replies.try_send(line(text));
+    }
+
+    /// Puts a line on the console when there is room: for answers of many lines, of which none may be missing.
+    pub async fn tell(&self, text: core::fmt::Arguments<'_>) {
+        self.replies.send(line(text)).await;
+    }
+}
+
+/// As much of the text as a line holds.
+fn line(text: core::fmt::Arguments<'_>) -> Line {
+    struct Cut(Line);
+    impl core::fmt::Write for Cut {
+        fn write_str(&mut self, text: &str) -> core::fmt::Result {
+            // One letter at a time: a piece that does not fit as a whole would be left out as a whole.
+            text.chars()
+                .try_for_each(|letter| self.0.push(letter))
+                .map_err(|_| core::fmt::Error)
+        }
+    }
+    let mut cut = Cut(Line::new());
+    let _ = core::fmt::Write::write_fmt(&mut cut, text);
+    cut.0
+}

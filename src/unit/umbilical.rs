@@ -1,0 +1,187 @@
+//! The umbilical: commands in, replies, packets and records out.
+//!
+//! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
+
+use embassy_futures::select::{Either4, select4};
+use embassy_time::{Duration, Instant, with_timeout};
+use embedded_io_async::Read;
+
+use super::{
+    shared::Shared,
+    telemetry::write,
+    vote::{Voter, Votes, WAKE_MS},
+};
+use crate::{
+    board::Board,
+    command::{COMMANDS, Command, Heard, Parser, word_of},
+    derived,
+    mode::{Action, Refusal, Task, Verdict},
+};
+
+/// Sends for ever.
+pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalTx) {
+    let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
+        return;
+    };
+    if let Some(crash) = &shared.crash {
+        shared.say(format_args!(
+            "crash before this start: {:?} at {} {}",
+            crash.cause, crash.at, crash.place
+        ));
+    }
+    shared.say(format_args!(
+        "e-MEMS {} started: {:?}",
+        env!("CARGO_PKG_VERSION"),
+        shared.reset
+    ));
+    loop {
+        votes.cast(Voter::UmbilicalSend);
+        let next = select4(
+            shared.replies.receive(),
+            shared.dumped.receive(),
+            cycles.next_message_pure(),
+            frames.next_message_pure(),
+        );
+        let Ok(next) = with_timeout(Duration::from_millis(WAKE_MS), next).await else {
+            continue;
+        };
+        let (sending, derived_on) = {
+            let state = shared.state.borrow();
+            (state.task == Task::SendPackets, state.derived)
+        };
+        match next {
+            Either4::First(reply) => {
+                write(&mut line, b">").await;
+                write(&mut line, reply.as_bytes()).await;
+                write(&mut line, b"\r\n").await;
+            }
+            Either4::Second(packet) => write(&mut line, &packet).await,
+            Either4::Third(cycle) if sending => write(&mut line, &cycle.packet).await,
+            Either4::Fourth(frame) if sending && derived_on => write(&mut line, &derived::encode(&frame)).await,
+            _ => {}
+        }
+    }
+}
+
+/// Listens for ever.
+pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx) {
+    let mut parser = Parser::default();
+    let mut lost = 0_u32;
+    let mut bytes = [0; 32];
+    loop {
+        votes.cast(Voter::UmbilicalListen);
+        let heard = match with_timeout(Duration::from_millis(WAKE_MS), line.read(&mut bytes)).await {
+            Ok(Ok(count)) => bytes.get(..count).unwrap_or_default(),
+            Ok(Err(_)) => {
+                lost = lost.saturating_add(1);
+                &[]
+            }
+            Err(_) => continue,
+        };
+        for byte in heard {
+            if let Some(heard) = parser.hear(*byte, Instant::now().as_micros()) {
+                answer(shared, heard).await;
+            }
+        }
+        shared.umbilical_noise.set(parser.passed_over.saturating_add(lost));
+    }
+}
+
+async fn answer(shared: &Shared, heard: Heard) {
+    let command = match heard {
+        Heard::Command(command) => command,
+        Heard::Unknown(word) => {
+            return shared.say(format_args!("{} no: unknown, G_HE lists the words", Printable(&word)));
+        }
+        Heard::BadDigit { word, digit, found } => {
+            return shared.say(format_args!(
+                "{} no: digit {digit} is 0x{found:02X}, not 0-9 or A-F",
+                Printable(&word)
+            ));
+        }
+    };
+    let verdict = shared.state.borrow_mut().command(command, Instant::now().as_micros());
+    let word = Printable(word_of(command));
+    match verdict {
+        Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
+        Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
+        Verdict::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
+        Verdict::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
+        Verdict::Done(Action::None) => {
+            let mode = shared.state.borrow().mode.name();
+            shared.say(format_args!("{word} ok: {mode}"));
+        }
+        Verdict::Done(Action::Erase) => {
+            shared.erase_ordered.set(true);
+            shared.say(format_args!(
+                "{word} ok: erasing {} records",
+                shared.recorder.get().used
+            ));
+        }
+        Verdict::Done(Action::SelfTest) => {
+            shared.self_test_ordered.signal(());
+            shared.say(format_args!(
+                "{word} ok: sixteen sensors, about 5 s; keep the unit still"
+            ));
+        }
+        Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
+        Verdict::Done(Action::Report(Command::Version)) => {
+            shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
+        }
+        Verdict::Done(Action::Report(_)) => status(shared),
+    }
+}
+
+async fn help(shared: &Shared) {
+    for entry in &COMMANDS {
+        shared
+            .tell(format_args!("{} {}", Printable(entry.word), entry.meaning))
+            .await;
+    }
+}
+
+fn status(shared: &Shared) {
+    let state = *shared.state.borrow();
+    let (lift_off, micro_g) = shared.discretes.get();
+    let recorder = shared.recorder.get();
+    let resets = shared.resume.map_or(0, |resume| resume.resets);
+    shared.say(format_args!(
+        "G_ST {} task {} recording {} derived {}",
+        state.mode.name(),
+        match state.task {
+            Task::Idle => "none",
+            Task::SendPackets => "G_MT",
+            Task::Dump { .. } => "G_Ml",
+        },
+        u8::from(state.recording),
+        u8::from(state.derived)
+    ));
+    shared.say(format_args!(
+        "G_ST lift-off {} micro-g {} errors {:04X} noise {}",
+        u8::from(lift_off),
+        u8::from(micro_g),
+        shared.errors.get().0,
+        shared.umbilical_noise.get()
+    ));
+    shared.say(format_args!(
+        "G_ST recorder {} of {} {} started {:?} resets {resets} up {} s",
+        recorder.used,
+        recorder.capacity,
+        if recorder.erasing.is_some() { "erasing" } else { "ready" },
+        shared.reset,
+        Instant::now().as_secs()
+    ));
+}
+
+/// Letters as they came; what a terminal might take for a command is a dot.
+struct Printable<'a>(&'a [u8]);
+
+impl core::fmt::Display for Printable<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        for byte in self.0 {
+            let safe = byte.is_ascii_alphanumeric() || *byte == b'_';
+            core::fmt::Write::write_char(f, if safe { char::from(*byte) } else { '.' })?;
+        }
+        Ok(())
+    }
+}
