@@ -14,8 +14,9 @@ use std::{
 };
 
 use defmt_decoder::Table;
+use emems::board::ResetCause;
 use rigless::{
-    device::ResetCause,
+    device,
     emulator::{self, Driver, Finished, Host, Start, Stop},
     session::Session,
     soc::Width,
@@ -49,28 +50,6 @@ pub struct Options {
     pub statics: Vec<(String, usize)>,
 }
 
-/// Why the unit restarted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
-    /// The independent watchdog ran out.
-    Watchdog,
-    /// The firmware asked for it.
-    Software,
-    /// The reset pin.
-    Pin,
-    /// Anything else the emulator knows.
-    Other,
-}
-
-/// A restart of the unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Restart {
-    /// When.
-    pub at: Nanos,
-    /// Why.
-    pub cause: Cause,
-}
-
 /// What a run leaves behind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
@@ -78,8 +57,8 @@ pub struct Report {
     pub flown: Nanos,
     /// Instructions executed.
     pub instructions: u64,
-    /// Restarts, in order.
-    pub restarts: Vec<Restart>,
+    /// Resets and when they struck.
+    pub resets: Vec<(Nanos, ResetCause)>,
     /// Accesses no peripheral answered, one line each: an address the part does not have, or a shut clock gate.
     pub unanswered: Vec<String>,
     /// Registers of peripherals the emulator has no model of (plain storage), as `INSTANCE.REGISTER`.
@@ -321,16 +300,8 @@ fn report(finished: Finished<Stand, Pilot>) -> Report {
     Report {
         flown: stop.map_or(0, |stop| stop.at.0),
         instructions: driver.instructions,
-        restarts: (session.resets().iter())
-            .map(|reset| Restart {
-                at: reset.at.0,
-                cause: match reset.cause {
-                    ResetCause::Model("IWDG") => Cause::Watchdog,
-                    ResetCause::Core => Cause::Software,
-                    ResetCause::Pin => Cause::Pin,
-                    _ => Cause::Other,
-                },
-            })
+        resets: (session.resets().iter())
+            .map(|reset| (reset.at.0, cause(reset.cause)))
             .collect(),
         unanswered: (session.unmapped().iter())
             .map(ToString::to_string)
@@ -340,5 +311,15 @@ fn report(finished: Finished<Stand, Pilot>) -> Report {
             .map(|access| format!("{}.{}", access.instance, access.register))
             .collect(),
         statics: driver.static_bytes,
+    }
+}
+
+fn cause(cause: device::ResetCause) -> ResetCause {
+    match cause {
+        device::ResetCause::Model("IWDG") => ResetCause::Watchdog,
+        device::ResetCause::Pin => ResetCause::Pin,
+        device::ResetCause::PowerOn => ResetCause::PowerOn,
+        // The core's own request; no other model of this part asks for one.
+        _ => ResetCause::Software,
     }
 }

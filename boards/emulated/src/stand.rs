@@ -319,7 +319,8 @@ mod tests {
         let plant = SharedPlant::new(Plant::ideal(Arc::from(still)));
         let mut mcu = Stand::new(plant, covers).expect("rigless' own description").mcu;
         for (address, value) in [(RCC_APB1ENR, 1 << 3), (TIM5_EGR, 1)] {
-            mcu.write(NOW, address, Width::W32, value).expect("a register of the part");
+            mcu.write(NOW, address, Width::W32, value)
+                .expect("a register of the part");
         }
         mcu.read(NOW, TIM5_SR, Width::W32).expect("a register of the part") & MATCHES
     }

@@ -3,7 +3,8 @@
 mod bench;
 
 use bench::{MS, Tape, flown};
-use emulated::{Covers, Error, Options, flight::Cause};
+use emems::board::ResetCause;
+use emulated::{Covers, Error, Options};
 use twin::{
     part::Nanos,
     run::{Fault, Scheduled},
@@ -32,7 +33,7 @@ fn a_packet_comes_every_200_ms_and_the_log_is_text() {
     assert!(tape.log.iter().any(|line| line.contains("PowerOn")), "{:?}", tape.log);
     assert_eq!(report.flown, 2_500 * MS);
     assert!(report.unanswered.is_empty(), "{:?}", report.unanswered);
-    assert!(report.restarts.is_empty());
+    assert!(report.resets.is_empty());
 }
 
 #[test]
@@ -47,9 +48,9 @@ fn two_runs_are_the_same_to_the_nanosecond_and_the_instruction() {
 fn a_reset_in_flight_is_told_apart_and_the_count_goes_on() {
     let mut tape = Tape::default();
     let report = flown(&Options::default(), &[at(500, Fault::Reset)], 1_000, &mut tape);
-    assert_eq!(report.restarts.len(), 1);
-    assert_eq!(report.restarts[0].cause, Cause::Pin);
-    assert!(report.restarts[0].at.abs_diff(500 * MS) < MS);
+    assert_eq!(report.resets.len(), 1);
+    assert_eq!(report.resets[0].1, ResetCause::Pin);
+    assert!(report.resets[0].0.abs_diff(500 * MS) < MS);
     assert!(tape.log.iter().any(|line| line.contains("Pin")), "{:?}", tape.log);
     let counters: Vec<u16> = tape.packets().iter().map(|(_, reading)| reading.counter).collect();
     assert!(counters.windows(2).all(|pair| pair[1] == pair[0] + 1), "{counters:?}");
@@ -88,7 +89,12 @@ fn a_read_is_one_byte_off_without_the_cover_of_last() {
     };
     flown(&Options::default(), &[], 900, &mut covered);
     flown(&options, &[], 900, &mut bare);
-    let read = |tape: &Tape| tape.packets().into_iter().map(|(_, reading)| reading).collect::<Vec<_>>();
+    let read = |tape: &Tape| {
+        tape.packets()
+            .into_iter()
+            .map(|(_, reading)| reading)
+            .collect::<Vec<_>>()
+    };
     assert_ne!(read(&covered), read(&bare));
 }
 

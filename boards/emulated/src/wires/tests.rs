@@ -36,7 +36,11 @@ impl Pins {
         let source = motion::by_name(motion).expect("the twin has it");
         let plant = SharedPlant::new(Plant::ideal(Arc::from(source)));
         let stand = Stand::new(plant.clone(), Covers::default()).expect("rigless' own description");
-        let mut pins = Pins { stand, plant, now: 1_000 };
+        let mut pins = Pins {
+            stand,
+            plant,
+            now: 1_000,
+        };
         // RCC_AHB1ENR: ports B and C; RCC_APB1ENR: I2C1.
         pins.write(0x4002_3830, 0b110);
         pins.write(0x4002_3840, 1 << 21);
@@ -49,12 +53,18 @@ impl Pins {
 
     fn write(&mut self, address: u64, value: u64) {
         let at = VirtualNanos(self.now);
-        self.stand.mcu.write(at, address, Width::W32, value).expect("a register of the part");
+        self.stand
+            .mcu
+            .write(at, address, Width::W32, value)
+            .expect("a register of the part");
     }
 
     fn read(&mut self, address: u64) -> u64 {
         let at = VirtualNanos(self.now);
-        self.stand.mcu.read(at, address, Width::W32).expect("a register of the part")
+        self.stand
+            .mcu
+            .read(at, address, Width::W32)
+            .expect("a register of the part")
     }
 
     fn strike(&mut self, fault: Fault) {
