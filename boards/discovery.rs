@@ -20,9 +20,10 @@ mod stm32f407;
 
 use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
-use emems::recorder::MemoryRecorder;
 
-use self::stm32f407::{ResetSafeRam, SensorBus, Stm32f407, Umbilical, VehicleInputs, gyros, start, telemetry};
+use self::stm32f407::{
+    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+};
 
 /// The types of this board.
 pub type Discovery = Stm32f407<PB8, PB7>;
@@ -30,7 +31,7 @@ pub type Discovery = Stm32f407<PB8, PB7>;
 /// Starts the chip and hands out its parts.
 pub fn init() -> Parts<Discovery> {
     let (p, watchdog, reset) = start();
-    let umbilical = Umbilical::new(p.USART3, p.PD8, p.PD9, p.DMA1_CH3, p.DMA1_CH1);
+    let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PD8, p.PD9, p.DMA1_CH3);
     Parts {
         sensor_bus: SensorBus::new(p.I2C1, p.PB8, p.PB7, p.DMA1_CH7, p.DMA1_CH0, p.PE11),
         gyros: gyros(
@@ -41,12 +42,12 @@ pub fn init() -> Parts<Discovery> {
             [p.PE7.into(), p.PE8.into(), p.PE9.into(), p.PE10.into()],
         ),
         telemetry: telemetry(p.USART2, p.PA2, p.DMA1_CH6),
-        umbilical_tx: umbilical.tx,
-        umbilical_rx: umbilical.rx,
+        umbilical_tx,
+        umbilical_rx,
         discretes: VehicleInputs::new(p.PE12, p.PE13),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: MemoryRecorder::new(),
+        recorder: recorder(),
         reset,
     }
 }

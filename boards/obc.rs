@@ -21,9 +21,10 @@ mod stm32f407;
 
 use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
-use emems::recorder::MemoryRecorder;
 
-use self::stm32f407::{ResetSafeRam, SensorBus, Stm32f407, Umbilical, VehicleInputs, gyros, start, telemetry};
+use self::stm32f407::{
+    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+};
 
 /// The types of this board.
 pub type Obc = Stm32f407<PB6, PB7>;
@@ -31,7 +32,7 @@ pub type Obc = Stm32f407<PB6, PB7>;
 /// Starts the chip and hands out its parts.
 pub fn init() -> Parts<Obc> {
     let (p, watchdog, reset) = start();
-    let umbilical = Umbilical::new(p.USART3, p.PB10, p.PB11, p.DMA1_CH3, p.DMA1_CH1);
+    let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PB10, p.PB11, p.DMA1_CH3);
     Parts {
         sensor_bus: SensorBus::new(p.I2C1, p.PB6, p.PB7, p.DMA1_CH7, p.DMA1_CH0, p.PB5),
         gyros: gyros(
@@ -42,12 +43,12 @@ pub fn init() -> Parts<Obc> {
             [p.PC0.into(), p.PC1.into(), p.PC2.into(), p.PC3.into()],
         ),
         telemetry: telemetry(p.USART2, p.PA2, p.DMA1_CH6),
-        umbilical_tx: umbilical.tx,
-        umbilical_rx: umbilical.rx,
+        umbilical_tx,
+        umbilical_rx,
         discretes: VehicleInputs::new(p.PC6, p.PC7),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: MemoryRecorder::new(),
+        recorder: recorder(),
         reset,
     }
 }

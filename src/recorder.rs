@@ -57,6 +57,29 @@ pub trait Recorder {
     fn status(&self) -> RecorderStatus;
 }
 
+/// A recorder that lives elsewhere, so that moving its owner does not move ten kilobytes.
+impl<R: Recorder> Recorder for &mut R {
+    async fn append(&mut self, record: &Record) -> Result<(), RecorderError> {
+        R::append(self, record).await
+    }
+
+    async fn read(&mut self, index: u32) -> Result<Record, RecorderError> {
+        R::read(self, index).await
+    }
+
+    fn start_erase(&mut self) {
+        R::start_erase(self);
+    }
+
+    async fn erase_step(&mut self) -> Result<u32, RecorderError> {
+        R::erase_step(self).await
+    }
+
+    fn status(&self) -> RecorderStatus {
+        R::status(self)
+    }
+}
+
 /// A recorder in RAM for `N` records: it survives neither reset nor power cut.
 #[derive(Default)]
 pub struct MemoryRecorder<const N: usize> {

@@ -127,8 +127,8 @@ impl<Scl: self::Scl, Sda: self::Sda> embedded_hal_async::i2c::I2c for SensorBus<
 }
 
 impl<Scl: self::Scl, Sda: self::Sda> RecoverBus for SensorBus<Scl, Sda> {
-    /// At most 0.7 ms: nine times two clock edges, each stretched to the limit. All of it is waited for in place, since
-    /// a recovery that is itself abandoned would leave no driver.
+    /// At most 0.4 ms: nine STOPs of 20 us, each with its clock edge stretched to the limit. All of it is waited for in
+    /// place, since a recovery that is itself abandoned would leave no driver.
     async fn recover(&mut self) -> bool {
         // Gates the peripheral's clock and takes the pins off it.
         self.driver = None;

@@ -14,9 +14,9 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 
-/// Reads of RCC_CR until the crystal is given up: at least five cycles of the 16 MHz HSI each, so at least 100 ms, as
-/// long as ST's own start-up code waits. A healthy crystal needs 2 ms.
-const HSE_READS: u32 = 320_000;
+/// Reads of RCC_CR until the crystal is given up: at least four cycles of the 16 MHz HSI each, so at least 100 ms, as
+/// long as ST's own start-up code waits. A healthy crystal needs 2 ms (STM32F407 datasheet, tSU(HSE)).
+const HSE_READS: u32 = 400_000;
 
 /// Starts the clocks. The HAL would wait for a dead crystal for ever, so the crystal is tried before it is asked to.
 pub fn start() -> Peripherals {

@@ -80,6 +80,12 @@ impl GyroBus {
     }
 
     fn exchange(&mut self, word: u16) -> Result<u16, ErrorKind> {
+        // Whatever an abandoned wait left behind. Only an interrupt that was not pending becomes an event, so it is taken
+        // back here, after a read of SR, and not right after the word's: RXNE takes a moment to reach the NVIC.
+        if pac::SPI1.sr().read().rxne() {
+            let _ = pac::SPI1.dr().read();
+        }
+        NVIC::unpend(interrupt::SPI1);
         pac::SPI1.dr().write(|w| w.set_dr(word));
         let there = (0..WAKES).any(|_| {
             let there = pac::SPI1.sr().read().rxne();
@@ -89,7 +95,6 @@ impl GyroBus {
             there
         });
         let answer = pac::SPI1.dr().read().dr();
-        NVIC::unpend(interrupt::SPI1);
         if there { Ok(answer) } else { Err(ErrorKind::Other) }
     }
 }

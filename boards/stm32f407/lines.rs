@@ -1,36 +1,30 @@
 //! The lines to the vehicle and the ground: telemetry on USART2, umbilical on USART3, two discrete inputs.
 //!
-//! In: bytes, pin levels. Out: bytes, `true` for an asserted line. A byte that came with a framing, noise or overrun
-//! error ends the HAL's reception (embassy issues 1441 and 3356); here it is reported once and reception is running
-//! again before the caller hears of it.
+//! In: bytes, pin levels. Out: bytes, `true` for an asserted line. Lines out go by DMA. The umbilical's way in is an
+//! interrupt a byte and a queue: it carries commands, ten bytes a second and not ten thousand, and the HAL's DMA ring
+//! does not come back from an error: the stream restarts at the ring's beginning while its reader goes on where it was
+//! (RM0090 section 10.5.6, reload of NDTR; embassy issues 1441 and 3356), so up to a ring of old bytes is read as new
+//! and a ring of new ones is not seen. Here a byte with a framing, noise or overrun error is one error in its place
+//! among the bytes, and the next byte is the next byte.
+
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_stm32::Peri;
-use embassy_stm32::gpio::{Input, Pin, Pull};
-use embassy_stm32::interrupt::typelevel::Interrupt;
+use embassy_stm32::gpio::{AfType, Flex, Input, Pin, Pull};
+use embassy_stm32::interrupt::typelevel::{self, Handler, Interrupt};
 use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH3, DMA1_CH6, USART2, USART3};
-use embassy_stm32::usart::{self, Config, RingBufferedUartRx, RxPin, TxPin, Uart, UartTx};
-use embedded_io_async::{ErrorType, Read};
+use embassy_stm32::pac;
+use embassy_stm32::peripherals::{DMA1_CH3, DMA1_CH6, USART2, USART3};
+use embassy_stm32::usart::{Config, RxPin, TxPin, UartTx};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embedded_io_async::{Error, ErrorKind, ErrorType, Read};
 use emems::board::Discretes;
-use static_cell::StaticCell;
 
 use super::Irqs;
 
 /// A line out.
 pub type Transmitter = UartTx<'static, Async>;
-
-/// 64 ms of the umbilical at full rate: nothing keeps its reader waiting that long.
-const RING_BYTES: usize = 1024;
-
-static RING: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
-
-/// Both ways of the umbilical.
-pub struct Umbilical {
-    /// To the ground.
-    pub tx: Transmitter,
-    /// From the ground.
-    pub rx: Receiver,
-}
 
 /// USART2, sending only.
 pub fn telemetry(
@@ -41,44 +35,109 @@ pub fn telemetry(
     let line = UartTx::new(usart, tx, dma, Irqs, Config::default()).expect("115200 Bd divides APB1's 42 MHz");
     // SAFETY: `Irqs` binds the handler. The HAL leaves a line that only sends without its interrupt, and then a flush
     // is never woken.
-    unsafe { embassy_stm32::interrupt::typelevel::USART2::enable() };
+    unsafe { typelevel::USART2::enable() };
     line
 }
 
-impl Umbilical {
-    /// USART3, receiving into a ring from now on.
-    pub fn new(
-        usart: Peri<'static, USART3>,
-        tx: Peri<'static, impl TxPin<USART3>>,
-        rx: Peri<'static, impl RxPin<USART3>>,
-        tx_dma: Peri<'static, DMA1_CH3>,
-        rx_dma: Peri<'static, DMA1_CH1>,
-    ) -> Self {
-        let mut config = Config::default();
-        // An unplugged umbilical idles instead of receiving noise.
-        config.rx_pull = Pull::Up;
-        let line = Uart::new(usart, rx, tx, tx_dma, rx_dma, Irqs, config).expect("115200 Bd divides APB1's 42 MHz");
-        let (tx, rx) = line.split();
-        let mut rx = Receiver(rx.into_ring_buffered(RING.init([0; RING_BYTES])));
-        rx.0.start_uart();
-        Umbilical { tx, rx }
+/// USART3, both ways.
+pub fn umbilical(
+    usart: Peri<'static, USART3>,
+    tx: Peri<'static, impl TxPin<USART3>>,
+    rx: Peri<'static, impl RxPin<USART3>>,
+    dma: Peri<'static, DMA1_CH3>,
+) -> (Transmitter, Receiver) {
+    let line = UartTx::new(usart, tx, dma, Irqs, Config::default()).expect("115200 Bd divides APB1's 42 MHz");
+    let function = rx.af_num();
+    let mut pin = Flex::new(rx);
+    // An unplugged umbilical idles instead of receiving noise.
+    pin.set_as_af_unchecked(function, AfType::input(Pull::Up));
+    pac::USART3.cr1().modify(|w| {
+        w.set_re(true);
+        w.set_rxneie(true);
+    });
+    // SAFETY: `Irqs` binds the handlers, and what they need is static.
+    unsafe { typelevel::USART3::enable() };
+    let receiver = Receiver { lost: false, _pin: pin };
+    (line, receiver)
+}
+
+/// Bytes on their way to the reader: 22 ms at full rate. Nothing keeps the reader waiting that long.
+static RECEIVED: Channel<CriticalSectionRawMutex, Result<u8, BytesLost>, 256> = Channel::new();
+
+/// The queue was full when a byte came.
+static OVERFLOWED: AtomicBool = AtomicBool::new(false);
+
+/// USART3's receiver, beside the HAL's handler for its transmitter.
+pub struct ReceiverInterrupt;
+
+impl Handler<typelevel::USART3> for ReceiverInterrupt {
+    unsafe fn on_interrupt() {
+        // Reading SR, then DR clears the byte's flags, the error flags with it (RM0090 section 26.6.1). An overrun
+        // raises the same interrupt.
+        let flags = pac::USART3.sr().read();
+        if !flags.rxne() && !flags.ore() {
+            return;
+        }
+        let byte = pac::USART3.dr().read().dr() as u8;
+        let damaged = flags.fe() || flags.ne() || flags.ore();
+        let item = if damaged { Err(BytesLost) } else { Ok(byte) };
+        if RECEIVED.try_send(item).is_err() {
+            OVERFLOWED.store(true, Ordering::Relaxed);
+        }
     }
 }
 
-/// A line in.
-pub struct Receiver(RingBufferedUartRx<'static>);
+/// Bytes were damaged on the line, or came faster than they were read.
+#[derive(Clone, Copy, Debug)]
+pub struct BytesLost;
+
+impl core::fmt::Display for BytesLost {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str("bytes were lost on the umbilical")
+    }
+}
+
+impl core::error::Error for BytesLost {}
+
+impl Error for BytesLost {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::InvalidData
+    }
+}
+
+/// A line in. There is one: its queue is static.
+pub struct Receiver {
+    /// An error came after bytes that had to be handed over first.
+    lost: bool,
+    _pin: Flex<'static>,
+}
 
 impl ErrorType for Receiver {
-    type Error = usart::Error;
+    type Error = BytesLost;
 }
 
 impl Read for Receiver {
-    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, usart::Error> {
-        let result = self.0.read(buffer).await;
-        if result.is_err() {
-            self.0.start_uart();
+    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, BytesLost> {
+        if core::mem::take(&mut self.lost) || OVERFLOWED.swap(false, Ordering::Relaxed) {
+            return Err(BytesLost);
         }
-        result
+        let Some((first, rest)) = buffer.split_first_mut() else {
+            return Ok(0);
+        };
+        *first = RECEIVED.receive().await?;
+        let mut count = 1;
+        for place in rest {
+            match RECEIVED.try_receive() {
+                Ok(Ok(byte)) => *place = byte,
+                Ok(Err(BytesLost)) => {
+                    self.lost = true;
+                    break;
+                }
+                Err(_) => break,
+            }
+            count += 1;
+        }
+        Ok(count)
     }
 }
 

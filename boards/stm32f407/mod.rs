@@ -4,9 +4,9 @@
 //! |---|---|---|
 //! | time, 1 us ticks | TIM5 | |
 //! | sensor bus, 400 kHz | I2C1 | DMA1 stream 0 receives, stream 7 transmits, both channel 1 |
-//! | gyros, mode 3, 1.3125 MHz, 16 bit | SPI1 | none: [`gyros`] says why |
+//! | gyros, mode 3, 1.3125 MHz, 16 bit | SPI1 | none: `gyros.rs` says why |
 //! | telemetry, 115200 8N1 | USART2 | DMA1 stream 6 transmits, channel 4 |
-//! | umbilical, 115200 8N1 | USART3 | DMA1 stream 1 receives, stream 3 transmits, both channel 4 |
+//! | umbilical, 115200 8N1 | USART3 | DMA1 stream 3 transmits, channel 4; bytes are received one by one |
 //! | watchdog, 1 s | IWDG | |
 //!
 //! In: the pins. Out: the [`Parts`](emems::board::Parts) of [`Stm32f407`]. All of the firmware's unsafe code is in
@@ -25,10 +25,11 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
 use emems::board::{Board, ResetCause, Watchdog};
 use emems::recorder::MemoryRecorder;
+use static_cell::ConstStaticCell;
 
 pub use self::bus::SensorBus;
 pub use self::gyros::gyros;
-pub use self::lines::{Umbilical, VehicleInputs, telemetry};
+pub use self::lines::{VehicleInputs, telemetry, umbilical};
 pub use self::retained::ResetSafeRam;
 
 bind_interrupts!(struct Irqs {
@@ -38,8 +39,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM7 => dma::InterruptHandler<peripherals::DMA1_CH7>;
     USART2 => usart::InterruptHandler<peripherals::USART2>;
     DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
-    USART3 => usart::InterruptHandler<peripherals::USART3>;
-    DMA1_STREAM1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+    USART3 => lines::ReceiverInterrupt, usart::InterruptHandler<peripherals::USART3>;
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
 });
 
@@ -55,7 +55,17 @@ impl<Scl: bus::Scl, Sda: bus::Sda> Board for Stm32f407<Scl, Sda> {
     type Discretes = VehicleInputs;
     type Watchdog = Iwdg;
     type Retained = ResetSafeRam;
-    type Recorder = MemoryRecorder<64>;
+    type Recorder = &'static mut MemoryRecorder<RECORDS>;
+}
+
+/// Records that fit: 12.8 s of flight at 5 Hz, until there is a NAND.
+const RECORDS: usize = 64;
+
+static RECORDER: ConstStaticCell<MemoryRecorder<RECORDS>> = ConstStaticCell::new(MemoryRecorder::new());
+
+/// The recorder in RAM.
+pub fn recorder() -> &'static mut MemoryRecorder<RECORDS> {
+    RECORDER.take()
 }
 
 /// The independent watchdog. Nothing but a reset stops it.

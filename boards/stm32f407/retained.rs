@@ -6,7 +6,6 @@
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RCC;
 use emems::board::{ResetCause, Retained};
 use emems::crash::{CRASH_BYTES, CrashRecord};
@@ -66,10 +65,6 @@ impl Retained for ResetSafeRam {
         let crash = CrashRecord::decode(&CRASH.read());
         CRASH.write([0; CRASH_BYTES]);
         crash
-    }
-
-    fn reset(&mut self) -> ! {
-        SCB::sys_reset()
     }
 }
 
