@@ -1,0 +1,198 @@
+//! The firmware image: an ELF file for the STM32F407, read or built.
+//!
+//! In: a path, or the workspace this package belongs to. Out: an image the stand can run, its symbols, its log table.
+//! Refuses a file that is no ELF file, and one for another processor, and says what to do instead.
+
+use std::{
+    fmt, io,
+    path::{Path, PathBuf},
+};
+
+use defmt_decoder::Table;
+use rigless::symbols::Symbols;
+
+pub use crate::toolchain::build;
+
+/// ELF32, little endian, `e_machine` EM_ARM (ELF specification, header; ELF for the Arm architecture 5.2).
+const ELF_MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];
+const MACHINE: usize = 18;
+const EM_ARM: u16 = 40;
+
+/// A firmware image.
+#[derive(Clone, Debug)]
+pub struct Image {
+    path: PathBuf,
+    pub(crate) placed: rigless::image::Image,
+    symbols: Symbols,
+}
+
+/// Why there is no image, or not the wanted thing in it. The text says what to do.
+#[derive(Debug)]
+pub enum ImageError {
+    /// The file could not be read.
+    Read(PathBuf, io::Error),
+    /// The file is not an ELF file.
+    NotElf(PathBuf),
+    /// An ELF file for another processor: its `e_machine`, or `None` if it is not even 32-bit little endian.
+    Architecture(PathBuf, Option<u16>),
+    /// The ELF file is damaged; the reader's text.
+    Damaged(PathBuf, String),
+    /// No static or function of this name.
+    NoSymbol(PathBuf, String),
+    /// The firmware does not compile; the compiler has said why.
+    Compile,
+    /// No compiler for the board could be had; what was tried.
+    NoCompiler(Vec<String>),
+}
+
+impl std::error::Error for ImageError {}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ImageError::Read(path, error) => write!(
+                formatter,
+                "{}: {error}. Build the image with `cargo build --release` first, or name another file",
+                path.display()
+            ),
+            ImageError::NotElf(path) => write!(
+                formatter,
+                "{} is not an ELF file. Name the file that `cargo build --release` leaves as \
+                 target/thumbv7em-none-eabihf/release/emems, not a .bin or .hex made from it",
+                path.display()
+            ),
+            ImageError::Architecture(path, machine) => {
+                write!(formatter, "{} is for another processor (", path.display())?;
+                match machine {
+                    Some(machine) => write!(formatter, "ELF machine {machine}")?,
+                    None => write!(formatter, "not 32-bit little endian")?,
+                }
+                write!(
+                    formatter,
+                    "; the board's is {EM_ARM}, 32-bit Arm). Build with `--target thumbv7em-none-eabihf`"
+                )
+            }
+            ImageError::Damaged(path, text) => {
+                write!(formatter, "{} is damaged: {text}. Build it again", path.display())
+            }
+            ImageError::NoSymbol(path, name) => write!(
+                formatter,
+                "{} has no symbol {name}. Keep its symbols (no `strip` in the profile), and mark the static \
+                 `#[unsafe(no_mangle)]`",
+                path.display()
+            ),
+            ImageError::Compile => write!(formatter, "the firmware does not compile; cargo's messages are above"),
+            ImageError::NoCompiler(tried) => {
+                writeln!(formatter, "no compiler for thumbv7em-none-eabihf:")?;
+                for attempt in tried {
+                    writeln!(formatter, "  {attempt}")?;
+                }
+                write!(
+                    formatter,
+                    "Install one of:\n  rustup target add thumbv7em-none-eabihf\n  \
+                     apt-get install rustc-web cargo-web rust-web-src lld   (Debian)"
+                )
+            }
+        }
+    }
+}
+
+impl Image {
+    /// The image in the file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// See [`ImageError`].
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let bytes = std::fs::read(path).map_err(|error| ImageError::Read(path.into(), error))?;
+        Image::new(path, bytes)
+    }
+
+    /// The image `bytes`, called `path` in every error.
+    ///
+    /// # Errors
+    ///
+    /// See [`ImageError`].
+    pub fn new(path: &Path, bytes: Vec<u8>) -> Result<Self, ImageError> {
+        if bytes.get(..4) != Some(&ELF_MAGIC[..4]) {
+            return Err(ImageError::NotElf(path.into()));
+        }
+        let machine = match bytes.get(MACHINE..MACHINE + 2) {
+            Some(&[low, high]) if bytes.get(..6) == Some(&ELF_MAGIC) => Some(u16::from_le_bytes([low, high])),
+            _ => None,
+        };
+        if machine != Some(EM_ARM) {
+            return Err(ImageError::Architecture(path.into(), machine));
+        }
+        let damaged = |error: &dyn fmt::Display| ImageError::Damaged(path.into(), error.to_string());
+        let symbols = Symbols::read(&bytes, std::convert::identity).map_err(|error| damaged(&error))?;
+        let placed = rigless::image::Image::new(path, bytes, None).map_err(|error| damaged(&error))?;
+        Ok(Image {
+            path: path.into(),
+            placed,
+            symbols,
+        })
+    }
+
+    /// The address of a static.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::NoSymbol`].
+    pub fn symbol(&self, name: &str) -> Result<u64, ImageError> {
+        (self.symbols.get(name)).map_err(|_| ImageError::NoSymbol(self.path.clone(), name.into()))
+    }
+
+    /// The table of log strings; `None` for an image that logs nothing, or in a format this reader does not know.
+    pub fn log_table(&self) -> Option<Table> {
+        Table::parse(self.placed.bytes()).ok().flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(bytes: &[u8]) -> String {
+        Image::new(Path::new("a.elf"), bytes.to_vec()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_raw_binary_is_refused_with_the_file_to_name_instead() {
+        assert!(refused(&[0x00, 0x00, 0x02, 0x20]).contains("target/thumbv7em-none-eabihf/release/emems"));
+        assert!(refused(b"").contains("not an ELF file"));
+    }
+
+    #[test]
+    fn a_host_program_is_refused_with_the_target_to_build_for() {
+        let mut header = [0; 64];
+        header[..6].copy_from_slice(&[0x7F, b'E', b'L', b'F', 2, 1]);
+        assert!(refused(&header).contains("not 32-bit little endian"));
+        header[4] = 1;
+        header[MACHINE] = 243;
+        let text = refused(&header);
+        assert!(
+            text.contains("ELF machine 243") && text.contains("--target thumbv7em-none-eabihf"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_header_without_its_sections_is_damaged() {
+        let mut header = [0; 52];
+        header[..6].copy_from_slice(&ELF_MAGIC);
+        header[MACHINE] = EM_ARM as u8;
+        header[32] = 0xFF;
+        header[48] = 1;
+        assert!(refused(&header).contains("Build it again"), "{}", refused(&header));
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_named_with_the_way_to_make_it() {
+        let text = Image::read(Path::new("no/such/image")).unwrap_err().to_string();
+        assert!(
+            text.starts_with("no/such/image: ") && text.contains("cargo build --release"),
+            "{text}"
+        );
+    }
+}
