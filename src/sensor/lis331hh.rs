@@ -93,7 +93,7 @@ pub struct Config {
 impl Config {
     /// CTRL_REG1 to CTRL_REG5: normal power, all axes on; no filter but the low-pass; no interrupts; block data update.
     const fn registers(self) -> [(Register, u8); 5] {
-        const NORMAL_POWER_ALL_AXES: u8 = 0b001_00_111;
+        const NORMAL_POWER_ALL_AXES: u8 = 0b0010_0111;
         [
             (CTRL_REG1, NORMAL_POWER_ALL_AXES | (self.rate as u8) << 3),
             (CTRL_REG2, 0),

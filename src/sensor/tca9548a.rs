@@ -162,7 +162,7 @@ mod tests {
     use std::{string::ToString, vec};
 
     use embassy_futures::block_on;
-    use embedded_hal_async::i2c::NoAcknowledgeSource;
+    use embedded_hal_async::i2c::{Error as _, NoAcknowledgeSource};
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
 
     use super::*;
