@@ -46,6 +46,8 @@ pub struct Options {
     pub covers: Covers,
     /// How many in a million of the bytes towards the unit arrive with a framing error.
     pub framing_errors_per_million: u32,
+    /// The board lacks its 8 MHz crystal.
+    pub no_crystal: bool,
     /// Statics of the firmware, by symbol and size in bytes, read when the run ends.
     pub statics: Vec<(String, usize)>,
 }
@@ -127,7 +129,10 @@ pub fn fly_with(
     let emulator = |error: &dyn std::fmt::Display| Error::Emulator(error.to_string());
     let plant = SharedPlant::new(plant);
     let mut stand = Stand::new(plant.clone(), options.covers).map_err(|error| emulator(&error))?;
-    stand.mcu.garble_umbilical(options.framing_errors_per_million, 1);
+    stand.mcu.garble_umbilical(options.framing_errors_per_million);
+    if options.no_crystal {
+        stand.mcu.remove_crystal();
+    }
     // The first stop, one instruction in: the bench's first commands have to be known from the start.
     let session = Session::new(Box::new(stand), 0, VirtualNanos(1)).map_err(|error| emulator(&error))?;
     let mut faults = faults.to_vec();

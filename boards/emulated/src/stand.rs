@@ -36,6 +36,8 @@ use crate::{
 
 /// Virtual instructions a second: one a cycle at 168 MHz.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
+/// The crystal of the reference design.
+const HSE_HZ: u64 = 8_000_000;
 const NAME: &str = "emems";
 /// Index of USART2 in the part's serial ports: telemetry.
 const TELEMETRY: usize = 1;
@@ -88,7 +90,7 @@ pub struct Wired {
 impl Wired {
     fn new(plant: SharedPlant, covers: Covers) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
-        part.rcc.attach_crystals(8_000_000, 0);
+        part.rcc.attach_crystals(HSE_HZ, 0);
         part.set_supply(3300);
         for plate in 0..4_u8 {
             let gyro = Gyro {
@@ -139,12 +141,17 @@ impl Wired {
         self.part.usart[UMBILICAL].chip_mut()
     }
 
-    /// How many in a million of the bytes towards the unit arrive with a framing error, keyed by `seed`.
-    pub fn garble_umbilical(&mut self, per_million: u32, seed: u64) {
+    /// How many in a million of the bytes towards the unit arrive with a framing error. Which ones is drawn by rigless
+    /// from the byte's number, so it is the same in every run.
+    pub fn garble_umbilical(&mut self, per_million: u32) {
         let errors = self.part.usart[UMBILICAL].errors_mut();
-        errors.seed = seed;
         errors.framing.name = "umbilical framing";
         errors.framing.per_million = per_million;
+    }
+
+    /// Takes the high-speed crystal off the board.
+    pub fn remove_crystal(&mut self) {
+        self.part.rcc.attach_crystals(0, 0);
     }
 
     fn one_byte_is_left(&self) -> bool {
