@@ -34,7 +34,6 @@ use shared::Shared;
 
 /// What a laboratory may choose without touching the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Settings {
     /// [ms] from packet to packet, 20 to 1000. Short: more packets, less idle time. The thesis has 200.
     pub period_ms: u64,

@@ -1,1 +1,12 @@
 //! The ground side as a library.
+
+pub mod channel;
+pub mod console;
+pub mod decode;
+pub mod digest;
+pub mod envelope;
+pub mod folder;
+pub mod log;
+pub mod plot;
+pub mod summary;
+pub mod table;

@@ -1,3 +1,19 @@
 //! `ground`: the one host program.
 
-fn main() {}
+use clap::Parser;
+
+/// The ground side of the e-MEMS attitude sensor unit.
+#[derive(Parser)]
+#[command(name = "ground", version)]
+enum Command {
+    Decode(ground::decode::Arguments),
+    /// Talk to the unit over its umbilical, see all sensors, keep everything it says
+    Console(ground::console::Arguments),
+}
+
+fn main() -> anyhow::Result<()> {
+    match Command::parse() {
+        Command::Decode(arguments) => Ok(ground::decode::decode(&arguments)?),
+        Command::Console(arguments) => Ok(ground::console::console(&arguments)?),
+    }
+}

@@ -8,6 +8,7 @@
 
 use core::fmt;
 
+pub mod adis16265;
 pub mod hmc5883l;
 pub mod lis331hh;
 pub mod tca9548a;

@@ -11,7 +11,7 @@
 use core::fmt;
 
 use embassy_sync::{blocking_mutex::raw::NoopRawMutex, mutex::Mutex};
-use embedded_hal_async::i2c::{Error as _, ErrorKind, ErrorType, I2c, Operation};
+use embedded_hal_async::i2c::{ErrorKind, ErrorType, I2c, Operation};
 
 use crate::board::RecoverBus;
 

@@ -1,0 +1,109 @@
+//! The umbilical console: one screen for the engineer at the launch pad.
+//!
+//! In: a [`mod@line`] to the unit (a serial port, or a unit that flies in another thread), keys or lines of text. Out: the
+//! unit's replies, all sensors live, and a recording of every byte received. Data flows one way:
+//!
+//! ```text
+//! line -> recording -> stream -> model -> view -> terminal          keys -> input -> line
+//! ```
+//!
+//! [`stream`], [`model`], [`input`], [`keys`] and [`view`] are functions of their arguments; only [`mod@line`], [`serial`],
+//! [`recording`], [`screen`] and [`plain`] touch the world, and [`session`] is where they meet.
+
+use std::{
+    io::{self, IsTerminal},
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+pub mod display;
+mod help;
+pub mod history;
+pub mod input;
+pub mod keys;
+pub mod line;
+pub mod model;
+pub mod plain;
+mod plot;
+pub mod recording;
+pub mod screen;
+pub mod serial;
+pub mod session;
+mod state;
+pub mod stream;
+mod table;
+pub mod view;
+
+use line::Line;
+use recording::Recording;
+use serial::SerialLine;
+use session::Session;
+
+/// `ground console`: talk to the unit over its umbilical, see all sensors live, keep everything it says
+///
+/// Opens the port at 115200 8N1, and opens it again when it was unplugged. Commands are sent as typed; `?` shows the keys
+/// and the unit's commands. The recording holds the received bytes as they came: `ground decode` reads it.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ground console /dev/ttyUSB0 --record pad.log\n  echo G_ST | ground console /dev/ttyUSB0 --plain"
+)]
+pub struct Arguments {
+    /// Serial port of the umbilical (/dev/ttyUSB0, COM3); it may be plugged in later
+    pub port: String,
+    /// File to append every received byte to; FILE.commands.txt takes what was sent [default: umbilical-TIME.log]
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // clap would take the text for the command's.
+    pub options: Options,
+}
+
+/// How a console shows itself.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct Options {
+    /// Print lines instead of a screen and read commands from standard input; so without a terminal
+    #[arg(long)]
+    pub plain: bool,
+}
+
+/// Why a console ended.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Nothing can be recorded, so nothing is shown.
+    #[error(transparent)]
+    Recording(#[from] recording::OpenError),
+    /// The terminal failed; the recording is whole up to then.
+    #[error("the terminal failed: {0}; --plain does without one")]
+    Terminal(#[from] io::Error),
+}
+
+/// Runs `ground console`.
+///
+/// # Errors
+/// See [`run`].
+pub fn console(arguments: &Arguments) -> Result<(), Error> {
+    let default = || recording::default_path(SystemTime::now());
+    let path = arguments.record.clone().unwrap_or_else(default);
+    run(SerialLine::new(&arguments.port), &path, arguments.options)
+}
+
+/// A console on `line` until the user quits, recording to `path`.
+///
+/// # Errors
+/// When the recording cannot be opened, or the terminal fails; never because of the line.
+pub fn run(line: impl Line, path: &Path, options: Options) -> Result<(), Error> {
+    let recording = Recording::open(path, line.name(), SystemTime::now())?;
+    let mut session = Session::new(line, recording);
+    if options.plain || !io::stdout().is_terminal() || !io::stdin().is_terminal() {
+        plain::run(&mut session)?;
+    } else {
+        screen::run(&mut session)?;
+    }
+    let kept = display::size(session.model.recorded_bytes);
+    eprintln!(
+        "{kept} in {}, what was sent in {}",
+        path.display(),
+        recording::commands_path(path).display()
+    );
+    Ok(())
+}

@@ -1,0 +1,259 @@
+//! `ground decode`: a stream that was kept, as tables.
+//!
+//! In: a file of packets, however damaged, gzip or not, or standard input. Out: CSV on standard output, gaps and
+//! rejected bytes on standard error; or with `--out` a folder with everything. Memory does not grow with the file.
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, Read, Write},
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use flate2::read::MultiGzDecoder;
+
+use crate::{
+    digest::{Digest, Entry},
+    folder::{self, Folder, FolderError},
+    log::Bytes5To8,
+    table,
+};
+
+/// Bytes read at once.
+const PIECE: usize = 64 * 1024;
+
+/// `ground decode`: packets to CSV; gaps and undecodable bytes are listed
+///
+/// Reads 156-byte packets (and derived frames) from a file however cut, spliced or mixed with other text: every intact
+/// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale
+/// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell; time is counter times cycle.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded"
+)]
+pub struct Arguments {
+    /// File of packets, gzip if it ends in .gz; - for standard input
+    pub file: PathBuf,
+    /// Values in counts instead of SI, with counter, error bits and flags
+    #[arg(long, conflicts_with = "out")]
+    pub counts: bool,
+    /// Write a folder in DIR instead: counts.csv, si.csv, log.txt, summary.txt, plots in index.html
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Bytes 5 to 8 are a CRC-16 (streams after Table A.2), not the error identifier
+    #[arg(long)]
+    pub crc: bool,
+    /// Time between two packets
+    #[arg(long, value_name = "TIME", default_value = "200ms", value_parser = cycle)]
+    pub cycle: Duration,
+}
+
+/// Why a file could not be decoded.
+#[derive(Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// It cannot be read.
+    #[error("{path} cannot be read at byte {offset}: {source}")]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// How far it was read, after unpacking.
+        offset: u64,
+        /// Why.
+        source: io::Error,
+    },
+    /// Standard output or error cannot be written.
+    #[error("the output cannot be written: {0}")]
+    Output(#[from] io::Error),
+    /// The folder cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+}
+
+/// Runs `ground decode`.
+///
+/// # Errors
+/// When the file cannot be read or the output not written; never because of what is in the file.
+pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
+    let cycle_s = arguments.cycle.as_secs_f64();
+    match &arguments.out {
+        None => to_text(
+            arguments,
+            cycle_s,
+            &mut BufWriter::new(io::stdout().lock()),
+            &mut BufWriter::new(io::stderr().lock()),
+        ),
+        Some(parent) => to_folder(arguments, cycle_s, parent),
+    }
+}
+
+fn to_text(
+    arguments: &Arguments,
+    cycle_s: f64,
+    rows: &mut dyn Write,
+    remarks: &mut dyn Write,
+) -> Result<(), DecodeError> {
+    let header = if arguments.counts {
+        table::counts_header()
+    } else {
+        table::si_header()
+    };
+    writeln!(rows, "{header}")?;
+    let mut digest = Digest::new(bytes_5_to_8(arguments));
+    let mut put = |entries: &[Entry]| -> io::Result<()> {
+        for entry in entries {
+            if let Entry::Packet { number, reading, .. } = entry {
+                let t_s = *number as f64 * cycle_s;
+                let row = if arguments.counts {
+                    table::counts_row(t_s, reading)
+                } else {
+                    table::si_row(t_s, reading)
+                };
+                writeln!(rows, "{row}")?;
+            }
+            if let Some(remark) = folder::remark(entry, cycle_s) {
+                writeln!(remarks, "{remark}")?;
+            }
+        }
+        Ok(())
+    };
+    read(&arguments.file, |piece| Ok(put(&digest.push(None, piece))?))?;
+    let (rest, summary, _) = digest.finish();
+    put(&rest)?;
+    rows.flush()?;
+    write!(remarks, "{}", folder::text_of(&summary.rows()))?;
+    Ok(remarks.flush()?)
+}
+
+fn to_folder(arguments: &Arguments, cycle_s: f64, parent: &Path) -> Result<(), DecodeError> {
+    let name = arguments
+        .file
+        .file_name()
+        .map_or("stdin".into(), |name| name.to_string_lossy());
+    let stem = name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("log");
+    let mut folder = Folder::create(parent, if stem == "-" { "stdin" } else { stem }, cycle_s)?;
+    let mut digest = Digest::new(bytes_5_to_8(arguments));
+    read(&arguments.file, |piece| Ok(folder.entries(&digest.push(None, piece))?))?;
+    let (rest, summary, envelope) = digest.finish();
+    folder.entries(&rest)?;
+    let path = folder.finish(stem, &format!("decoded from {name}"), &[], &summary, &envelope)?;
+    print!("{}", folder::text_of(&summary.rows()));
+    println!("{}", path.join("index.html").display());
+    Ok(())
+}
+
+/// Reads a file to its end, piece by piece.
+fn read(path: &Path, mut take: impl FnMut(&[u8]) -> Result<(), DecodeError>) -> Result<(), DecodeError> {
+    let fail = |offset| {
+        move |source| DecodeError::Read {
+            path: path.to_owned(),
+            offset,
+            source,
+        }
+    };
+    let mut bytes: Box<dyn Read> = if path == Path::new("-") {
+        Box::new(io::stdin().lock())
+    } else {
+        let file = File::open(path).map_err(fail(0))?;
+        if path.extension().is_some_and(|extension| extension == "gz") {
+            Box::new(MultiGzDecoder::new(file))
+        } else {
+            Box::new(file)
+        }
+    };
+    let (mut piece, mut offset) = (vec![0; PIECE], 0);
+    loop {
+        match bytes.read(&mut piece) {
+            Ok(0) => return Ok(()),
+            Ok(length) => {
+                take(piece.get(..length).unwrap_or_default())?;
+                offset += length as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(fail(offset)(error)),
+        }
+    }
+}
+
+fn bytes_5_to_8(arguments: &Arguments) -> Bytes5To8 {
+    if arguments.crc {
+        Bytes5To8::Crc
+    } else {
+        Bytes5To8::Errors
+    }
+}
+
+fn cycle(text: &str) -> Result<Duration, String> {
+    match humantime::parse_duration(text) {
+        Ok(cycle) if cycle >= Duration::from_millis(1) => Ok(cycle),
+        Ok(_) => Err("at least 1ms".into()),
+        Err(error) => Err(format!("{error}; write it like 200ms")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use emems::{packet::encode, sample::Reading};
+    use flate2::{Compression, write::GzEncoder};
+
+    use super::*;
+
+    fn arguments(file: &Path) -> Arguments {
+        Arguments {
+            file: file.into(),
+            counts: true,
+            out: None,
+            crc: false,
+            cycle: Duration::from_millis(200),
+        }
+    }
+
+    #[test]
+    fn a_packed_stream_becomes_rows_and_remarks() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let file = place.path().join("log.txt.gz");
+        let mut packed = GzEncoder::new(File::create(&file).expect("file"), Compression::fast());
+        for bytes in [
+            b"ok\n".as_slice(),
+            &encode(&Reading::unread(2)),
+            &encode(&Reading::unread(4)),
+        ] {
+            packed.write_all(bytes).expect("write");
+        }
+        packed.finish().expect("finish");
+        let (mut rows, mut remarks) = (Vec::new(), Vec::new());
+        to_text(&arguments(&file), 0.2, &mut rows, &mut remarks).expect("decode");
+        let rows = String::from_utf8(rows).expect("text");
+        let times: Vec<_> = rows
+            .lines()
+            .map(|row| row.split(',').take(3).collect::<Vec<_>>().join(","))
+            .collect();
+        assert_eq!(times, ["t_s,counter,errors", "0.400,2,FFFF", "0.800,4,FFFF"]);
+        let remarks = String::from_utf8(remarks).expect("text");
+        assert!(
+            remarks.starts_with(
+                "offset 0, 3 bytes: not part of a frame\noffset 159, packet 4, 0.800 s: 1 packet missed before it\npackets "
+            ),
+            "{remarks}"
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_cut_or_missing_is_named_with_its_offset() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let missing = read(&place.path().join("none.txt"), |_| Ok(())).expect_err("missing");
+        assert!(
+            missing.to_string().contains("none.txt cannot be read at byte 0"),
+            "{missing}"
+        );
+        let cut = place.path().join("cut.gz");
+        std::fs::write(&cut, b"\x1f\x8b\x08\x00").expect("write");
+        assert!(read(&cut, |_| Ok(())).is_err());
+    }
+
+    #[test]
+    fn a_cycle_has_a_unit_and_a_least() {
+        assert_eq!(cycle("100ms"), Ok(Duration::from_millis(100)));
+        assert!(cycle("0s").is_err());
+        assert!(cycle("fast").is_err());
+    }
+}
