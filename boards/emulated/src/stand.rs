@@ -17,7 +17,7 @@ use rigless::{
         Bus, Error,
         stm32f427::{
             Stm32f427,
-            generated::{dma2, i2c3, tim5},
+            generated::{self, dma2, i2c3, tim5},
             peripherals::{
                 gpio::{Gpio, Pin},
                 i2c::I2c,
@@ -74,6 +74,7 @@ struct Slots {
     gpio_c: usize,
     dma1: usize,
     tim5: usize,
+    rcc: usize,
 }
 
 /// The microcontroller with the stand's own models in three of its slots.
@@ -85,6 +86,7 @@ pub struct Wired {
     discrete_pins: DiscretePins,
     slots: Slots,
     covers: Covers,
+    crystal: bool,
 }
 
 impl Wired {
@@ -117,6 +119,7 @@ impl Wired {
             gpio_c: bus.slot("GPIOC")?,
             dma1: bus.slot("DMA1")?,
             tim5: bus.slot("TIM5")?,
+            rcc: bus.slot("RCC")?,
         };
         Ok(Wired {
             part,
@@ -128,6 +131,7 @@ impl Wired {
             },
             slots,
             covers,
+            crystal: true,
         })
     }
 
@@ -152,6 +156,14 @@ impl Wired {
     /// Takes the high-speed crystal off the board.
     pub fn remove_crystal(&mut self) {
         self.part.rcc.attach_crystals(0, 0);
+        self.crystal = false;
+    }
+
+    /// The model lets HSERDY rise whether or not there is a crystal, so it is kept down.
+    fn keep_hse_from_starting(&mut self) {
+        let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
+        let control = registers.get(generated::rcc::Register::Cr);
+        registers.set(generated::rcc::Register::Cr, generated::rcc::cr::HSERDY.set(control, 0));
     }
 
     fn one_byte_is_left(&self) -> bool {
@@ -231,6 +243,8 @@ impl Mcu for Wired {
             self.sensor_port.nack_next = self.covers.i2c_last && self.one_byte_is_left();
         } else if slot == self.slots.tim5 && self.covers.timer_update {
             self.forget_spurious_matches();
+        } else if slot == self.slots.rcc && !self.crystal {
+            self.keep_hse_from_starting();
         }
         let (bus, model) = self.part.split(slot);
         let model = if slot == self.slots.i2c1 {
