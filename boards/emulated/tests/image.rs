@@ -124,6 +124,7 @@ fn a_command_is_answered_within_its_millisecond_or_two() {
     let answer = tape.umbilical.iter().find(|(at, _)| *at >= 633 * MS);
     // Four bytes there and one back at 115200 8N1 take 0.43 ms.
     assert!(answer.is_some_and(|(at, _)| *at < 635 * MS), "{:?}", tape.said());
+    assert!(tape.said().contains("G_ME"), "{}", tape.said());
 }
 
 #[test]
