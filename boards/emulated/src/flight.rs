@@ -30,9 +30,10 @@ use twin::{
 
 use crate::{
     chips::{Line, SharedPlant},
+    covers::Covers,
     image::{Image, ImageError},
     rtt,
-    stand::{Covers, Stand},
+    stand::Stand,
 };
 
 /// [ns] between two meetings of the core and the bench.
@@ -46,6 +47,8 @@ pub struct Options {
     pub covers: Covers,
     /// How many in a million of the bytes towards the unit arrive with a framing error.
     pub framing_errors_per_million: u32,
+    /// The board lacks its 8 MHz crystal.
+    pub no_crystal: bool,
     /// Statics of the firmware, by symbol and size in bytes, read when the run ends.
     pub statics: Vec<(String, usize)>,
 }
@@ -127,7 +130,10 @@ pub fn fly_with(
     let emulator = |error: &dyn std::fmt::Display| Error::Emulator(error.to_string());
     let plant = SharedPlant::new(plant);
     let mut stand = Stand::new(plant.clone(), options.covers).map_err(|error| emulator(&error))?;
-    stand.mcu.garble_umbilical(options.framing_errors_per_million, 1);
+    stand.mcu.garble_umbilical(options.framing_errors_per_million);
+    if options.no_crystal {
+        stand.mcu.remove_crystal();
+    }
     // The first stop, one instruction in: the bench's first commands have to be known from the start.
     let session = Session::new(Box::new(stand), 0, VirtualNanos(1)).map_err(|error| emulator(&error))?;
     let mut faults = faults.to_vec();
@@ -144,7 +150,7 @@ pub fn fly_with(
         log: image.symbol("_SEGGER_RTT").ok(),
         to_bench,
         said,
-        met: 0,
+        next_meeting: 0,
         instructions: 0,
         static_bytes: Vec::new(),
     };
@@ -161,6 +167,11 @@ pub fn fly_with(
         drop(to_core);
         core.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
+}
+
+/// The next meeting, on the grid of whole steps from power-on, whatever other stops there are.
+fn meeting_after(now: Nanos) -> Nanos {
+    (now / STEP + 1) * STEP
 }
 
 /// What the core has to tell at a meeting.
@@ -199,7 +210,7 @@ fn attend(bench: &mut dyn Bench, table: Option<&Table>, heard: &Receiver<Heard>,
             bench.log(heard.now, &line);
         }
         let flow = bench.advanced(heard.now);
-        let commands = (heard.now.div_ceil(MILLISECOND)..(heard.now + STEP).div_ceil(MILLISECOND))
+        let commands = (heard.now.div_ceil(MILLISECOND)..meeting_after(heard.now).div_ceil(MILLISECOND))
             .map(|ms| (ms * MILLISECOND, bench.commands(ms * MILLISECOND)))
             .filter(|(_, bytes)| !bytes.is_empty())
             .collect();
@@ -219,8 +230,8 @@ struct Pilot {
     log: Option<u64>,
     to_bench: SyncSender<Heard>,
     said: Receiver<Said>,
-    /// The next meeting.
-    met: Nanos,
+    /// When the next meeting is.
+    next_meeting: Nanos,
     instructions: u64,
     static_bytes: Vec<Vec<u8>>,
 }
@@ -261,9 +272,8 @@ impl Driver<Stand> for Pilot {
     fn on_stop(&mut self, session: &mut Session<Stand>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let now = stop.at.0;
         self.strike(session, stop, host);
-        if now >= self.met || now >= self.duration {
-            // On the grid of whole steps from the start, whatever other stops there were.
-            self.met = (now / STEP + 1) * STEP;
+        if now >= self.next_meeting || now >= self.duration {
+            self.next_meeting = meeting_after(now);
             if self.meet(session, now, host).is_none() {
                 self.instructions = stop.instruction_count;
                 self.static_bytes = (self.statics.iter())
@@ -281,7 +291,7 @@ impl Driver<Stand> for Pilot {
         // The first byte of a burst needs a stop at its instant; the line itself fetches the others, frame by frame.
         let command = line.and_then(|line| line.next_due()).filter(|&due| due > now);
         let fault = self.faults.last().map(|scheduled| scheduled.at);
-        [Some(self.met), Some(self.duration), command, fault]
+        [Some(self.next_meeting), Some(self.duration), command, fault]
             .into_iter()
             .flatten()
             .min()

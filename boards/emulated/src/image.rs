@@ -188,6 +188,14 @@ mod tests {
     }
 
     #[test]
+    fn a_machine_without_a_compiler_for_the_board_is_told_what_to_install() {
+        let text = ImageError::NoCompiler(vec!["rustup does not start: no such file".into()]).to_string();
+        assert!(text.contains("rustup does not start"));
+        assert!(text.contains("rustup target add thumbv7em-none-eabihf"));
+        assert!(text.contains("apt-get install rustc-web cargo-web rust-web-src lld"));
+    }
+
+    #[test]
     fn a_file_that_is_not_there_is_named_with_the_way_to_make_it() {
         let text = Image::read(Path::new("no/such/image")).unwrap_err().to_string();
         assert!(

@@ -10,13 +10,14 @@
 //! Time is instruction count at 168 million a second: no wait states, no bus contention, no FPU latency.
 
 mod chips;
+mod covers;
 pub mod flight;
 pub mod image;
 mod rtt;
-pub mod stand;
+mod stand;
 mod toolchain;
 mod wires;
 
+pub use covers::Covers;
 pub use flight::{Error, Options, Report, fly, fly_with};
 pub use image::Image;
-pub use stand::Covers;

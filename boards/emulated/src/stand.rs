@@ -1,15 +1,15 @@
-//! The stand: an STM32F427 in place of the F407, wired as the board file wires it, with two model defects covered.
+//! The stand: an STM32F427 in place of the F407, wired as the board file wires it, with the emulator's defects covered.
 //!
 //! In: a plant. Out: a rigless board whose firmware sees sensors, lines and discretes. See `wires` and `chips` for
 //! what hangs where.
 //!
-//! Both covers act in [`Mcu::split`], which rigless asks for every access and event of a peripheral, so they see the
-//! registers just before the model does. A test switches each off and shows what goes wrong.
+//! The covers act in [`Mcu::split`], which rigless asks for every access and event of a peripheral, so they see the
+//! registers just before the model does.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
 use rigless::{
-    device::{ErasedDevice, Level, RegisterFile, ResetCause},
+    device::{ErasedDevice, Level, ResetCause},
     machine::{Board, Target, armv7m},
     mcu::{Mcu, Operate},
     snapshot::Store,
@@ -17,7 +17,7 @@ use rigless::{
         Bus, Error,
         stm32f427::{
             Stm32f427,
-            generated::{dma2, i2c3, tim5},
+            generated::rcc::{Register, cr},
             peripherals::{
                 gpio::{Gpio, Pin},
                 i2c::I2c,
@@ -31,38 +31,19 @@ use rigless::{
 
 use crate::{
     chips::{Gyro, Line, SensorBus, SharedPlant},
+    covers::{self, Covers},
     wires::{BusPins, DiscretePins, SensorPort},
 };
 
 /// Virtual instructions a second: one a cycle at 168 MHz.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
+/// The crystal of the reference design.
+const HSE_HZ: u64 = 8_000_000;
 const NAME: &str = "emems";
 /// Index of USART2 in the part's serial ports: telemetry.
 const TELEMETRY: usize = 1;
 /// Index of USART3: the umbilical.
 const UMBILICAL: usize = 2;
-/// `DR` of I2C1 (RM0090 table 1 and 27.6.5), by which a DMA stream is known to serve it.
-const I2C1_DR: u64 = 0x4000_5410;
-
-/// Which of the emulator's two defects are covered. Both are by default; a run without one is wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Covers {
-    /// rigless stores `I2C_CR2.LAST` and does not act on it (its i2c.rs says so): the controller clocks one byte too
-    /// many, and every later DMA read is shifted by one byte.
-    pub i2c_last: bool,
-    /// rigless raises `CC1IF` to `CC4IF` when `EGR.UG` reinitialises a stopped timer whose compare registers are 0;
-    /// embassy's time driver then counts half a period (32768 ticks) that did not happen.
-    pub timer_update: bool,
-}
-
-impl Default for Covers {
-    fn default() -> Self {
-        Covers {
-            i2c_last: true,
-            timer_update: true,
-        }
-    }
-}
 
 /// The slots of the peripherals the stand answers for or watches.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +53,7 @@ struct Slots {
     gpio_c: usize,
     dma1: usize,
     tim5: usize,
+    rcc: usize,
 }
 
 /// The microcontroller with the stand's own models in three of its slots.
@@ -83,12 +65,13 @@ pub struct Wired {
     discrete_pins: DiscretePins,
     slots: Slots,
     covers: Covers,
+    crystal: bool,
 }
 
 impl Wired {
     fn new(plant: SharedPlant, covers: Covers) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
-        part.rcc.attach_crystals(8_000_000, 0);
+        part.rcc.attach_crystals(HSE_HZ, 0);
         part.set_supply(3300);
         for plate in 0..4_u8 {
             let gyro = Gyro {
@@ -115,6 +98,7 @@ impl Wired {
             gpio_c: bus.slot("GPIOC")?,
             dma1: bus.slot("DMA1")?,
             tim5: bus.slot("TIM5")?,
+            rcc: bus.slot("RCC")?,
         };
         Ok(Wired {
             part,
@@ -126,6 +110,7 @@ impl Wired {
             },
             slots,
             covers,
+            crystal: true,
         })
     }
 
@@ -139,63 +124,27 @@ impl Wired {
         self.part.usart[UMBILICAL].chip_mut()
     }
 
-    /// How many in a million of the bytes towards the unit arrive with a framing error, keyed by `seed`.
-    pub fn garble_umbilical(&mut self, per_million: u32, seed: u64) {
+    /// How many in a million of the bytes towards the unit arrive with a framing error. Which ones is drawn by rigless
+    /// from the byte's number, so it is the same in every run.
+    pub fn garble_umbilical(&mut self, per_million: u32) {
         let errors = self.part.usart[UMBILICAL].errors_mut();
-        errors.seed = seed;
         errors.framing.name = "umbilical framing";
         errors.framing.per_million = per_million;
     }
 
-    fn one_byte_is_left(&self) -> bool {
-        let slots = self.part.bus().slots();
-        let control = slots[self.slots.i2c1].registers().get(i2c3::Register::Cr2);
-        i2c3::cr2::LAST.is_set(control)
-            && i2c3::cr2::DMAEN.is_set(control)
-            && STREAMS
-                .iter()
-                .any(|stream| stream.serves_last_byte(slots[self.slots.dma1].registers()))
+    /// Takes the high-speed crystal off the board.
+    pub fn remove_crystal(&mut self) {
+        self.part.rcc.attach_crystals(0, 0);
+        self.crystal = false;
     }
 
-    fn forget_spurious_matches(&mut self) {
-        let registers = self.part.bus_mut().slot_mut(self.slots.tim5).registers_mut();
-        if !tim5::cr1::CEN.is_set(registers.get(tim5::Register::Cr1)) {
-            // CC1IF to CC4IF, RM0090 18.4.5.
-            let status = registers.get(tim5::Register::Sr) & !0b1_1110;
-            registers.set(tim5::Register::Sr, status);
-        }
+    /// The model lets HSERDY rise whether or not there is a crystal, so it is kept down.
+    fn keep_hse_from_starting(&mut self) {
+        let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
+        let control = registers.get(Register::Cr);
+        registers.set(Register::Cr, cr::HSERDY.set(control, 0));
     }
 }
-
-/// The registers of one stream of a DMA controller.
-struct Stream {
-    control: dma2::Register,
-    count: dma2::Register,
-    peripheral: dma2::Register,
-}
-
-impl Stream {
-    fn serves_last_byte(&self, registers: &RegisterFile) -> bool {
-        // S0CR.EN is bit 0 of every stream's control register, RM0090 10.5.5.
-        registers.get(self.control) & 1 == 1
-            && registers.get(self.peripheral) == I2C1_DR
-            && registers.get(self.count) == 1
-    }
-}
-
-/// The two streams a request of I2C1_RX can reach, RM0090 table 42: 0 and 5 of DMA1, channel 1.
-const STREAMS: [Stream; 2] = [
-    Stream {
-        control: dma2::Register::S0cr,
-        count: dma2::Register::S0ndtr,
-        peripheral: dma2::Register::S0par,
-    },
-    Stream {
-        control: dma2::Register::S5cr,
-        count: dma2::Register::S5ndtr,
-        peripheral: dma2::Register::S5par,
-    },
-];
 
 impl Mcu for Wired {
     fn bus(&self) -> &Bus {
@@ -221,9 +170,14 @@ impl Mcu for Wired {
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
         if slot == self.slots.i2c1 {
-            self.sensor_port.nack_next = self.covers.i2c_last && self.one_byte_is_left();
+            self.sensor_port.nack_next = self.covers.i2c_last && {
+                let slots = self.part.bus().slots();
+                covers::one_byte_is_left(slots[slot].registers(), slots[self.slots.dma1].registers())
+            };
         } else if slot == self.slots.tim5 && self.covers.timer_update {
-            self.forget_spurious_matches();
+            covers::forget_spurious_matches(self.part.bus_mut().slot_mut(slot).registers_mut());
+        } else if slot == self.slots.rcc && !self.crystal {
+            self.keep_hse_from_starting();
         }
         let (bus, model) = self.part.split(slot);
         let model = if slot == self.slots.i2c1 {
@@ -295,47 +249,5 @@ impl Board for Stand {
             armv7m::MpuRegions::Eight,
         );
         vec![Target::new(NAME, &mut self.mcu, core)]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use rigless::soc::Width;
-    use twin::{motion, plant::Plant};
-
-    use super::*;
-
-    const NOW: VirtualNanos = VirtualNanos(1_000);
-    const RCC_APB1ENR: u64 = 0x4002_3840;
-    const TIM5_EGR: u64 = 0x4000_0C14;
-    const TIM5_SR: u64 = 0x4000_0C10;
-    /// CC1IF to CC4IF.
-    const MATCHES: u64 = 0x1E;
-
-    fn matches_after_update(covers: Covers) -> u64 {
-        let still = motion::by_name("still").expect("the twin has it");
-        let plant = SharedPlant::new(Plant::ideal(Arc::from(still)));
-        let mut mcu = Stand::new(plant, covers).expect("rigless' own description").mcu;
-        for (address, value) in [(RCC_APB1ENR, 1 << 3), (TIM5_EGR, 1)] {
-            mcu.write(NOW, address, Width::W32, value)
-                .expect("a register of the part");
-        }
-        mcu.read(NOW, TIM5_SR, Width::W32).expect("a register of the part") & MATCHES
-    }
-
-    #[test]
-    fn a_stopped_timer_that_is_updated_has_matched_nothing() {
-        assert_eq!(matches_after_update(Covers::default()), 0);
-    }
-
-    #[test]
-    fn without_the_cover_it_has_matched_all_four() {
-        let bare = Covers {
-            timer_update: false,
-            ..Covers::default()
-        };
-        assert_eq!(matches_after_update(bare), MATCHES);
     }
 }

@@ -15,20 +15,20 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 
-/// Builds the release image for `board` (a name `build.rs` knows: `obc`, `discovery`) and reads it. Cargo does nothing
-/// if it is up to date. Progress goes to stderr.
+/// Builds the release image of the reference board, whose wiring the stand has, and reads it. Cargo does nothing if it
+/// is up to date, and shows its progress on stderr.
 ///
 /// # Errors
 ///
 /// [`ImageError::Compile`], or [`ImageError::NoCompiler`] with what was tried.
-pub fn build(board: &str) -> Result<Image, ImageError> {
+pub fn build() -> Result<Image, ImageError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = root.canonicalize().map_err(|error| ImageError::Read(root, error))?;
     let target_dir = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let mut tried = Vec::new();
     if has_target(&mut tried) {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        return compile(Command::new(cargo), &root, board, &target_dir);
+        return compile(Command::new(cargo), &root, &target_dir);
     }
     if debian(&root, &mut tried) {
         let mut cargo = Command::new(DEBIAN_CARGO);
@@ -38,29 +38,19 @@ pub fn build(board: &str) -> Result<Image, ImageError> {
             // Debian's compiler is a stable one; -Zbuild-std is what makes it serve a target it ships no core for.
             .env("RUSTC_BOOTSTRAP", "1")
             .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
-        return compile(cargo, &root, board, &target_dir.join("debian"));
+        return compile(cargo, &root, &target_dir.join("debian"));
     }
     Err(ImageError::NoCompiler(tried))
 }
 
 /// Runs `cargo build --release` for the board and reads what it leaves.
-fn compile(mut cargo: Command, root: &Path, board: &str, target_dir: &Path) -> Result<Image, ImageError> {
-    eprintln!("building the firmware image for {board} ...");
+fn compile(mut cargo: Command, root: &Path, target_dir: &Path) -> Result<Image, ImageError> {
     cargo
-        .args([
-            "build",
-            "--release",
-            "--quiet",
-            "--ignore-rust-version",
-            "--package",
-            "emems",
-        ])
+        .args(["build", "--release", "--ignore-rust-version", "--package", "emems"])
         .args(["--target", TARGET, "--target-dir"])
         .arg(target_dir)
-        .env("EMEMS_BOARD", board)
-        // Cargo sets these for a program it runs; a build of another package must not see them.
-        .env_remove("RUSTFLAGS")
-        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        // The default of build.rs; unset, so that a plain `cargo build --release` leaves the same image.
+        .env_remove("EMEMS_BOARD")
         .current_dir(root)
         .stdin(Stdio::null());
     match cargo.status() {

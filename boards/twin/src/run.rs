@@ -21,7 +21,8 @@ pub trait Bench {
     fn umbilical(&mut self, at: Nanos, bytes: &[u8]);
     /// A decoded log line of the firmware (defmt); the host board has none.
     fn log(&mut self, at: Nanos, line: &str);
-    /// Asked at least every millisecond of virtual time: bytes to send to the unit on the umbilical from now on.
+    /// Asked for every millisecond of virtual time: bytes to send to the unit on the umbilical from `now` on. The
+    /// emulated board asks up to 20 ms ahead of what it has let hear.
     fn commands(&mut self, now: Nanos) -> Vec<u8>;
     /// Told at least every 100 ms of virtual time; decides whether to go on.
     fn advanced(&mut self, now: Nanos) -> Flow;

@@ -5,10 +5,7 @@ use std::sync::Arc;
 use rigless::{mcu::Operate, soc::Width, time::VirtualNanos};
 use twin::{motion, plant::Plant, run::Fault};
 
-use crate::{
-    chips::SharedPlant,
-    stand::{Covers, Stand},
-};
+use crate::{chips::SharedPlant, covers::Covers, stand::Stand};
 
 const GPIOB: u64 = 0x4002_0400;
 const GPIOC: u64 = 0x4002_0800;

@@ -55,6 +55,12 @@ impl Bench for Tape {
 }
 
 impl Tape {
+    /// What was said on the umbilical.
+    pub fn said(&self) -> String {
+        let bytes: Vec<u8> = self.umbilical.iter().map(|&(_, byte)| byte).collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
     /// The packets heard whole, with the instant each was complete.
     pub fn packets(&self) -> Vec<(Nanos, Reading)> {
         let mut packets = Vec::new();
@@ -80,10 +86,14 @@ pub fn world(name: &str) -> Arc<dyn TruthSource> {
     motion::by_name(name).expect("a motion of the twin").into()
 }
 
-/// Flies the image of the reference board for `ms` milliseconds, from power-on, with parts free of noise.
-pub fn flown(options: &Options, faults: &[Scheduled], ms: u64, tape: &mut Tape) -> Report {
+/// The image of the reference board, built once.
+pub fn image() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
-    let image = IMAGE.get_or_init(|| image::build("obc").unwrap_or_else(|error| panic!("{error}")));
+    IMAGE.get_or_init(|| image::build().unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Flies the image for `ms` milliseconds from power-on, at rest, with parts free of noise and bias.
+pub fn flown(options: &Options, faults: &[Scheduled], ms: u64, tape: &mut Tape) -> Report {
     let plant = Plant::ideal(world("still"));
-    fly_with(options, image, plant, faults, ms * MS, tape).unwrap_or_else(|error| panic!("{error}"))
+    fly_with(options, image(), plant, faults, ms * MS, tape).unwrap_or_else(|error| panic!("{error}"))
 }

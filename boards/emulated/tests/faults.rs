@@ -1,0 +1,95 @@
+//! What befalls the unit, and how the release image goes on.
+
+mod bench;
+
+use bench::{MS, Tape, flown};
+use emems::board::ResetCause;
+use emulated::Options;
+use twin::run::{Fault, Scheduled};
+
+/// Instants through a read cycle at which a bus may get stuck [us after the cycle's first packet was due].
+const THROUGH_A_CYCLE_US: [u64; 4] = [300, 1_100, 2_300, 3_700];
+
+fn at_us(us: u64, fault: Fault) -> Scheduled {
+    Scheduled { at: us * 1_000, fault }
+}
+
+fn at(ms: u64, fault: Fault) -> Scheduled {
+    at_us(ms * 1_000, fault)
+}
+
+fn errors(tape: &Tape) -> Vec<u16> {
+    tape.packets().iter().map(|(_, reading)| reading.errors.0).collect()
+}
+
+#[test]
+fn a_reset_in_flight_is_told_apart_and_the_count_goes_on() {
+    let mut tape = Tape::default();
+    let report = flown(&Options::default(), &[at(800, Fault::Reset)], 1_700, &mut tape);
+    assert_eq!(report.resets.len(), 1);
+    let (struck, cause) = report.resets[0];
+    assert_eq!(cause, ResetCause::Pin);
+    assert!(struck.abs_diff(800 * MS) < MS);
+    assert!(tape.said().contains("Pin"), "{}", tape.said());
+    let counters: Vec<u16> = tape.packets().iter().map(|(_, reading)| reading.counter).collect();
+    assert!(counters.windows(2).all(|pair| pair[1] == pair[0] + 1), "{counters:?}");
+    assert_eq!(errors(&tape).last(), Some(&0));
+}
+
+#[test]
+fn a_part_that_holds_sda_is_clocked_free() {
+    let mut tape = Tape::default();
+    flown(&Options::default(), &[at(800, Fault::SdaHeld)], 2_500, &mut tape);
+    let errors = errors(&tape);
+    assert!(errors.iter().skip(2).any(|&errors| errors != 0), "{errors:x?}");
+    assert_eq!(errors.last(), Some(&0), "{errors:x?}");
+}
+
+#[test]
+fn a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free() {
+    // The cycle begins some milliseconds before its packet is complete (13.5 ms on the line).
+    let mut undisturbed = Tape::default();
+    flown(&Options::default(), &[], 1_000, &mut undisturbed);
+    let begun_us = undisturbed.packets()[3].0 / 1_000 - 13_541 - 4_000;
+    for offset_us in THROUGH_A_CYCLE_US {
+        let mut tape = Tape::default();
+        let faults = [
+            at_us(begun_us + offset_us, Fault::BusStuck(true)),
+            at_us(begun_us + 300_000, Fault::BusStuck(false)),
+        ];
+        flown(&Options::default(), &faults, 2_700, &mut tape);
+        let errors = errors(&tape);
+        assert!(errors.len() >= 11, "a packet every 200 ms whatever the bus does");
+        assert!(
+            errors.iter().skip(2).any(|&errors| errors != 0),
+            "{offset_us} us: {errors:x?}"
+        );
+        assert_eq!(errors.last(), Some(&0), "{offset_us} us: {errors:x?}");
+    }
+}
+
+#[test]
+fn a_silent_sensor_has_its_error_bit_until_it_answers_again() {
+    let mut tape = Tape::default();
+    // Slot 5: the magnetometer of the second plate. Slot 9: its gyro.
+    let faults = [
+        at(700, Fault::Silent(5)),
+        at(700, Fault::Silent(9)),
+        at(1_300, Fault::Restored(5)),
+        at(1_300, Fault::Restored(9)),
+    ];
+    flown(&Options::default(), &faults, 2_500, &mut tape);
+    let errors = errors(&tape);
+    assert_eq!(errors[4], 1 << 5 | 1 << 9, "{errors:x?}");
+    assert_eq!(errors.last(), Some(&0), "{errors:x?}");
+}
+
+#[test]
+fn without_the_multiplexer_the_gyros_are_still_read() {
+    let mut tape = Tape::default();
+    let faults = [at(700, Fault::MuxSilent(true)), at(1_300, Fault::MuxSilent(false))];
+    flown(&Options::default(), &faults, 2_500, &mut tape);
+    let errors = errors(&tape);
+    assert_eq!(errors[4], 0xF0FF, "{errors:x?}");
+    assert_eq!(errors.last(), Some(&0), "{errors:x?}");
+}
