@@ -1,0 +1,141 @@
+//! `ground fly`: the unit in the air, watched.
+//!
+//! In: [`plan::Arguments`]. Out: a folder with all that was seen, and the summary on standard output. What flies the unit
+//! (the emulated board or the host one) is a [`board::Flight`]; everything here is the same for both.
+
+pub mod board;
+pub mod plan;
+mod progress;
+pub mod source;
+pub mod watch;
+
+use std::{io, thread, time::Duration};
+
+use twin::{plant::Plant, run::Bench};
+
+use self::{
+    board::{BoardError, Remark},
+    plan::{Arguments, PlanError},
+    progress::Progress,
+    source::{Source, SourceError},
+    watch::{Seen, Watch},
+};
+use crate::{
+    console::{self, line},
+    folder::{self, Folder, FolderError},
+    log::sequence::CYCLE_S,
+};
+
+/// Why a flight was not made, or not to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum FlyError {
+    /// Nothing to fly.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// What was asked for makes no flight.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The board.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The console.
+    #[error(transparent)]
+    Console(#[from] console::Error),
+    /// The thread of the flight.
+    #[error("the flight cannot be run beside the console: {0}")]
+    Thread(#[from] io::Error),
+    /// A fault of this program, which has said more on standard error.
+    #[error("the flight broke down; please report what is printed above")]
+    Broken,
+}
+
+/// Runs `ground fly`.
+///
+/// # Errors
+/// See [`FlyError`].
+pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
+    let source = source::open(arguments)?;
+    let duration = plan::duration_of(arguments.duration, source.truth.duration_s());
+    let faults = plan::faults(&arguments.silent, duration)?;
+    let end = plan::nanos(duration)?;
+    // An image that cannot be built must not leave an empty folder.
+    let flight = if arguments.host { board::host() } else { board::image()? };
+    let name = format!("{}-{}", source.name, arguments.seed);
+    let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
+    let progress = Progress::start(duration, arguments.real_time || arguments.console, arguments.console);
+    let plant = Plant::new(source.truth.clone(), arguments.seed);
+    let (seen, remarks) = if arguments.console {
+        beside_the_console(arguments, folder, progress, move |watch| {
+            flight(plant, &faults, end, watch)
+        })?
+    } else {
+        let mut watch = Watch::new(folder, progress, None, arguments.derived);
+        let remarks = flight(plant, &faults, end, &mut watch)?;
+        (watch.finish()?, remarks)
+    };
+    report(arguments, &source, seen, remarks)
+}
+
+/// Flies in a thread of its own while the user has the terminal; ends when both do.
+fn beside_the_console(
+    arguments: &Arguments,
+    folder: Folder,
+    progress: Progress,
+    flight: impl FnOnce(&mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send + 'static,
+) -> Result<(Seen, Vec<Remark>), FlyError> {
+    let (line, unit) = line::channel("the flying unit");
+    let kept = folder.path().join("umbilical.txt");
+    let mut watch = Watch::new(folder, progress, Some(unit), arguments.derived);
+    let flying = thread::Builder::new()
+        .name("flight".into())
+        .spawn(move || -> Result<_, FlyError> {
+            let remarks = flight(&mut watch)?;
+            Ok((watch.finish()?, remarks))
+        })?;
+    let talked = console::run(line, &kept, console::Options::default());
+    let seen = flying.join().map_err(|_| FlyError::Broken)??;
+    talked?;
+    Ok(seen)
+}
+
+/// Writes the page and prints the summary.
+fn report(arguments: &Arguments, source: &Source, seen: Seen, remarks: Vec<Remark>) -> Result<(), FlyError> {
+    let board = if arguments.host {
+        "host, virtual time"
+    } else {
+        "emulated STM32F4, release image"
+    };
+    let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
+    rows.extend(remarks);
+    let title = format!("{} flight, unit {}", source.name, arguments.seed);
+    let path = seen
+        .folder
+        .finish(&title, &source.about, &rows, &seen.summary, &seen.envelope)?;
+    print!("{}{}", folder::text_of(&rows), folder::text_of(&seen.summary.rows()));
+    println!("{}", path.join("index.html").display());
+    Ok(())
+}
+
+fn flight_rows(
+    board: &str,
+    source: &Source,
+    seed: u64,
+    flown: Duration,
+    took: Duration,
+) -> Vec<(&'static str, String)> {
+    let (flown_s, took_s) = (flown.as_secs_f64(), took.as_secs_f64());
+    vec![
+        ("flown", format!("{}, seed {seed}", source.name)),
+        ("board", board.into()),
+        (
+            "virtual time",
+            format!(
+                "{flown_s:.1} s in {took_s:.1} s, {:.0} times real time",
+                flown_s / took_s.max(1e-3)
+            ),
+        ),
+    ]
+}
