@@ -135,8 +135,9 @@ fn to_folder(arguments: &Arguments, cycle_s: f64, parent: &Path) -> Result<(), D
     read(&arguments.file, |piece| Ok(folder.entries(&digest.push(None, piece))?))?;
     let (rest, summary, envelope) = digest.finish();
     folder.entries(&rest)?;
-    let path = folder.finish(stem, &format!("decoded from {name}"), &[], &summary, &envelope)?;
-    print!("{}", folder::text_of(&summary.rows()));
+    let rows = summary.rows();
+    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
+    print!("{}", folder::text_of(&rows));
     println!("{}", path.join("index.html").display());
     Ok(())
 }

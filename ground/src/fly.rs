@@ -110,11 +110,12 @@ fn report(arguments: &Arguments, source: &Source, seen: Seen, remarks: Vec<Remar
     };
     let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
     rows.extend(remarks);
+    rows.extend(seen.summary.rows());
     let title = format!("{} flight, unit {}", source.name, arguments.seed);
     let path = seen
         .folder
         .finish(&title, &source.about, &rows, &seen.summary, &seen.envelope)?;
-    print!("{}{}", folder::text_of(&rows), folder::text_of(&seen.summary.rows()));
+    print!("{}", folder::text_of(&rows));
     println!("{}", path.join("index.html").display());
     Ok(())
 }

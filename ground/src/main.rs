@@ -1,5 +1,7 @@
 //! `ground`: the one host program.
 
+use std::{error::Error, process::ExitCode};
+
 use clap::Parser;
 
 /// The ground side of the e-MEMS attitude sensor unit.
@@ -14,14 +16,22 @@ enum Command {
     Console(ground::console::Arguments),
 }
 
-fn main() -> anyhow::Result<()> {
-    match Command::parse() {
-        Command::Fly(arguments) => Ok(ground::fly::fly(&arguments)?),
-        Command::Sources => {
-            print!("{}", ground::fly::source::list());
-            Ok(())
+fn main() -> ExitCode {
+    match run(Command::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
         }
-        Command::Decode(arguments) => Ok(ground::decode::decode(&arguments)?),
-        Command::Console(arguments) => Ok(ground::console::console(&arguments)?),
     }
+}
+
+fn run(command: Command) -> Result<(), Box<dyn Error>> {
+    match command {
+        Command::Fly(arguments) => ground::fly::fly(&arguments)?,
+        Command::Sources => print!("{}", ground::fly::source::list()),
+        Command::Decode(arguments) => ground::decode::decode(&arguments)?,
+        Command::Console(arguments) => ground::console::console(&arguments)?,
+    }
+    Ok(())
 }

@@ -55,24 +55,18 @@ impl Progress {
     /// The flight is at `now`; in real time, waits until the wall clock is there too.
     pub fn advanced(&mut self, now: Nanos, packets: u64) {
         let flown = Duration::from_nanos(now);
-        let text = || {
-            format!(
-                "{:.1} s flown, {packets} packets, {:.0} x real time",
-                flown.as_secs_f64(),
-                self.ratio(flown)
-            )
-        };
+        let text = format!("{:.1} s flown, {packets} packets", flown.as_secs_f64());
         match &mut self.shown {
             Shown::Not => {}
             Shown::Bar(bar) => {
-                bar.set_message(format!("{:.1} s flown, {packets} packets", flown.as_secs_f64()));
+                bar.set_message(text);
                 bar.set_position(millis(flown));
             }
             Shown::Lines(printed) => {
-                let part = LINES * millis(flown) / millis(self.duration).max(1);
+                let part = LINES.saturating_mul(millis(flown)) / millis(self.duration).max(1);
                 if part > *printed {
                     *printed = part;
-                    eprintln!("{}", text());
+                    eprintln!("{text}");
                 }
             }
         }
@@ -88,12 +82,8 @@ impl Progress {
         }
         self.started.elapsed()
     }
-
-    fn ratio(&self, flown: Duration) -> f64 {
-        flown.as_secs_f64() / self.started.elapsed().as_secs_f64().max(1e-9)
-    }
 }
 
 fn millis(time: Duration) -> u64 {
-    u64::try_from(time.as_millis()).unwrap_or(u64::MAX / LINES)
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
