@@ -140,3 +140,70 @@ fn flight_rows(
         ),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Words {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    fn words(words: &[&str]) -> Result<Arguments, clap::Error> {
+        Words::try_parse_from([&["fly"], words].concat()).map(|words| words.arguments)
+    }
+
+    #[test]
+    fn the_same_words_give_the_same_packets_in_a_folder_of_their_own() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().to_string_lossy();
+        let arguments = words(&[
+            "--host",
+            "--motion",
+            "tumble",
+            "--duration",
+            "5s",
+            "--seed",
+            "7",
+            "--silent",
+            "a2@2s",
+            "--out",
+            &out,
+        ]);
+        let arguments = arguments.expect("arguments");
+        fly(&arguments).expect("first flight");
+        fly(&arguments).expect("second flight");
+        let packets = |name: &str| fs::read(place.path().join(name).join("packets.txt")).expect(name);
+        assert_eq!(packets("tumble-7"), packets("tumble-7-2"));
+        let counts = fs::read_to_string(place.path().join("tumble-7/counts.csv")).expect("counts");
+        let last = counts.lines().last().unwrap_or_default();
+        assert!(
+            last.contains(",0002,0,0,") && last.contains(",,,"),
+            "accelerometer 2 is silent: {last}"
+        );
+        let summary = fs::read_to_string(place.path().join("tumble-7/summary.txt")).expect("summary");
+        assert!(summary.contains("accelerometer 2: "), "{summary}");
+    }
+
+    #[test]
+    fn two_sources_at_once_are_refused() {
+        assert!(words(&["--motion", "still", "--recording", "x.csv"]).is_err());
+        assert!(words(&["--recording", "x.csv", "--motion-file", "y.csv"]).is_err());
+    }
+
+    #[test]
+    fn a_flight_that_cannot_start_leaves_no_folder() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().to_string_lossy();
+        let arguments = words(&["--host", "--recording", "no-such-file.csv", "--out", &out]).expect("arguments");
+        let error = fly(&arguments).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("no-such-file.csv"), "{error}");
+        assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 0);
+    }
+}

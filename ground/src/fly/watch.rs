@@ -149,3 +149,72 @@ impl Bench for Watch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use emems::{packet::encode, sample::Reading};
+
+    use super::*;
+    use crate::{console::line, log::sequence::CYCLE_S};
+
+    const MILLISECOND: Nanos = 1_000_000;
+
+    fn watch(place: &std::path::Path, console: Option<UnitEnd>, ask_derived: bool) -> Watch {
+        let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
+        let progress = Progress::start(Duration::from_secs(60), false, true);
+        Watch::new(folder, progress, console, ask_derived)
+    }
+
+    #[test]
+    fn packets_are_timed_by_their_last_byte() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, false);
+        for (counter, at) in [(0, 14 * MILLISECOND), (1, 214 * MILLISECOND + 50_000)] {
+            let packet = encode(&Reading::unread(counter));
+            watch.telemetry(at - 1, &packet[..155]);
+            watch.telemetry(at, &packet[155..]);
+        }
+        let seen = watch.finish().expect("seen");
+        assert_eq!(seen.summary.period_s.count, 1);
+        assert!(
+            (seen.summary.period_s.mean - 0.200_05).abs() < 1e-12,
+            "{:?}",
+            seen.summary.period_s
+        );
+    }
+
+    #[test]
+    fn derived_frames_are_asked_for_once_and_not_before_the_unit_listens() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, true);
+        assert_eq!(watch.commands(MILLISECOND), b"");
+        assert_eq!(watch.commands(ASK_AT), b"G_DL");
+        assert_eq!(watch.commands(ASK_AT + MILLISECOND), b"");
+    }
+
+    #[test]
+    fn a_console_hears_the_umbilical_speaks_and_ends_the_flight_when_closed() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let (mut line, unit) = line::channel("flying");
+        let mut watch = watch(place.path(), Some(unit), false);
+        watch.umbilical(7 * MILLISECOND, b">up\n");
+        let heard = line::Line::hear(&mut line, Duration::ZERO);
+        assert!(matches!(heard, line::Heard::Bytes { bytes, .. } if bytes == b">up\n"));
+        line::Line::say(&mut line, b"G_ST").expect("say");
+        assert_eq!(watch.commands(8 * MILLISECOND), b"G_ST");
+        assert_eq!(watch.advanced(9 * MILLISECOND), Flow::Continue);
+        drop(line);
+        assert_eq!(watch.advanced(10 * MILLISECOND), Flow::Stop);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_stops_the_flight_and_is_named() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, false);
+        std::fs::write(watch.folder.path().join("packets.txt"), "not ours").expect("write");
+        watch.telemetry(MILLISECOND, b"@");
+        assert_eq!(watch.advanced(MILLISECOND), Flow::Stop);
+        let error = watch.finish().err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("packets.txt cannot be written"), "{error}");
+    }
+}
