@@ -22,7 +22,7 @@ use crate::{
 /// Bytes read at once.
 const PIECE: usize = 64 * 1024;
 
-/// `ground decode`: packets to CSV; gaps and undecodable bytes are listed
+/// Decodes packets to CSV and lists gaps and bytes that are no packet
 ///
 /// Reads 156-byte packets (and derived frames) from a file however cut, spliced or mixed with other text: every intact
 /// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale

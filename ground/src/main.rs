@@ -9,10 +9,10 @@ use clap::Parser;
 #[command(name = "ground", version)]
 enum Command {
     Fly(ground::fly::plan::Arguments),
-    /// List the motions that can be flown
+    /// Lists the motions that can be flown
     Sources,
     Decode(ground::decode::Arguments),
-    /// Talk to the unit over its umbilical, see all sensors, keep everything it says
+    /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
 }
 

@@ -16,7 +16,7 @@ use crate::table::SLOT_NAMES;
 /// How long a motion without an end is flown.
 const ENDLESS_S: f64 = 60.0;
 
-/// Flies the unit: the release image on the emulated board, or with --host the same code on this computer
+/// Flies the unit: its release image on the emulated board, or with --host the same code on this computer
 ///
 /// Sensors, buses and lines are modelled at register level; what they measure comes from a motion or a recording. The
 /// telemetry is decoded as it comes and everything kept in a new folder: packets.txt, counts.csv, si.csv, log.txt,

@@ -3,7 +3,7 @@
 //! In: what the command line names. Out: the truth of a flight and what to call it. Refuses a name that no motion has, and
 //! what the readers of files refuse, with file and line.
 
-use std::{path::Path, sync::Arc};
+use std::{borrow::Cow, path::Path, sync::Arc};
 
 use twin::{
     environment::{Environment, World},
@@ -46,12 +46,12 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
     match (&arguments.recording, &arguments.motion_file) {
         (Some(path), _) => Ok(Source {
             name: stem(path),
-            about: format!("recording of a real unit, {}", path.display()),
+            about: format!("recording of a real unit, {}", file_name(path)),
             truth: Arc::new(Recording::open(path)?),
         }),
         (_, Some(path)) => Ok(Source {
             name: stem(path),
-            about: format!("recorded motion, {}, in the laboratory", path.display()),
+            about: format!("recorded motion, {}, in the laboratory", file_name(path)),
             truth: Arc::new(World {
                 motion: Recorded::open(path)?,
                 environment: Environment::laboratory(),
@@ -83,9 +83,14 @@ fn by_name(name: &str) -> Result<Source, SourceError> {
     }
 }
 
+/// A file's name without its folder, which is nobody's business on a page that may be passed on.
+fn file_name(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
+}
+
 /// A file's name up to its first dot.
 fn stem(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = file_name(path);
     name.split('.').find(|part| !part.is_empty()).unwrap_or("file").into()
 }
 

@@ -24,7 +24,7 @@ const GRID: RGBColor = RGBColor(222, 222, 222);
 const FRAME: RGBColor = RGBColor(120, 120, 120);
 
 const TITLE_PX: u32 = 34;
-const LABEL_PX: u32 = 28;
+const LABEL_PX: u32 = 30;
 
 /// Share of the height that a strip takes.
 const STRIP: f64 = 0.035;
