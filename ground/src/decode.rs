@@ -22,7 +22,7 @@ use crate::{
 /// Bytes read at once.
 const PIECE: usize = 64 * 1024;
 
-/// `ground decode`: packets to CSV; gaps and undecodable bytes are listed
+/// Decodes packets to CSV and lists gaps and bytes that are no packet
 ///
 /// Reads 156-byte packets (and derived frames) from a file however cut, spliced or mixed with other text: every intact
 /// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale
@@ -135,8 +135,9 @@ fn to_folder(arguments: &Arguments, cycle_s: f64, parent: &Path) -> Result<(), D
     read(&arguments.file, |piece| Ok(folder.entries(&digest.push(None, piece))?))?;
     let (rest, summary, envelope) = digest.finish();
     folder.entries(&rest)?;
-    let path = folder.finish(stem, &format!("decoded from {name}"), &[], &summary, &envelope)?;
-    print!("{}", folder::text_of(&summary.rows()));
+    let rows = summary.rows();
+    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
+    print!("{}", folder::text_of(&rows));
     println!("{}", path.join("index.html").display());
     Ok(())
 }

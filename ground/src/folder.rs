@@ -167,7 +167,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Writes page and summary and closes all files. `rows` come before the figures of `summary`.
+    /// Writes page and summary, of these rows, and closes all files.
     ///
     /// # Errors
     /// When a file cannot be written or a figure drawn.
@@ -179,17 +179,9 @@ impl Folder {
         summary: &Summary,
         envelope: &Envelope,
     ) -> Result<PathBuf, FolderError> {
-        let rows: Vec<_> = rows.iter().cloned().chain(summary.rows()).collect();
         let figures = plot::figures(envelope, self.cycle_s, summary)?;
-        let html = page::html(
-            &Heading {
-                title,
-                about,
-                rows: &rows,
-            },
-            &figures,
-        );
-        for (name, content) in [("index.html", html), ("summary.txt", text_of(&rows))] {
+        let html = page::html(&Heading { title, about, rows }, &figures);
+        for (name, content) in [("index.html", html), ("summary.txt", text_of(rows))] {
             let path = self.path.join(name);
             fs::write(&path, content).map_err(|source| FolderError::Write { path, source })?;
         }
@@ -312,9 +304,8 @@ mod tests {
         folder.entries(&entries).expect("entries");
         folder.log(0.25, "INFO up").expect("log");
         let (_, summary, envelope) = digest.finish();
-        let path = folder
-            .finish("still", "", &[("seed", "1".into())], &summary, &envelope)
-            .expect("finish");
+        let rows = summary.rows();
+        let path = folder.finish("still", "", &rows, &summary, &envelope).expect("finish");
         assert_eq!(read(&path, "packets.txt").as_bytes(), stream);
         assert_eq!(read(&path, "counts.csv").lines().count(), 3);
         assert_eq!(read(&path, "si.csv").lines().count(), 3);
@@ -323,7 +314,9 @@ mod tests {
             "offset 0, 1 bytes: not part of a frame\n\
              offset 157, packet 4, 0.800 s: 2 packets missed before it\n    0.250000 INFO up\n"
         );
-        assert!(read(&path, "summary.txt").starts_with("seed           1\npackets        2\nmissed         2\n"));
+        assert!(
+            read(&path, "summary.txt").starts_with("packets                     2\nmissed                      2\n")
+        );
         assert!(read(&path, "index.html").contains("Accelerometers"));
         assert!(!path.join("derived.csv").exists(), "no derived frames, no file");
     }

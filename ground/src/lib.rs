@@ -5,6 +5,7 @@ pub mod console;
 pub mod decode;
 pub mod digest;
 pub mod envelope;
+pub mod fly;
 pub mod folder;
 pub mod log;
 pub mod plot;

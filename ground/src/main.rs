@@ -1,19 +1,37 @@
 //! `ground`: the one host program.
 
+use std::{error::Error, process::ExitCode};
+
 use clap::Parser;
 
 /// The ground side of the e-MEMS attitude sensor unit.
 #[derive(Parser)]
 #[command(name = "ground", version)]
 enum Command {
+    Fly(ground::fly::plan::Arguments),
+    /// Lists the motions that can be flown
+    Sources,
     Decode(ground::decode::Arguments),
-    /// Talk to the unit over its umbilical, see all sensors, keep everything it says
+    /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
 }
 
-fn main() -> anyhow::Result<()> {
-    match Command::parse() {
-        Command::Decode(arguments) => Ok(ground::decode::decode(&arguments)?),
-        Command::Console(arguments) => Ok(ground::console::console(&arguments)?),
+fn main() -> ExitCode {
+    match run(Command::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
     }
+}
+
+fn run(command: Command) -> Result<(), Box<dyn Error>> {
+    match command {
+        Command::Fly(arguments) => ground::fly::fly(&arguments)?,
+        Command::Sources => print!("{}", ground::fly::source::list()),
+        Command::Decode(arguments) => ground::decode::decode(&arguments)?,
+        Command::Console(arguments) => ground::console::console(&arguments)?,
+    }
+    Ok(())
 }

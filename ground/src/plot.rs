@@ -122,7 +122,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
         .collect();
     legend.extend(times.legend(panels.iter().any(|panel| !panel.failed.is_empty())));
     let svg = draw(FOUR_PANELS, title, |root| {
-        let y = panel::shared_y(&panels, lsb);
+        let y = panel::shared_y(&panels, times, lsb);
         for (area, panel) in root.split_evenly((2, 2)).iter().zip(&panels) {
             panel.draw(area, times, y.clone())?;
         }
@@ -156,7 +156,11 @@ fn period(times: &Times, summary: &Summary) -> Result<Figure, PlotError> {
     let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other")];
     legend.extend(times.legend(false));
     let svg = draw(ONE_PANEL, &title, |root| {
-        let y = panel::shared_y(std::slice::from_ref(&panel), LEAST_SPAN_US / panel::LEAST_SPAN_LSB);
+        let y = panel::shared_y(
+            std::slice::from_ref(&panel),
+            times,
+            LEAST_SPAN_US / panel::LEAST_SPAN_LSB,
+        );
         panel.draw(root, times, y)
     })?;
     Ok(Figure { title, legend, svg })

@@ -140,7 +140,7 @@ impl Summary {
         let mut rows = vec![
             ("packets", self.packets.to_string()),
             ("missed", self.missed.to_string()),
-            ("sensor errors", self.errors()),
+            ("packets with sensor errors", self.errors()),
         ];
         if self.period_s.count > 0 {
             rows.push(("packet period", self.period_s.milli("ms")));
@@ -169,7 +169,7 @@ impl Summary {
     fn errors(&self) -> String {
         let failing: Vec<String> = (self.failed.iter().enumerate())
             .filter(|(_, count)| **count > 0)
-            .map(|(slot, count)| format!("{} {count}", channel::sensor_name(slot)))
+            .map(|(slot, count)| format!("{}: {count}", channel::sensor_name(slot)))
             .collect();
         match failing.as_slice() {
             [] => "none".into(),
@@ -211,7 +211,10 @@ mod tests {
             [
                 ("packets", "2".into()),
                 ("missed", "3".into()),
-                ("sensor errors", "accelerometer 2 2, thermometer 4 2".into()),
+                (
+                    "packets with sensor errors",
+                    "accelerometer 2: 2, thermometer 4: 2".into()
+                ),
             ]
         );
     }

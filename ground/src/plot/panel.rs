@@ -24,7 +24,7 @@ const GRID: RGBColor = RGBColor(222, 222, 222);
 const FRAME: RGBColor = RGBColor(120, 120, 120);
 
 const TITLE_PX: u32 = 34;
-const LABEL_PX: u32 = 28;
+const LABEL_PX: u32 = 30;
 
 /// Share of the height that a strip takes.
 const STRIP: f64 = 0.035;
@@ -166,14 +166,10 @@ impl<'a> Times<'a> {
     fn middle(&self, index: usize) -> f64 {
         self.envelope.middle(index) * self.packet
     }
-
-    fn strips(&self) -> bool {
-        !self.missed.is_empty()
-    }
 }
 
 /// A value axis that suits all panels, with room for their strips.
-pub fn shared_y(panels: &[Panel], lsb: f64) -> Range<f64> {
+pub fn shared_y(panels: &[Panel], times: &Times, lsb: f64) -> Range<f64> {
     let values = || {
         (panels.iter())
             .flat_map(|panel| &panel.traces)
@@ -183,8 +179,15 @@ pub fn shared_y(panels: &[Panel], lsb: f64) -> Range<f64> {
     let (least, most) = if least <= most { (least, most) } else { (0.0, 0.0) };
     let span = (most - least).max(LEAST_SPAN_LSB * lsb);
     let middle = 0.5 * (least + most);
-    // 5 % of air above, and below it the room of two strips.
-    middle - (0.5 + 0.05 + 2.6 * STRIP) * span..middle + (0.5 + 0.05) * span
+    let strips = if !times.missed.is_empty() {
+        2.6
+    } else if panels.iter().any(|panel| !panel.failed.is_empty()) {
+        1.4
+    } else {
+        0.0
+    };
+    // 5 % of air above and below, and below that the room of the strips.
+    middle - (0.55 + strips * STRIP) * span..middle + 0.55 * span
 }
 
 impl Panel {
@@ -231,7 +234,8 @@ impl Panel {
             let line = [(at, y.start), (at, y.end)];
             chart.draw_series(DashedLineSeries::new(line, 12, 10, LIFT_OFF.stroke_width(2)))?;
         }
-        for trace in &self.traces {
+        // The first on top: it is the quieter one where two nearly coincide.
+        for trace in self.traces.iter().rev() {
             for run in &trace.runs {
                 chart.draw_series(LineSeries::new(run.iter().copied(), trace.colour.stroke_width(3)))?;
             }
@@ -241,14 +245,12 @@ impl Panel {
                 .into_iter()
                 .map(|corners| Rectangle::new(corners, FAILED.filled())),
         )?;
-        if times.strips() {
-            let missed = strip(&times.missed, 1.2);
-            chart.draw_series(
-                missed
-                    .into_iter()
-                    .map(|corners| Rectangle::new(corners, MISSED.filled())),
-            )?;
-        }
+        let missed = strip(&times.missed, 1.2);
+        chart.draw_series(
+            missed
+                .into_iter()
+                .map(|corners| Rectangle::new(corners, MISSED.filled())),
+        )?;
         Ok(())
     }
 }
@@ -321,6 +323,8 @@ mod tests {
 
     #[test]
     fn a_flat_line_is_not_blown_up() {
+        let mut envelope = Envelope::default();
+        envelope.add(0, &emems::sample::Reading::unread(0), 0, None);
         let panel = Panel {
             title: String::new(),
             y_title: String::new(),
@@ -330,7 +334,7 @@ mod tests {
             }],
             failed: Vec::new(),
         };
-        let y = shared_y(&[panel], 1.0);
+        let y = shared_y(&[panel], &Times::of(&envelope, 0.2), 1.0);
         assert!(
             y.start < 5.0 - 0.5 * LEAST_SPAN_LSB && y.end > 5.0 + 0.5 * LEAST_SPAN_LSB,
             "{y:?}"

@@ -1,0 +1,209 @@
+//! `ground fly`: the unit in the air, watched.
+//!
+//! In: [`plan::Arguments`]. Out: a folder with all that was seen, and the summary on standard output. What flies the unit
+//! (the emulated board or the host one) is a [`board::Flight`]; everything here is the same for both.
+
+pub mod board;
+pub mod plan;
+mod progress;
+pub mod source;
+pub mod watch;
+
+use std::{io, thread, time::Duration};
+
+use twin::{plant::Plant, run::Bench};
+
+use self::{
+    board::{BoardError, Remark},
+    plan::{Arguments, PlanError},
+    progress::Progress,
+    source::{Source, SourceError},
+    watch::{Seen, Watch},
+};
+use crate::{
+    console::{self, line},
+    folder::{self, Folder, FolderError},
+    log::sequence::CYCLE_S,
+};
+
+/// Why a flight was not made, or not to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum FlyError {
+    /// Nothing to fly.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// What was asked for makes no flight.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The board.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The console.
+    #[error(transparent)]
+    Console(#[from] console::Error),
+    /// The thread of the flight.
+    #[error("the flight cannot be run beside the console: {0}")]
+    Thread(#[from] io::Error),
+    /// A fault of this program, which has said more on standard error.
+    #[error("the flight broke down; please report what is printed above")]
+    Broken,
+}
+
+/// Runs `ground fly`.
+///
+/// # Errors
+/// See [`FlyError`].
+pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
+    let source = source::open(arguments)?;
+    let duration = plan::duration_of(arguments.duration, source.truth.duration_s());
+    let faults = plan::faults(&arguments.silent, duration)?;
+    let end = plan::nanos(duration)?;
+    // An image that cannot be built must not leave an empty folder.
+    let flight = if arguments.host { board::host() } else { board::image()? };
+    let name = format!("{}-{}", source.name, arguments.seed);
+    let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
+    let progress = Progress::start(duration, arguments.real_time || arguments.console, arguments.console);
+    let plant = Plant::new(source.truth.clone(), arguments.seed);
+    let (seen, remarks) = if arguments.console {
+        beside_the_console(arguments, folder, progress, move |watch| {
+            flight(plant, &faults, end, watch)
+        })?
+    } else {
+        let mut watch = Watch::new(folder, progress, None, arguments.derived);
+        let remarks = flight(plant, &faults, end, &mut watch)?;
+        (watch.finish()?, remarks)
+    };
+    report(arguments, &source, seen, remarks)
+}
+
+/// Flies in a thread of its own while the user has the terminal; ends when both do.
+fn beside_the_console(
+    arguments: &Arguments,
+    folder: Folder,
+    progress: Progress,
+    flight: impl FnOnce(&mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send + 'static,
+) -> Result<(Seen, Vec<Remark>), FlyError> {
+    let (line, unit) = line::channel("the flying unit");
+    let kept = folder.path().join("umbilical.txt");
+    let mut watch = Watch::new(folder, progress, Some(unit), arguments.derived);
+    let flying = thread::Builder::new()
+        .name("flight".into())
+        .spawn(move || -> Result<_, FlyError> {
+            let remarks = flight(&mut watch)?;
+            Ok((watch.finish()?, remarks))
+        })?;
+    let talked = console::run(line, &kept, console::Options::default());
+    let seen = flying.join().map_err(|_| FlyError::Broken)??;
+    talked?;
+    Ok(seen)
+}
+
+/// Writes the page and prints the summary.
+fn report(arguments: &Arguments, source: &Source, seen: Seen, remarks: Vec<Remark>) -> Result<(), FlyError> {
+    let board = if arguments.host {
+        "host, virtual time"
+    } else {
+        "emulated STM32F4, release image"
+    };
+    let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
+    rows.extend(remarks);
+    rows.extend(seen.summary.rows());
+    let title = format!("{} flight, unit {}", source.name, arguments.seed);
+    let path = seen
+        .folder
+        .finish(&title, &source.about, &rows, &seen.summary, &seen.envelope)?;
+    print!("{}", folder::text_of(&rows));
+    println!("{}", path.join("index.html").display());
+    Ok(())
+}
+
+fn flight_rows(
+    board: &str,
+    source: &Source,
+    seed: u64,
+    flown: Duration,
+    took: Duration,
+) -> Vec<(&'static str, String)> {
+    let (flown_s, took_s) = (flown.as_secs_f64(), took.as_secs_f64());
+    vec![
+        ("flown", format!("{}, seed {seed}", source.name)),
+        ("board", board.into()),
+        (
+            "virtual time",
+            format!(
+                "{flown_s:.1} s in {took_s:.1} s, {:.0} times real time",
+                flown_s / took_s.max(1e-3)
+            ),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Words {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    fn words(words: &[&str]) -> Result<Arguments, clap::Error> {
+        Words::try_parse_from([&["fly"], words].concat()).map(|words| words.arguments)
+    }
+
+    #[test]
+    fn the_same_words_give_the_same_packets_in_a_folder_of_their_own() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().to_string_lossy();
+        let arguments = words(&[
+            "--host",
+            "--motion",
+            "tumble",
+            "--duration",
+            "5s",
+            "--seed",
+            "7",
+            "--silent",
+            "a2@2s",
+            "--out",
+            &out,
+        ]);
+        let arguments = arguments.expect("arguments");
+        fly(&arguments).expect("first flight");
+        fly(&arguments).expect("second flight");
+        let packets = |name: &str| fs::read(place.path().join(name).join("packets.txt")).expect(name);
+        assert_eq!(packets("tumble-7"), packets("tumble-7-2"));
+        let counts = fs::read_to_string(place.path().join("tumble-7/counts.csv")).expect("counts");
+        let last = counts.lines().last().unwrap_or_default();
+        assert!(
+            last.contains(",0002,0,0,") && last.contains(",,,"),
+            "accelerometer 2 is silent: {last}"
+        );
+        let summary = fs::read_to_string(place.path().join("tumble-7/summary.txt")).expect("summary");
+        assert!(summary.contains("accelerometer 2: "), "{summary}");
+    }
+
+    #[test]
+    fn two_sources_at_once_are_refused() {
+        assert!(words(&["--motion", "still", "--recording", "x.csv"]).is_err());
+        assert!(words(&["--recording", "x.csv", "--motion-file", "y.csv"]).is_err());
+    }
+
+    #[test]
+    fn a_flight_that_cannot_start_leaves_no_folder() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().to_string_lossy();
+        let arguments = words(&["--host", "--recording", "no-such-file.csv", "--out", &out]).expect("arguments");
+        let error = fly(&arguments).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("no-such-file.csv"), "{error}");
+        assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 0);
+    }
+}

@@ -1,0 +1,66 @@
+//! What flies the unit: its release image on the emulated board, or its code on this computer.
+//!
+//! Both take the same plant, faults and bench. Out: remarks on what befell the unit, as rows of the summary.
+
+use emems::unit::Settings;
+use emulated::{Image, image::ImageError};
+use twin::{
+    host,
+    part::Nanos,
+    plant::Plant,
+    run::{Bench, Scheduled},
+};
+
+/// Flies a plant, with faults, until an instant or until the bench says stop.
+pub type Flight = Box<dyn FnOnce(Plant, &[Scheduled], Nanos, &mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send>;
+
+/// A row of the summary.
+pub type Remark = (&'static str, String);
+
+/// Wired like the reference design.
+const BOARD: &str = "obc";
+
+/// Why a board could not fly.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardError {
+    /// There is no image.
+    #[error("there is no image to fly: {0}; --host flies without one")]
+    Image(#[from] ImageError),
+    /// The emulator gave up.
+    #[error(transparent)]
+    Emulated(#[from] emulated::Error),
+}
+
+/// The unit's code on this computer, in virtual time.
+pub fn host() -> Flight {
+    Box::new(|plant, faults, end, bench| {
+        let report = host::fly(plant, Settings::NOMINAL, faults, end, bench);
+        let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
+        Ok(resets.collect())
+    })
+}
+
+/// The release image on the emulated board; builds it first.
+///
+/// # Errors
+/// When it cannot be built.
+pub fn image() -> Result<Flight, BoardError> {
+    let image = emulated::image::build(BOARD)?;
+    Ok(on_emulated(image))
+}
+
+fn on_emulated(image: Image) -> Flight {
+    Box::new(move |plant, faults, end, bench| {
+        let report = emulated::fly(&image, plant, faults, end, bench)?;
+        let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
+        let unanswered = report
+            .unanswered
+            .iter()
+            .map(|access| ("unanswered access", access.clone()));
+        Ok(resets.chain(unanswered).collect())
+    })
+}
+
+fn reset(at: Nanos, cause: &dyn std::fmt::Debug) -> Remark {
+    ("reset", format!("{:.3} s, {cause:?}", 1e-9 * at as f64))
+}

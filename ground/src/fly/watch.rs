@@ -1,0 +1,220 @@
+//! Whoever watches a flight: keeps every byte, decodes the telemetry as it comes, passes the umbilical on.
+//!
+//! In: what both lines and the log say. Out: the folder, the figures, and commands to the unit. A folder that cannot be
+//! written stops the flight, and so does a console that was closed.
+
+use std::time::Duration;
+
+use emems::command::{Command, word_of};
+use twin::{
+    part::Nanos,
+    run::{Bench, Flow},
+};
+
+use super::progress::Progress;
+use crate::{
+    console::line::UnitEnd,
+    digest::{Digest, Entry},
+    envelope::Envelope,
+    folder::{Folder, FolderError},
+    summary::Summary,
+};
+
+/// [ns] when derived frames are asked for: the unit has long booted.
+const ASK_AT: Nanos = 300_000_000;
+
+/// What is left of a watched flight.
+pub struct Seen {
+    /// The folder, still open.
+    pub folder: Folder,
+    /// The figures.
+    pub summary: Summary,
+    /// What plots show.
+    pub envelope: Envelope,
+    /// Virtual time flown.
+    pub flown: Duration,
+    /// Wall time it took.
+    pub took: Duration,
+}
+
+/// Watches one flight.
+pub struct Watch {
+    folder: Folder,
+    digest: Digest,
+    progress: Progress,
+    console: Option<UnitEnd>,
+    ask_derived: bool,
+    packets: u64,
+    flown: Nanos,
+    failed: Option<FolderError>,
+    closed: bool,
+}
+
+impl Watch {
+    /// Before take-off. With a console, the umbilical is the console's to keep.
+    pub fn new(folder: Folder, progress: Progress, console: Option<UnitEnd>, ask_derived: bool) -> Self {
+        Watch {
+            folder,
+            digest: Digest::default(),
+            progress,
+            console,
+            ask_derived,
+            packets: 0,
+            flown: 0,
+            failed: None,
+            closed: false,
+        }
+    }
+
+    /// After landing.
+    ///
+    /// # Errors
+    /// When the folder could not be written at some time.
+    pub fn finish(self) -> Result<Seen, FolderError> {
+        let took = self.progress.finish();
+        if let Some(error) = self.failed {
+            return Err(error);
+        }
+        let mut folder = self.folder;
+        let (rest, summary, envelope) = self.digest.finish();
+        folder.entries(&rest)?;
+        Ok(Seen {
+            folder,
+            summary,
+            envelope,
+            flown: Duration::from_nanos(self.flown),
+            took,
+        })
+    }
+
+    fn keep(&mut self, kept: Result<(), FolderError>) {
+        if let Err(error) = kept {
+            self.failed.get_or_insert(error);
+        }
+    }
+
+    fn tell_console(&mut self, at: Nanos, bytes: &[u8]) {
+        if let Some(console) = &self.console {
+            self.closed |= console.send(Duration::from_nanos(at), bytes).is_err();
+        }
+    }
+}
+
+impl Bench for Watch {
+    fn telemetry(&mut self, at: Nanos, bytes: &[u8]) {
+        let entries = self.digest.push(Some(1e-9 * at as f64), bytes);
+        let packets = entries.iter().filter(|entry| matches!(entry, Entry::Packet { .. }));
+        self.packets += packets.count() as u64;
+        let kept = self
+            .folder
+            .telemetry(bytes)
+            .and_then(|()| self.folder.entries(&entries));
+        self.keep(kept);
+    }
+
+    fn umbilical(&mut self, at: Nanos, bytes: &[u8]) {
+        if self.console.is_some() {
+            self.tell_console(at, bytes);
+        } else {
+            let kept = self.folder.umbilical(bytes);
+            self.keep(kept);
+        }
+    }
+
+    fn log(&mut self, at: Nanos, line: &str) {
+        let kept = self.folder.log(1e-9 * at as f64, line);
+        self.keep(kept);
+    }
+
+    fn commands(&mut self, now: Nanos) -> Vec<u8> {
+        let mut commands = Vec::new();
+        if self.ask_derived && now >= ASK_AT {
+            self.ask_derived = false;
+            commands.extend(word_of(Command::DerivedOn));
+        }
+        if let Some(console) = &self.console {
+            commands.extend(console.commands());
+        }
+        commands
+    }
+
+    fn advanced(&mut self, now: Nanos) -> Flow {
+        self.flown = now;
+        self.progress.advanced(now, self.packets);
+        self.tell_console(now, &[]);
+        if self.closed || self.failed.is_some() {
+            Flow::Stop
+        } else {
+            Flow::Continue
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use emems::{packet::encode, sample::Reading};
+
+    use super::*;
+    use crate::{console::line, log::sequence::CYCLE_S};
+
+    const MILLISECOND: Nanos = 1_000_000;
+
+    fn watch(place: &std::path::Path, console: Option<UnitEnd>, ask_derived: bool) -> Watch {
+        let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
+        let progress = Progress::start(Duration::from_secs(60), false, true);
+        Watch::new(folder, progress, console, ask_derived)
+    }
+
+    #[test]
+    fn packets_are_timed_by_their_last_byte() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, false);
+        for (counter, at) in [(0, 14 * MILLISECOND), (1, 214 * MILLISECOND + 50_000)] {
+            let packet = encode(&Reading::unread(counter));
+            watch.telemetry(at - 1, &packet[..155]);
+            watch.telemetry(at, &packet[155..]);
+        }
+        let seen = watch.finish().expect("seen");
+        assert_eq!(seen.summary.period_s.count, 1);
+        assert!(
+            (seen.summary.period_s.mean - 0.200_05).abs() < 1e-12,
+            "{:?}",
+            seen.summary.period_s
+        );
+    }
+
+    #[test]
+    fn derived_frames_are_asked_for_once_and_not_before_the_unit_listens() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, true);
+        assert_eq!(watch.commands(MILLISECOND), b"");
+        assert_eq!(watch.commands(ASK_AT), b"G_DL");
+        assert_eq!(watch.commands(ASK_AT + MILLISECOND), b"");
+    }
+
+    #[test]
+    fn a_console_hears_the_umbilical_speaks_and_ends_the_flight_when_closed() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let (mut line, unit) = line::channel("flying");
+        let mut watch = watch(place.path(), Some(unit), false);
+        watch.umbilical(7 * MILLISECOND, b">up\n");
+        let heard = line::Line::hear(&mut line, Duration::ZERO);
+        assert!(matches!(heard, line::Heard::Bytes { bytes, .. } if bytes == b">up\n"));
+        line::Line::say(&mut line, b"G_ST").expect("say");
+        assert_eq!(watch.commands(8 * MILLISECOND), b"G_ST");
+        assert_eq!(watch.advanced(9 * MILLISECOND), Flow::Continue);
+        drop(line);
+        assert_eq!(watch.advanced(10 * MILLISECOND), Flow::Stop);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_stops_the_flight_and_is_named() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let mut watch = watch(place.path(), None, false);
+        std::fs::write(watch.folder.path().join("packets.txt"), "not ours").expect("write");
+        watch.telemetry(MILLISECOND, b"@");
+        assert_eq!(watch.advanced(MILLISECOND), Flow::Stop);
+        let error = watch.finish().err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("packets.txt cannot be written"), "{error}");
+    }
+}
