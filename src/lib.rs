@@ -12,6 +12,14 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+/// A line for whoever listens with a debug probe: defmt on the board, nothing on a host.
+macro_rules! log_line {
+    ($text:expr) => {
+        #[cfg(target_os = "none")]
+        defmt::info!("{=str}", $text);
+    };
+}
+
 pub mod board;
 pub mod budget;
 pub mod command;

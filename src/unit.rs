@@ -11,6 +11,7 @@
 //! They share [`Shared`], which lives in this future; nothing is global.
 
 mod acquire;
+mod clock;
 mod estimate;
 mod gyros;
 mod inputs;
@@ -21,6 +22,8 @@ mod shared;
 mod telemetry;
 mod umbilical;
 mod vote;
+
+use core::pin::pin;
 
 use embassy_futures::join;
 
@@ -94,7 +97,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     let crash = parts.retained.take_crash();
     let shared = Shared::new(settings, parts.reset, resume, crash);
     let switch = Switch::new(parts.sensor_bus);
-    let gyros = Gyros::new(parts.gyros, settings);
+    let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();
     let link = join::join4(
         telemetry::run::<B>(&shared, &votes, parts.telemetry),
@@ -110,9 +113,9 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     );
     let care = join::join(
         self_test::run::<B>(&shared, &switch, &gyros),
-        vote::run::<B>(&votes, parts.watchdog),
+        vote::run::<B>(&shared.clock, &votes, parts.watchdog),
     );
-    join::join3(link, data, care).await;
+    shared.clock.drive(pin!(join::join3(link, data, care))).await;
     // Every part runs for ever; should one end, the vote is missing and the watchdog restarts the unit.
     core::future::pending().await
 }

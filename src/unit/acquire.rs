@@ -9,13 +9,14 @@
 
 use core::fmt::Display;
 
-use embassy_time::{Duration, Instant, TimeoutError, Timer, with_timeout};
+use embassy_time::{Duration, Instant};
 
 use super::{
+    clock::TimedOut,
     gyros::Gyros,
     plates::{Plates, Taken},
     shared::{Cycle, Shared},
-    vote::{Voter, Votes, WAKE_MS},
+    vote::{Voter, Votes},
 };
 use crate::{
     board::{Board, ResetCause, Retained},
@@ -46,7 +47,7 @@ pub async fn run<B: Board>(
     shared: &Shared,
     votes: &Votes,
     switch: &Switch<B::SensorBus>,
-    gyros: &Gyros<B::Gyro>,
+    gyros: &Gyros<'_, B::Gyro>,
     mut retained: B::Retained,
 ) {
     let mut acquisition = Acquisition::<B> {
@@ -59,8 +60,8 @@ pub async fn run<B: Board>(
         health: Health::default(),
     };
     if shared.reset == ResetCause::PowerOn {
-        Timer::at(Instant::from_millis(GYRO_START_MS)).await;
-        votes.cast(Voter::Acquire);
+        let started = shared.clock.until(Instant::from_millis(GYRO_START_MS));
+        votes.waiting(Voter::Acquire, started).await;
     }
     for slot in 0..SENSOR_COUNT {
         acquisition
@@ -75,9 +76,9 @@ pub async fn run<B: Board>(
     let mut start = Instant::now() + Duration::from_millis(1);
     let mut verified = 0;
     loop {
-        wait_until(start, votes).await;
+        votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
         let cycle = acquisition.cycle(counter, start).await;
-        wait_until(start + close, votes).await;
+        votes.waiting(Voter::Acquire, shared.clock.until(start + close)).await;
         counter = counter.wrapping_add(1);
         shared.publish_cycle(cycle);
         let (mode, recording) = {
@@ -99,34 +100,22 @@ pub async fn run<B: Board>(
     }
 }
 
-/// Sleeps until `at`, voting meanwhile.
-async fn wait_until(at: Instant, votes: &Votes) {
-    loop {
-        votes.cast(Voter::Acquire);
-        let wake = at.min(Instant::now() + Duration::from_millis(WAKE_MS));
-        Timer::at(wake).await;
-        if wake == at {
-            return;
-        }
-    }
-}
-
-struct Acquisition<'a, B: Board> {
+struct Acquisition<'a, 'c, B: Board> {
     shared: &'a Shared,
     switch: &'a Switch<B::SensorBus>,
     plates: Plates<'a, B::SensorBus>,
-    gyros: &'a Gyros<B::Gyro>,
+    gyros: &'a Gyros<'c, B::Gyro>,
     budget: Budget,
     standing: [Standing; SENSOR_COUNT],
     health: Health,
 }
 
-impl<B: Board> Acquisition<'_, B> {
+impl<B: Board> Acquisition<'_, '_, B> {
     /// One read cycle.
     async fn cycle(&mut self, counter: u16, start: Instant) -> Cycle {
         let mut reading = Reading::unread(counter);
         let mut slots_us = [NO_SLOT; SENSOR_COUNT];
-        for slot in 0..SENSOR_COUNT {
+        for (slot, slot_us) in slots_us.iter_mut().enumerate() {
             let elapsed_us = start.elapsed().as_micros();
             let waiting = (SENSOR_COUNT - 1 - slot) as u64;
             let lost = self.standing[slot] == Standing::Lost;
@@ -139,7 +128,7 @@ impl<B: Board> Acquisition<'_, B> {
             } else if lost {
                 self.configure(slot, limit_us).await;
             } else if self.read(slot, limit_us, &mut reading).await {
-                slots_us[slot] = elapsed_us as u32;
+                *slot_us = elapsed_us as u32;
                 reading.errors.remove(slot);
             }
         }
@@ -162,7 +151,7 @@ impl<B: Board> Acquisition<'_, B> {
         let limit = Duration::from_micros(limit_us);
         let sensor = SENSORS[slot];
         if sensor.kind == Kind::Gyro {
-            let taken = with_timeout(limit, self.gyros.read(sensor.plate)).await;
+            let taken = self.shared.clock.within(limit, self.gyros.read(sensor.plate)).await;
             let Some((rate, temperature)) = self.settle(slot, taken).await else {
                 return false;
             };
@@ -171,7 +160,7 @@ impl<B: Board> Acquisition<'_, B> {
             reading.gyro_temperature[sensor.plate] = temperature;
             return true;
         }
-        let taken = with_timeout(limit, self.plates.read(sensor)).await;
+        let taken = self.shared.clock.within(limit, self.plates.read(sensor)).await;
         let Some(taken): Option<Taken> = self.settle(slot, taken).await else {
             return false;
         };
@@ -190,11 +179,15 @@ impl<B: Board> Acquisition<'_, B> {
         let sensor = SENSORS[slot];
         let known = match sensor.kind {
             Kind::Gyro => {
-                let done = with_timeout(limit, self.gyros.configure(sensor.plate)).await;
+                let done = self
+                    .shared
+                    .clock
+                    .within(limit, self.gyros.configure(sensor.plate))
+                    .await;
                 self.settle(slot, done).await.is_some()
             }
             _ => {
-                let done = with_timeout(limit, self.plates.configure(sensor)).await;
+                let done = self.shared.clock.within(limit, self.plates.configure(sensor)).await;
                 self.settle(slot, done).await.is_some()
             }
         };
@@ -212,11 +205,11 @@ impl<B: Board> Acquisition<'_, B> {
         }
         let kept = match sensor.kind {
             Kind::Gyro => {
-                let kept = with_timeout(limit, self.gyros.verify(sensor.plate)).await;
+                let kept = self.shared.clock.within(limit, self.gyros.verify(sensor.plate)).await;
                 self.settle(slot, kept).await.is_some()
             }
             _ => {
-                let kept = with_timeout(limit, self.plates.verify(sensor)).await;
+                let kept = self.shared.clock.within(limit, self.plates.verify(sensor)).await;
                 self.settle(slot, kept).await.is_some()
             }
         };
@@ -227,11 +220,11 @@ impl<B: Board> Acquisition<'_, B> {
     }
 
     /// The value, if there is one; otherwise the sensor is lost, and after a timeout the bus is freed.
-    async fn settle<T, E: Display>(&mut self, slot: usize, outcome: Result<Result<T, E>, TimeoutError>) -> Option<T> {
+    async fn settle<T, E: Display>(&mut self, slot: usize, outcome: Result<Result<T, E>, TimedOut>) -> Option<T> {
         match outcome {
             Ok(Ok(value)) => return Some(value),
             Ok(Err(error)) => self.lose(slot, &error),
-            Err(TimeoutError) => {
+            Err(TimedOut) => {
                 self.lose(slot, &"no answer in time");
                 if SENSORS[slot].kind != Kind::Gyro {
                     self.health = self.health.with(Health::BUS_RECOVERED);

@@ -1,10 +1,8 @@
 //! What is derived from a cycle.
 
-use embassy_time::{Duration, with_timeout};
-
 use super::{
     shared::{Cycle, Shared},
-    vote::{Voter, Votes, WAKE_MS},
+    vote::{Voter, Votes},
 };
 use crate::{
     derived::{Derived, Health},
@@ -17,11 +15,9 @@ pub async fn run(shared: &Shared, votes: &Votes) {
         return;
     };
     loop {
-        votes.cast(Voter::Estimate);
-        if let Ok(cycle) = with_timeout(Duration::from_millis(WAKE_MS), cycles.next_message_pure()).await {
-            let state = *shared.state.borrow();
-            shared.publish_derived(derive(&cycle, state, shared.recorder_refused.get()));
-        }
+        let cycle = votes.waiting(Voter::Estimate, cycles.next_message_pure()).await;
+        let state = *shared.state.borrow();
+        shared.publish_derived(derive(&cycle, state, shared.recorder_refused.get()));
     }
 }
 

@@ -7,11 +7,12 @@
 use core::cell::Cell;
 
 use embassy_sync::{blocking_mutex::raw::NoopRawMutex, mutex::Mutex};
-use embassy_time::{Delay, Duration, Instant, Ticker, Timer, with_timeout};
+use embassy_time::{Duration, Instant};
 use embedded_hal_async::spi::SpiDevice;
 
 use super::{
     Settings,
+    clock::Clock,
     shared::Shared,
     vote::{Voter, Votes},
 };
@@ -22,12 +23,15 @@ use crate::{
     sample::NOT_READ,
     sensor::{
         Error,
-        adis16265::{self, Adis16265, Output, STALL_US},
+        adis16265::{self, Adis16265, Output, STALL_US, diagnosis::Diagnosis},
     },
 };
 
 /// [ms] the longest all four may take.
 const FAST_LIMIT_MS: u64 = 2;
+
+/// [ms] between looks at a running self-test.
+const TEST_POLL_MS: u64 = 10;
 
 /// Pause between two frames of one part.
 const STALL: Duration = Duration::from_micros(STALL_US as u64);
@@ -36,8 +40,9 @@ const STALL: Duration = Duration::from_micros(STALL_US as u64);
 const SATURATED_COUNTS: u16 = 4368;
 
 /// The gyros of plates 1 to 4.
-pub struct Gyros<SPI> {
-    parts: Mutex<NoopRawMutex, [Adis16265<SPI, Delay>; 4]>,
+pub struct Gyros<'a, SPI> {
+    parts: Mutex<NoopRawMutex, [Adis16265<SPI, &'a Clock>; 4]>,
+    clock: &'a Clock,
     config: adis16265::Config,
     /// Bit set: the gyro of that plate is configured and answers.
     answering: Cell<u8>,
@@ -46,11 +51,12 @@ pub struct Gyros<SPI> {
     health: Cell<Health>,
 }
 
-impl<SPI: SpiDevice<u16>> Gyros<SPI> {
+impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     /// The gyros on their chip selects.
-    pub fn new(selects: [SPI; 4], settings: Settings) -> Self {
+    pub fn new(selects: [SPI; 4], settings: Settings, clock: &'a Clock) -> Self {
         Gyros {
-            parts: Mutex::new(selects.map(|select| Adis16265::new(select, Delay))),
+            parts: Mutex::new(selects.map(|select| Adis16265::new(select, clock))),
+            clock,
             config: settings.gyro(),
             answering: Cell::new(0),
             last_frame: Cell::new(Instant::MIN),
@@ -61,25 +67,33 @@ impl<SPI: SpiDevice<u16>> Gyros<SPI> {
     /// Identifies and configures the gyro of a plate.
     pub async fn configure(&self, plate: usize) -> Result<(), Error<SPI::Error>> {
         let configured = self.parts.lock().await[plate].configure(self.config).await;
-        self.settle(plate, configured)
+        self.rest(plate, configured)
     }
 
     /// Finds a gyro that has lost its settings.
     pub async fn verify(&self, plate: usize) -> Result<(), Error<SPI::Error>> {
         let kept = self.parts.lock().await[plate].verify(self.config).await;
-        self.settle(plate, kept)
+        self.rest(plate, kept)
     }
 
-    /// Tests a gyro with its own stimulus, as far as it can.
-    pub async fn self_test(&self, plate: usize) -> Result<(), Error<SPI::Error>> {
-        let tested = self.parts.lock().await[plate].verify(self.config).await; // SELFTEST
-        self.settle(plate, tested)
+    /// Lets a gyro test itself; the others are read meanwhile. It is not sampled again before it is configured.
+    pub async fn self_test(&self, plate: usize) -> Result<Diagnosis, Error<SPI::Error>> {
+        self.answers(plate, false);
+        self.parts.lock().await[plate].start_self_test().await?;
+        loop {
+            self.clock
+                .until(Instant::now() + Duration::from_millis(TEST_POLL_MS))
+                .await;
+            if let Some(diagnosis) = self.parts.lock().await[plate].self_test_result().await? {
+                return Ok(diagnosis);
+            }
+        }
     }
 
     /// [counts] rate and temperature of a plate's gyro.
     pub async fn read(&self, plate: usize) -> Result<(i16, i16), Error<SPI::Error>> {
         let read = self.parts.lock().await[plate].read_rate_and_temperature().await;
-        let (rate, temperature) = self.settle(plate, read)?;
+        let (rate, temperature) = self.rest(plate, read)?;
         self.note(rate);
         Ok((rate.counts, temperature.counts))
     }
@@ -94,14 +108,16 @@ impl<SPI: SpiDevice<u16>> Gyros<SPI> {
         let mut parts = self.parts.lock().await;
         let answering = self.answering.get();
         let is_answering = |plate: &usize| answering >> plate & 1 == 1;
-        Timer::at(self.last_frame.get() + STALL).await;
+        self.clock.until(self.last_frame.get() + STALL).await;
         let asked = Instant::now();
         for plate in (0..4).filter(is_answering) {
             let request = parts[plate].request(adis16265::GYRO_OUT).await;
             let _ = self.settle(plate, request);
         }
         // Four frames are longer than the pause; fewer may not be.
-        Timer::at(asked + STALL).await;
+        if answering != 0xF {
+            self.clock.until(asked + STALL).await;
+        }
         let mut counts = [NOT_READ; 4];
         for plate in (0..4).filter(is_answering) {
             let answer = parts[plate].exchange(adis16265::GYRO_OUT).await;
@@ -113,7 +129,6 @@ impl<SPI: SpiDevice<u16>> Gyros<SPI> {
                 counts[plate] = rate.counts;
             }
         }
-        self.last_frame.set(Instant::now());
         (asked, counts)
     }
 
@@ -123,23 +138,33 @@ impl<SPI: SpiDevice<u16>> Gyros<SPI> {
         self.health.set(health.with_if(Health::GYRO_SATURATED, saturated));
     }
 
+    /// As [`Gyros::settle`], after frames outside a fast sample, which will have to pause before its own.
+    fn rest<T>(&self, plate: usize, outcome: Result<T, Error<SPI::Error>>) -> Result<T, Error<SPI::Error>> {
+        self.last_frame.set(Instant::now());
+        self.settle(plate, outcome)
+    }
+
     /// Keeps whether the gyro of a plate answers.
     fn settle<T>(&self, plate: usize, outcome: Result<T, Error<SPI::Error>>) -> Result<T, Error<SPI::Error>> {
-        let others = self.answering.get() & !(1 << plate);
-        self.answering.set(others | u8::from(outcome.is_ok()) << plate);
-        self.last_frame.set(Instant::now());
+        self.answers(plate, outcome.is_ok());
         outcome
+    }
+
+    fn answers(&self, plate: usize, answering: bool) {
+        let others = self.answering.get() & !(1 << plate);
+        self.answering.set(others | u8::from(answering) << plate);
     }
 }
 
 /// Samples fast for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<B::Gyro>) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>) {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
-    let mut ticks = Ticker::every(interval);
+    let limit = Duration::from_millis(FAST_LIMIT_MS);
+    let mut tick = Instant::now();
     loop {
-        votes.cast(Voter::Gyros);
-        ticks.next().await;
-        if let Ok((at, counts)) = with_timeout(Duration::from_millis(FAST_LIMIT_MS), gyros.fast()).await {
+        tick += interval;
+        votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;
+        if let Ok((at, counts)) = shared.clock.within(limit, gyros.fast()).await {
             shared.integrator.borrow_mut().add(Fast {
                 at_us: at.as_micros(),
                 counts,

@@ -1,6 +1,6 @@
 //! Lift-off and micro-g, debounced; lift-off begins FLIGHT.
 
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Instant};
 
 use super::{
     shared::Shared,
@@ -14,14 +14,14 @@ use crate::{
 /// Polls for ever.
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discretes) {
     let (mut lift_off, mut micro_g) = (Debounce::default(), Debounce::default());
-    let mut polls = Ticker::every(Duration::from_micros(POLL_US));
+    let mut poll = Instant::now();
     loop {
-        votes.cast(Voter::Inputs);
         let levels = (lift_off.poll(lines.lift_off()), micro_g.poll(lines.micro_g()));
         shared.discretes.set(levels);
         if shared.state.borrow_mut().lift_off(levels.0) {
             shared.say(format_args!("lift-off: FLIGHT, recording"));
         }
-        polls.next().await;
+        poll += Duration::from_micros(POLL_US);
+        votes.waiting(Voter::Inputs, shared.clock.until(poll)).await;
     }
 }

@@ -1,10 +1,10 @@
 //! The recorder's part: packets into it while recording, records out of it while dumping, and erasing in free time.
 
-use embassy_time::{Duration, with_timeout};
+use embassy_time::Duration;
 
 use super::{
     shared::Shared,
-    vote::{Voter, Votes, WAKE_MS},
+    vote::{Voter, Votes},
 };
 use crate::{
     board::Board,
@@ -15,17 +15,20 @@ use crate::{
 /// [ms] while dumping or erasing, how long to wait for a cycle before the next step.
 const STEP_MS: u64 = 1;
 
+/// [ms] otherwise, how long an order to erase or dump may wait.
+const IDLE_MS: u64 = 100;
+
 /// Serves the recorder for ever.
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut recorder: B::Recorder) {
     let Some(mut cycles) = shared.cycle_reader() else {
         return;
     };
     loop {
-        votes.cast(Voter::Record);
         shared.recorder.set(recorder.status());
         let busy = step(shared, &mut recorder).await;
-        let wait = Duration::from_millis(if busy { STEP_MS } else { WAKE_MS });
-        let Ok(cycle) = with_timeout(wait, cycles.next_message_pure()).await else {
+        let wait = Duration::from_millis(if busy { STEP_MS } else { IDLE_MS });
+        let next = shared.clock.within(wait, cycles.next_message_pure());
+        let Ok(cycle) = votes.waiting(Voter::Record, next).await else {
             continue;
         };
         if shared.state.borrow().recording {

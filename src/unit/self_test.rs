@@ -4,14 +4,15 @@
 
 use core::fmt::Display;
 
-use embassy_time::{Delay, Duration, TimeoutError, with_timeout};
+use embassy_time::Duration;
 
-use super::{gyros::Gyros, shared::Shared};
+use super::{clock::TimedOut, gyros::Gyros, shared::Shared};
 use crate::{
     board::Board,
     mode::Mode,
     sample::{Kind, SENSORS, Sensor},
     sensor::{
+        adis16265::diagnosis::Flag,
         hmc5883l::{Hmc5883l, self_test::Bias},
         lis331hh::Lis331hh,
         tca9548a::Switch,
@@ -22,7 +23,7 @@ use crate::{
 const LIMIT_MS: u64 = 600;
 
 /// Tests whenever asked.
-pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros: &Gyros<B::Gyro>) {
+pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros: &Gyros<'_, B::Gyro>) {
     loop {
         shared.self_test_ordered.wait().await;
         let mut passed = 0;
@@ -43,36 +44,45 @@ pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros
 async fn test<B: Board>(
     shared: &Shared,
     switch: &Switch<B::SensorBus>,
-    gyros: &Gyros<B::Gyro>,
+    gyros: &Gyros<'_, B::Gyro>,
     sensor: Sensor,
 ) -> bool {
     let limit = Duration::from_millis(LIMIT_MS);
     let channel = switch.channel(sensor.plate as u8);
-    let mut delay = Delay;
+    let mut delay = &shared.clock;
     match sensor.kind {
         Kind::Accelerometer => {
             let mut part = Lis331hh::new(channel);
             let test = part.self_test(shared.settings.accelerometer(), &mut delay);
-            report(shared, sensor, with_timeout(limit, test).await).await
+            report(shared, sensor, shared.clock.within(limit, test).await).await
         }
         Kind::Magnetometer => {
             let mut part = Hmc5883l::new(channel);
             let test = part.self_test(shared.settings.magnetometer(), Bias::Positive, &mut delay);
-            report(shared, sensor, with_timeout(limit, test).await).await
+            report(shared, sensor, shared.clock.within(limit, test).await).await
         }
-        Kind::Gyro => report(shared, sensor, with_timeout(limit, gyros.self_test(sensor.plate)).await).await,
+        Kind::Gyro => {
+            let outcome = shared.clock.within(limit, gyros.self_test(sensor.plate)).await;
+            if let Ok(Ok(diagnosis)) = outcome
+                && diagnosis.contains(Flag::SelfTest)
+            {
+                shared.tell(format_args!("G_AT {sensor} failed: {diagnosis}")).await;
+                return false;
+            }
+            report(shared, sensor, outcome).await
+        }
         Kind::Thermometer => {
             let mut part = crate::sensor::tmp102::Tmp102::new(channel);
-            report(shared, sensor, with_timeout(limit, part.probe()).await).await
+            report(shared, sensor, shared.clock.within(limit, part.probe()).await).await
         }
     }
 }
 
-async fn report<T, E: Display>(shared: &Shared, sensor: Sensor, outcome: Result<Result<T, E>, TimeoutError>) -> bool {
+async fn report<T, E: Display>(shared: &Shared, sensor: Sensor, outcome: Result<Result<T, E>, TimedOut>) -> bool {
     match &outcome {
         Ok(Ok(_)) => shared.tell(format_args!("G_AT {sensor} ok")).await,
         Ok(Err(error)) => shared.tell(format_args!("G_AT {sensor} failed: {error}")).await,
-        Err(TimeoutError) => {
+        Err(TimedOut) => {
             shared
                 .tell(format_args!("G_AT {sensor} failed: no answer in time"))
                 .await

@@ -10,7 +10,7 @@ use embassy_sync::{
 };
 use heapless::String;
 
-use super::Settings;
+use super::{Settings, clock::Clock};
 use crate::{
     board::ResetCause,
     crash::CrashRecord,
@@ -57,6 +57,8 @@ pub type DumpedPacket = [u8; PACKET_BYTES];
 
 /// The shared state. Everything in it is touched between two awaits only.
 pub struct Shared {
+    /// The clock all parts wait on.
+    pub clock: Clock,
     /// What was chosen.
     pub settings: Settings,
     /// Why the unit started.
@@ -97,6 +99,7 @@ impl Shared {
     /// The state at start.
     pub fn new(settings: Settings, reset: ResetCause, resume: Option<Resume>, crash: Option<CrashRecord>) -> Self {
         Shared {
+            clock: Clock::new(),
             settings,
             reset,
             resume,
@@ -163,5 +166,6 @@ fn line(text: core::fmt::Arguments<'_>) -> Line {
     }
     let mut cut = Cut(Line::new());
     let _ = core::fmt::Write::write_fmt(&mut cut, text);
+    log_line!(cut.0.as_str());
     cut.0
 }

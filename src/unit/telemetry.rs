@@ -1,12 +1,13 @@
 //! Every new packet to the telemetry line, in every mode, and derived frames when they are on.
 
 use embassy_futures::select::{Either, select};
-use embassy_time::{Duration, with_timeout};
+use embassy_time::Duration;
 use embedded_io_async::Write;
 
 use super::{
+    clock::Clock,
     shared::Shared,
-    vote::{Voter, Votes, WAKE_MS},
+    vote::{Voter, Votes},
 };
 use crate::{board::Board, derived};
 
@@ -19,19 +20,20 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Telemetr
         return;
     };
     loop {
-        votes.cast(Voter::Telemetry);
         let next = select(cycles.next_message_pure(), frames.next_message_pure());
-        match with_timeout(Duration::from_millis(WAKE_MS), next).await {
-            Ok(Either::First(cycle)) => write(&mut line, &cycle.packet).await,
-            Ok(Either::Second(frame)) if shared.state.borrow().derived => {
-                write(&mut line, &derived::encode(&frame)).await;
+        match votes.waiting(Voter::Telemetry, next).await {
+            Either::First(cycle) => write(&shared.clock, &mut line, &cycle.packet).await,
+            Either::Second(frame) if shared.state.borrow().derived => {
+                write(&shared.clock, &mut line, &derived::encode(&frame)).await;
             }
-            _ => {}
+            Either::Second(_) => {}
         }
     }
 }
 
 /// One whole frame or, when the line is stuck, its loss.
-pub(super) async fn write(line: &mut impl Write, bytes: &[u8]) {
-    let _ = with_timeout(Duration::from_millis(WRITE_MS), line.write_all(bytes)).await;
+pub(super) async fn write(clock: &Clock, line: &mut impl Write, bytes: &[u8]) {
+    let _ = clock
+        .within(Duration::from_millis(WRITE_MS), line.write_all(bytes))
+        .await;
 }

@@ -3,13 +3,13 @@
 //! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
 
 use embassy_futures::select::{Either4, select4};
-use embassy_time::{Duration, Instant, with_timeout};
+use embassy_time::Instant;
 use embedded_io_async::Read;
 
 use super::{
     shared::Shared,
     telemetry::write,
-    vote::{Voter, Votes, WAKE_MS},
+    vote::{Voter, Votes},
 };
 use crate::{
     board::Board,
@@ -35,29 +35,28 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
         shared.reset
     ));
     loop {
-        votes.cast(Voter::UmbilicalSend);
         let next = select4(
             shared.replies.receive(),
             shared.dumped.receive(),
             cycles.next_message_pure(),
             frames.next_message_pure(),
         );
-        let Ok(next) = with_timeout(Duration::from_millis(WAKE_MS), next).await else {
-            continue;
-        };
+        let next = votes.waiting(Voter::UmbilicalSend, next).await;
         let (sending, derived_on) = {
             let state = shared.state.borrow();
             (state.task == Task::SendPackets, state.derived)
         };
         match next {
             Either4::First(reply) => {
-                write(&mut line, b">").await;
-                write(&mut line, reply.as_bytes()).await;
-                write(&mut line, b"\r\n").await;
+                write(&shared.clock, &mut line, b">").await;
+                write(&shared.clock, &mut line, reply.as_bytes()).await;
+                write(&shared.clock, &mut line, b"\r\n").await;
             }
-            Either4::Second(packet) => write(&mut line, &packet).await,
-            Either4::Third(cycle) if sending => write(&mut line, &cycle.packet).await,
-            Either4::Fourth(frame) if sending && derived_on => write(&mut line, &derived::encode(&frame)).await,
+            Either4::Second(packet) => write(&shared.clock, &mut line, &packet).await,
+            Either4::Third(cycle) if sending => write(&shared.clock, &mut line, &cycle.packet).await,
+            Either4::Fourth(frame) if sending && derived_on => {
+                write(&shared.clock, &mut line, &derived::encode(&frame)).await
+            }
             _ => {}
         }
     }
@@ -69,14 +68,12 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
     let mut lost = 0_u32;
     let mut bytes = [0; 32];
     loop {
-        votes.cast(Voter::UmbilicalListen);
-        let heard = match with_timeout(Duration::from_millis(WAKE_MS), line.read(&mut bytes)).await {
-            Ok(Ok(count)) => bytes.get(..count).unwrap_or_default(),
-            Ok(Err(_)) => {
+        let heard = match votes.waiting(Voter::UmbilicalListen, line.read(&mut bytes)).await {
+            Ok(count) => bytes.get(..count).unwrap_or_default(),
+            Err(_) => {
                 lost = lost.saturating_add(1);
                 &[]
             }
-            Err(_) => continue,
         };
         for byte in heard {
             if let Some(heard) = parser.hear(*byte, Instant::now().as_micros()) {

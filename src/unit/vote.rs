@@ -1,12 +1,20 @@
 //! The watchdog is fed only while every part of the unit is alive.
 //!
-//! A part votes each time it comes round its loop. It is alive while its last vote is younger than its allowance; one
-//! that waits for ever, or never yields, lets the watchdog bite (fault U1; after F Prime's `Svc::Health`).
+//! Every [`ASK_MS`] all parts are asked; the watchdog is fed, and they are asked again, when all have answered. A part
+//! answers whenever it waits for its next work, so one that waits for anything else for ever, or never yields, lets the
+//! watchdog bite (fault U1; after F Prime's `Svc::Health`).
 
-use core::cell::Cell;
+use core::{
+    cell::Cell,
+    future::Future,
+    pin::Pin,
+    task::{Context, Poll},
+};
 
-use embassy_time::{Duration, Instant, Timer};
+use embassy_time::{Duration, Instant};
+use pin_project_lite::pin_project;
 
+use super::clock::Clock;
 use crate::board::{Board, Watchdog};
 
 /// A part of the unit.
@@ -22,58 +30,92 @@ pub enum Voter {
     Record,
 }
 
-const VOTERS: usize = 8;
+const ALL: u8 = u8::MAX;
 
-/// [ms] how old a vote may be. Parts that wait for packets, lines or bytes wake at least every [`WAKE_MS`].
-const ALLOWANCE_MS: u64 = 400;
+/// [ms] between questions, as long as all answer. A part may be busy for 190 ms; the watchdog bites after 1 s.
+const ASK_MS: u64 = 100;
 
-/// [ms] longest a part may sleep without a vote.
-pub const WAKE_MS: u64 = 100;
-
-const FEED_MS: u64 = 50;
-
-/// When each part voted last.
+/// Who has answered since all were asked.
 #[derive(Default)]
 pub struct Votes {
-    last_ms: [Cell<u64>; VOTERS],
+    answered: Cell<u8>,
 }
 
 impl Votes {
-    /// Says that `voter` is alive.
-    pub fn cast(&self, voter: Voter) {
-        self.last_ms[voter as usize].set(Instant::now().as_millis());
+    /// What `work` gives. While it is waited for, `voter` answers.
+    pub fn waiting<F: Future>(&self, voter: Voter, work: F) -> Waiting<'_, F> {
+        Waiting {
+            work,
+            votes: self,
+            voter,
+        }
     }
 
-    fn all_alive(&self, now_ms: u64) -> bool {
-        self.last_ms
-            .iter()
-            .all(|last_ms| now_ms.saturating_sub(last_ms.get()) <= ALLOWANCE_MS)
+    fn answer(&self, voter: Voter) {
+        self.answered.set(self.answered.get() | 1 << voter as u8);
+    }
+}
+
+pin_project! {
+    /// [`Votes::waiting`]. Not an `async fn`: that would hold its future twice.
+    pub struct Waiting<'a, F> {
+        #[pin]
+        work: F,
+        votes: &'a Votes,
+        voter: Voter,
+    }
+}
+
+impl<F: Future> Future for Waiting<'_, F> {
+    type Output = F::Output;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<F::Output> {
+        let this = self.project();
+        this.votes.answer(*this.voter);
+        this.work.poll(context)
     }
 }
 
 /// Feeds the watchdog while every part is alive.
-pub async fn run<B: Board>(votes: &Votes, mut watchdog: B::Watchdog) {
+///
+/// The question needs no wake of its own: this part's alarm polls the whole unit, and with it every part that waits.
+pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog) {
     loop {
-        if votes.all_alive(Instant::now().as_millis()) {
+        clock.until(Instant::now() + Duration::from_millis(ASK_MS)).await;
+        if votes.answered.get() == ALL {
+            votes.answered.set(0);
             watchdog.feed();
         }
-        Timer::after(Duration::from_millis(FEED_MS)).await;
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use core::future::{pending, ready};
+
+    use embassy_futures::{block_on, select::select};
+
     use super::*;
 
+    const VOTERS: [Voter; 8] = [
+        Voter::Acquire,
+        Voter::Gyros,
+        Voter::Telemetry,
+        Voter::UmbilicalSend,
+        Voter::UmbilicalListen,
+        Voter::Inputs,
+        Voter::Estimate,
+        Voter::Record,
+    ];
+
     #[test]
-    fn one_silent_part_is_enough_to_starve_the_watchdog() {
+    fn a_part_that_waits_answers_and_one_that_never_comes_round_is_missed() {
         let votes = Votes::default();
-        assert!(votes.all_alive(ALLOWANCE_MS));
-        for last_ms in &votes.last_ms[1..] {
-            last_ms.set(1000);
+        for voter in &VOTERS[1..] {
+            block_on(select(votes.waiting(*voter, pending::<()>()), ready(())));
         }
-        assert!(!votes.all_alive(1000));
-        votes.last_ms[0].set(1000);
-        assert!(votes.all_alive(1000 + ALLOWANCE_MS));
+        assert_ne!(votes.answered.get(), ALL);
+        block_on(votes.waiting(VOTERS[0], ready(())));
+        assert_eq!(votes.answered.get(), ALL);
     }
 }

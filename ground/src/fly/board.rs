@@ -45,7 +45,7 @@ pub fn host() -> Flight {
 /// # Errors
 /// When it cannot be built.
 pub fn image() -> Result<Flight, BoardError> {
-    let image = emulated::image::build(BOARD)?;
+    let image = emulated::image::build()?;
     Ok(on_emulated(image))
 }
 

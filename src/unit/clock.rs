@@ -1,0 +1,120 @@
+//! The unit's waiting: one alarm for all its parts.
+//!
+//! The parts are one future, so each wake polls all of them. With a timer each, every wake would read the hardware clock
+//! and set its alarm a dozen times. Instead [`Clock::drive`] reads the clock once before it polls the parts; their waits
+//! compare with that reading and say how long they still want to sleep, and the earliest becomes the one alarm.
+//!
+//! Instants that are kept as data (slot times, fast samples) are read from the hardware clock itself.
+
+use core::{
+    cell::Cell,
+    future::{Future, poll_fn},
+    pin::{Pin, pin},
+    task::{Context, Poll},
+};
+
+use embassy_time::{Duration, Instant, Timer};
+use embedded_hal_async::delay::DelayNs;
+use pin_project_lite::pin_project;
+
+/// The reading of this poll, and the earliest instant that anyone waits for.
+pub struct Clock {
+    now: Cell<Instant>,
+    next: Cell<Instant>,
+}
+
+/// Time was up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimedOut;
+
+impl Clock {
+    /// A clock that starts now.
+    pub fn new() -> Self {
+        Clock {
+            now: Cell::new(Instant::now()),
+            next: Cell::new(Instant::MAX),
+        }
+    }
+
+    /// Runs the parts that wait on this clock.
+    pub async fn drive<F: Future>(&self, mut parts: Pin<&mut F>) -> F::Output {
+        poll_fn(|context| {
+            self.now.set(Instant::now());
+            self.next.set(Instant::MAX);
+            let polled = parts.as_mut().poll(context);
+            if polled.is_pending() && self.next.get() != Instant::MAX {
+                // One poll sets the alarm; when it rings, the parts are polled and say what they wait for next.
+                let alarm = pin!(Timer::at(self.next.get()));
+                let _ = alarm.poll(context);
+            }
+            polled
+        })
+        .await
+    }
+
+    /// The reading of this poll.
+    pub fn now(&self) -> Instant {
+        self.now.get()
+    }
+
+    /// Waits until `at`.
+    pub async fn until(&self, at: Instant) {
+        poll_fn(|_| {
+            if self.has_come(at) {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
+            }
+        })
+        .await
+    }
+
+    /// What `future` gives, if it does within `limit` from now on.
+    pub fn within<F: Future>(&self, limit: Duration, future: F) -> Within<'_, F> {
+        // Not the reading of this poll: the parts polled before may have taken their time.
+        Within {
+            future,
+            clock: self,
+            until: Instant::now() + limit,
+        }
+    }
+
+    /// Whether `at` has come; if not, it is waited for.
+    fn has_come(&self, at: Instant) -> bool {
+        let come = at <= self.now.get();
+        if !come {
+            self.next.set(self.next.get().min(at));
+        }
+        come
+    }
+}
+
+pin_project! {
+    /// [`Clock::within`]. Not an `async fn`: that would hold its future twice.
+    pub struct Within<'a, F> {
+        #[pin]
+        future: F,
+        clock: &'a Clock,
+        until: Instant,
+    }
+}
+
+impl<F: Future> Future for Within<'_, F> {
+    type Output = Result<F::Output, TimedOut>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let this = self.project();
+        match this.future.poll(context) {
+            Poll::Ready(output) => Poll::Ready(Ok(output)),
+            Poll::Pending if this.clock.has_come(*this.until) => Poll::Ready(Err(TimedOut)),
+            Poll::Pending => Poll::Pending,
+        }
+    }
+}
+
+impl DelayNs for &Clock {
+    async fn delay_ns(&mut self, ns: u32) {
+        self.until(Instant::now() + Duration::from_micros(u64::from(ns).div_ceil(1000)))
+            .await;
+    }
+}
