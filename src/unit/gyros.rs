@@ -160,7 +160,9 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>) {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
     let limit = Duration::from_millis(FAST_LIMIT_MS);
-    let mut tick = Instant::now();
+    // Half an interval off the grid on which cycles start, so that the two seldom meet.
+    let mut tick =
+        Instant::from_ticks(Instant::now().as_ticks() / interval.as_ticks() * interval.as_ticks()) + interval / 2;
     loop {
         tick += interval;
         votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;

@@ -17,9 +17,6 @@ pub type Flight = Box<dyn FnOnce(Plant, &[Scheduled], Nanos, &mut dyn Bench) -> 
 /// A row of the summary.
 pub type Remark = (&'static str, String);
 
-/// Wired like the reference design.
-const BOARD: &str = "obc";
-
 /// Why a board could not fly.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {

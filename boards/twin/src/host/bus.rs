@@ -14,7 +14,7 @@ use emems::board::RecoverBus;
 
 use super::{
     clock,
-    timing::{I2C_BIT, I2C_OVERHEAD, SPI_OVERHEAD, SPI_WORD},
+    timing::{I2C_BIT, I2C_OVERHEAD, I2C_TURN, SPI_OVERHEAD, SPI_WORD},
 };
 use crate::{
     part::{Nanos, SpiPart},
@@ -53,8 +53,9 @@ impl SensorBus {
         let mut direction = None;
         for operation in operations {
             let read = matches!(operation, i2c::Operation::Read(_));
-            if direction.replace(read) != Some(read) {
-                at += byte + I2C_BIT;
+            let before = direction.replace(read);
+            if before != Some(read) {
+                at += byte + I2C_BIT + before.map_or(0, |_| I2C_TURN);
                 if !plant.i2c.start(address, read, at) {
                     plant.i2c.stop(at);
                     return (
@@ -168,7 +169,8 @@ impl embedded_hal_async::spi::SpiDevice<u16> for Gyro {
             }
             gyro.deselect(at);
         }
-        wait_until(at).await;
+        // The STM32 board waits for the word in place: nothing else is polled meanwhile.
+        clock::spend(at - clock::since_power_on());
         Ok(())
     }
 }

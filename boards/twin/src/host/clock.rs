@@ -1,6 +1,7 @@
 //! Virtual time for `embassy-time`, one clock a thread, so that many units run in parallel tests.
 //!
-//! The clock keeps only instants: the one future of a run is polled again at each, whoever asked for it.
+//! The clock keeps only instants: the one future of a run is polled again at each, whoever asked for it. Computing
+//! takes no time, except where a part of the board says that it does ([`spend`]).
 
 use std::{
     cell::RefCell,
@@ -18,8 +19,10 @@ use crate::part::Nanos;
 
 #[derive(Default)]
 struct Clock {
-    now_us: u64,
+    /// [ns] since the unit's clock started.
+    now: Nanos,
     alarms_us: BTreeSet<u64>,
+    /// [ns] when the unit's clock started, since power-on.
     started: Nanos,
 }
 
@@ -31,7 +34,7 @@ struct ThreadClock;
 
 impl embassy_time_driver::Driver for ThreadClock {
     fn now(&self) -> u64 {
-        CLOCK.with_borrow(|clock| clock.now_us)
+        CLOCK.with_borrow(|clock| clock.now / 1000)
     }
 
     fn schedule_wake(&self, at: u64, _waker: &Waker) {
@@ -55,7 +58,12 @@ pub fn start(started: Nanos) {
 
 /// [ns] since power-on.
 pub fn since_power_on() -> Nanos {
-    CLOCK.with_borrow(|clock| clock.started + clock.now_us * 1000)
+    CLOCK.with_borrow(|clock| clock.started + clock.now)
+}
+
+/// The processor is busy for `duration` and polls nothing meanwhile.
+pub fn spend(duration: Nanos) {
+    CLOCK.with_borrow_mut(|clock| clock.now += duration);
 }
 
 #[derive(Default)]
@@ -72,7 +80,7 @@ pub fn advance<F: Future + ?Sized>(mut future: Pin<&mut F>, until: Nanos) -> Pol
     let woken = Arc::new(Woken(AtomicBool::new(true)));
     let waker = Waker::from(woken.clone());
     let mut context = Context::from_waker(&waker);
-    let until_us = CLOCK.with_borrow(|clock| until.saturating_sub(clock.started) / 1000);
+    let until = CLOCK.with_borrow(|clock| until.saturating_sub(clock.started));
     loop {
         while woken.0.swap(false, Ordering::Relaxed) {
             if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
@@ -80,12 +88,12 @@ pub fn advance<F: Future + ?Sized>(mut future: Pin<&mut F>, until: Nanos) -> Pol
             }
         }
         let due = CLOCK.with_borrow_mut(|clock| match clock.alarms_us.first() {
-            Some(at_us) if *at_us <= until_us => {
-                clock.now_us = clock.now_us.max(*at_us);
+            Some(at_us) if *at_us * 1000 <= until => {
+                clock.now = clock.now.max(*at_us * 1000);
                 clock.alarms_us.pop_first().is_some()
             }
             _ => {
-                clock.now_us = clock.now_us.max(until_us);
+                clock.now = clock.now.max(until);
                 false
             }
         });
