@@ -9,5 +9,6 @@ pub mod fly;
 pub mod folder;
 pub mod log;
 pub mod plot;
+pub mod size;
 pub mod summary;
 pub mod table;

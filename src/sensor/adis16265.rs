@@ -69,13 +69,13 @@ impl Range {
     }
 }
 
-/// Internal sample rate (data sheet, SMPL_PRD).
+/// Internal sample rate: 2048 / (SMPL_PRD + 1) a second (as Linux drivers/iio/gyro/adis16260.c computes it).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum SampleRate {
     Hz2048 = 0x00,
     #[default]
-    Hz256 = 0x01,
+    Hz256 = 0x07,
 }
 
 /// Settings.

@@ -12,7 +12,7 @@ use core::fmt::Display;
 use embassy_time::{Duration, Instant};
 
 use super::{
-    clock::TimedOut,
+    clock::{TimedOut, next_on_grid},
     gyros::Gyros,
     plates::{Plates, Taken},
     shared::{Cycle, Shared},
@@ -73,9 +73,7 @@ pub async fn run<B: Board>(
     let resets = resume.resets.saturating_add(u16::from(shared.resume.is_some()));
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
-    // On a grid, so that cycles of every start have the same phase to the gyros' fast samples.
-    let grid = period.as_ticks() / 4;
-    let mut start = Instant::from_ticks((Instant::now().as_ticks() / grid + 1) * grid);
+    let mut start = next_on_grid(period / 4, Duration::MIN);
     let mut verified = 0;
     loop {
         votes.waiting(Voter::Acquire, shared.clock.until(start)).await;

@@ -23,6 +23,14 @@ pub struct Clock {
     next: Cell<Instant>,
 }
 
+/// The next instant on the grid of multiples of `interval` of the unit's time, shifted by `phase`. Parts that do their
+/// work on shifted grids keep out of each other's way, and do it at the same times whatever start-up took.
+pub fn next_on_grid(interval: Duration, phase: Duration) -> Instant {
+    let interval = interval.as_ticks().max(1);
+    let since = Instant::now().as_ticks().saturating_sub(phase.as_ticks());
+    Instant::from_ticks((since / interval + 1) * interval) + phase
+}
+
 /// Time was up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimedOut;

@@ -12,7 +12,7 @@ use embedded_hal_async::spi::SpiDevice;
 
 use super::{
     Settings,
-    clock::Clock,
+    clock::{Clock, next_on_grid},
     shared::Shared,
     vote::{Voter, Votes},
 };
@@ -160,12 +160,11 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>) {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
     let limit = Duration::from_millis(FAST_LIMIT_MS);
-    // Half an interval off the grid on which cycles start, so that the two seldom meet.
-    let mut tick =
-        Instant::from_ticks(Instant::now().as_ticks() / interval.as_ticks() * interval.as_ticks()) + interval / 2;
+    // Cycles start on the grid of the period; half an interval off it, the two seldom meet.
+    let mut tick = next_on_grid(interval, interval / 2);
     loop {
-        tick += interval;
         votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;
+        tick += interval;
         if let Ok((at, counts)) = shared.clock.within(limit, gyros.fast()).await {
             shared.integrator.borrow_mut().add(Fast {
                 at_us: at.as_micros(),

@@ -1,8 +1,9 @@
 //! Lift-off and micro-g, debounced; lift-off begins FLIGHT.
 
-use embassy_time::{Duration, Instant};
+use embassy_time::Duration;
 
 use super::{
+    clock::next_on_grid,
     shared::Shared,
     vote::{Voter, Votes},
 };
@@ -11,17 +12,21 @@ use crate::{
     discrete::{Debounce, POLL_US},
 };
 
+/// After a cycle, between two fast samples of the gyros.
+const PHASE: Duration = Duration::from_millis(12);
+
 /// Polls for ever.
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discretes) {
     let (mut lift_off, mut micro_g) = (Debounce::default(), Debounce::default());
-    let mut poll = Instant::now();
+    let interval = Duration::from_micros(POLL_US);
+    let mut poll = next_on_grid(interval, PHASE);
     loop {
         let levels = (lift_off.poll(lines.lift_off()), micro_g.poll(lines.micro_g()));
         shared.discretes.set(levels);
         if shared.state.borrow_mut().lift_off(levels.0) {
             shared.say(format_args!("lift-off: FLIGHT, recording"));
         }
-        poll += Duration::from_micros(POLL_US);
         votes.waiting(Voter::Inputs, shared.clock.until(poll)).await;
+        poll += interval;
     }
 }

@@ -11,10 +11,10 @@ use core::{
     task::{Context, Poll},
 };
 
-use embassy_time::{Duration, Instant};
+use embassy_time::Duration;
 use pin_project_lite::pin_project;
 
-use super::clock::Clock;
+use super::clock::{Clock, next_on_grid};
 use crate::board::{Board, Watchdog};
 
 /// A part of the unit.
@@ -34,6 +34,9 @@ const ALL: u8 = u8::MAX;
 
 /// [ms] between questions, as long as all answer. A part may be busy for 190 ms; the watchdog bites after 1 s.
 const ASK_MS: u64 = 100;
+
+/// Between two fast samples of the gyros.
+const PHASE: Duration = Duration::from_millis(18);
 
 /// Who has answered since all were asked.
 #[derive(Default)]
@@ -80,8 +83,11 @@ impl<F: Future> Future for Waiting<'_, F> {
 ///
 /// The question needs no wake of its own: this part's alarm polls the whole unit, and with it every part that waits.
 pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog) {
+    let interval = Duration::from_millis(ASK_MS);
+    let mut ask = next_on_grid(interval, PHASE);
     loop {
-        clock.until(Instant::now() + Duration::from_millis(ASK_MS)).await;
+        clock.until(ask).await;
+        ask += interval;
         if votes.answered.get() == ALL {
             votes.answered.set(0);
             watchdog.feed();

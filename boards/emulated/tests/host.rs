@@ -1,5 +1,6 @@
 //! The image on the emulated board and the unit on the host board, in the same world: the same packets.
 
+#[allow(dead_code, reason = "each test file uses its own share of the bench")]
 mod bench;
 
 use bench::{MS, Tape, image};
@@ -52,7 +53,13 @@ fn host_run_and_image_emit_the_same_packets_byte_for_byte() {
         let (image, host) = (bytes(&image), bytes(&host));
         let differ = image.iter().zip(&host).position(|(image, host)| image != host);
         let place = differ.map(|at| (at / 156, at % 156));
-        assert_eq!(place, None, "{motion}: packet and byte; of {} and {} bytes", image.len(), host.len());
+        assert_eq!(
+            place,
+            None,
+            "{motion}: packet and byte; of {} and {} bytes",
+            image.len(),
+            host.len()
+        );
         assert_eq!(image.len(), host.len(), "{motion}");
     }
 }
@@ -62,12 +69,9 @@ fn both_boards_take_each_sensor_at_the_same_time() {
     let script = [(MS, b"G_DL".to_vec())];
     let image = on_image("still", 4_000 * MS, &script);
     let host = on_host("still", 4_000 * MS, &script);
-    let first = |tape: &Tape| tape.packets().first().map(|(at, _)| *at).expect("packets");
-    println!("first packet complete at {} and {} ns", first(&image), first(&host));
     let (image, host) = (derived_frames(&image), derived_frames(&host));
     assert!(image.len() > 10 && image.len() == host.len());
     for (image, host) in image.iter().zip(&host).skip(2) {
-            println!("{:?}\n{:?}\n", image.slots_us, host.slots_us);
         assert_eq!(image.start_us.abs_diff(host.start_us), 0);
         for (image_us, host_us) in image.slots_us.iter().zip(host.slots_us) {
             assert!(

@@ -1,7 +1,7 @@
 //! Virtual time for `embassy-time`, one clock a thread, so that many units run in parallel tests.
 //!
 //! The clock keeps only instants: the one future of a run is polled again at each, whoever asked for it. Computing
-//! takes no time, except where a part of the board says that it does ([`spend`]).
+//! takes no time, except a wake ([`WAKE`]) and where a part of the board says that it does ([`spend`]).
 
 use std::{
     cell::RefCell,
@@ -15,6 +15,7 @@ use std::{
     task::{Context, Poll, Wake, Waker},
 };
 
+use super::timing::WAKE;
 use crate::part::Nanos;
 
 #[derive(Default)]
@@ -89,7 +90,7 @@ pub fn advance<F: Future + ?Sized>(mut future: Pin<&mut F>, until: Nanos) -> Pol
         }
         let due = CLOCK.with_borrow_mut(|clock| match clock.alarms_us.first() {
             Some(at_us) if *at_us * 1000 <= until => {
-                clock.now = clock.now.max(*at_us * 1000);
+                clock.now = clock.now.max(*at_us * 1000) + WAKE;
                 clock.alarms_us.pop_first().is_some()
             }
             _ => {

@@ -8,15 +8,17 @@ use crate::part::Nanos;
 
 /// [ns] a bit on the sensor bus at 400 kHz.
 pub const I2C_BIT: Nanos = 2_500;
-/// [ns] the firmware's work around one I2C transaction.
-pub const I2C_OVERHEAD: Nanos = 10_400;
+/// [ns] from an alarm to the firmware's next step.
+pub const WAKE: Nanos = 8_000;
+/// [ns] the firmware's work around one I2C transaction, besides the wake at its end.
+pub const I2C_OVERHEAD: Nanos = 2_400;
 /// [ns] its work at each change of direction inside one.
 pub const I2C_TURN: Nanos = 11_700;
 /// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// [ns] the firmware's work around one word.
-pub const SPI_OVERHEAD: Nanos = 11_800;
+pub const SPI_OVERHEAD: Nanos = 4_800;
 /// [ns] a byte on a UART, 115200 8N1.
 pub const UART_BYTE: Nanos = 86_806;
 /// [ns] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 245_000;
+pub const BOOT: Nanos = 126_000;
