@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The parts are joined, not spawned: tasks cannot be generic, and one future can be polled on a host in virtual time.
-//! They share [`Shared`], which lives in this future; nothing is global.
+//! They share one state, which lives in this future; nothing is global.
 
 mod acquire;
 mod clock;

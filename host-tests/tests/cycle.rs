@@ -27,7 +27,7 @@ fn a_packet_comes_every_200_ms_and_holds_all_sixteen_sensors() {
     let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
     assert_eq!(counters, (0..counters.len() as u16).collect::<Vec<_>>());
     assert!(counters.len() >= 48);
-    for (_, reading) in &flown.packets[2..] {
+    for (_, reading) in &flown.packets {
         assert_eq!(reading.errors.0, 0, "{reading:?}");
     }
     // Level and still: plate 4 looks down its own z axis, 9.7864 m/s2 of 3 mg counts.
@@ -142,8 +142,9 @@ fn derived_frames_say_when_each_sensor_was_read_and_come_only_when_asked_for() {
             "{frame:?}"
         );
         assert!(frame.cycle_us <= 8_000, "{frame:?}");
-        assert_eq!(frame.increments.gyro[0].count, 20);
-        assert_eq!(frame.increments.covered_us, 200_000);
+        // At rest and without noise an old zero cannot be told from a dead line, and is left out.
+        assert!((19..=20).contains(&frame.increments.gyro[0].count), "{frame:?}");
+        assert!((180_000..=200_000).contains(&frame.increments.covered_us), "{frame:?}");
     }
 }
 

@@ -73,7 +73,11 @@ pub async fn run<B: Board>(
     let resets = resume.resets.saturating_add(u16::from(shared.resume.is_some()));
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
+    // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.
     let mut start = next_on_grid(period / 4, Duration::MIN);
+    votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
+    acquisition.cycle(counter, start).await;
+    start += period / 4;
     let mut verified = 0;
     loop {
         votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
