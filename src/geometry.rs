@@ -4,7 +4,7 @@
 //! angle is 18.4349 deg, its 18.4345 a slip). The thesis' frame e is left-handed: `x_b = z_e, y_b = y_e, z_b = x_e`; it
 //! does not appear here. Gyro `i` senses the right-handed rate about `-z` of plate `i`.
 
-use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix};
 
 /// cos atan(1/3) = 3/sqrt(10).
 const C: f32 = 0.948_683_3;
@@ -46,13 +46,10 @@ pub fn rate_from_gyros(present: u8) -> Option<SMatrix<f32, 3, 4>> {
     Some(normal.try_inverse()? * axes_b.transpose())
 }
 
-/// The rate seen by four gyros [same unit], all present.
-pub fn rate_b(gyro: Vector4<f32>) -> Vector3<f32> {
-    rate_from_gyros(0xF).map_or(Vector3::zeros(), |matrix| matrix * gyro)
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     /// f32 rounding of products of three numbers below one.

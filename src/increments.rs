@@ -16,9 +16,6 @@ use nalgebra::{SMatrix, Vector3, Vector4};
 
 use crate::{geometry::rate_from_gyros, sample::NOT_READ};
 
-/// [rad/s] a count of an ADIS16265 in its 320 deg/s range: 0.07326 deg/s (data sheet, Table 1).
-pub const RAD_S_PER_COUNT: f32 = 0.07326 * core::f32::consts::PI / 180.0;
-
 /// [s] an interval longer than this is a gap: rates between its ends are not known.
 pub const LONGEST_INTERVAL_S: f32 = 0.1;
 
@@ -62,6 +59,7 @@ const EMPTY: Increments = Increments {
 /// The running integration.
 #[derive(Clone, Debug)]
 pub struct Integrator {
+    rad_s_per_count: f32,
     sum: Increments,
     coning_b: Vector3<f32>,
     last_angle_b: Vector3<f32>,
@@ -80,9 +78,11 @@ pub struct Fast {
     pub counts: [i16; 4],
 }
 
-impl Default for Integrator {
-    fn default() -> Self {
+impl Integrator {
+    /// An integration of nothing yet, of gyros with `rad_s_per_count` [rad/s] a count.
+    pub fn new(rad_s_per_count: f32) -> Self {
         Integrator {
+            rad_s_per_count,
             sum: EMPTY,
             coning_b: Vector3::zeros(),
             last_angle_b: Vector3::zeros(),
@@ -91,9 +91,7 @@ impl Default for Integrator {
             rate_from_counts: None,
         }
     }
-}
 
-impl Integrator {
     /// Takes a fast sample.
     pub fn add(&mut self, fast: Fast) {
         for (channel, counts) in self.sum.gyro.iter_mut().zip(fast.counts) {
@@ -115,7 +113,7 @@ impl Integrator {
         }
         if present != self.present {
             self.present = present;
-            self.rate_from_counts = rate_from_gyros(present).map(|matrix| matrix * RAD_S_PER_COUNT);
+            self.rate_from_counts = rate_from_gyros(present).map(|matrix| matrix * self.rad_s_per_count);
         }
         if let Some(rate_from_counts) = self.rate_from_counts {
             self.rotate(rate_from_counts * mean_counts * dt_s);
@@ -157,14 +155,33 @@ mod tests {
     use super::*;
     use crate::geometry::gyro_axes_b;
 
+    /// The 320 deg/s range.
+    const RAD_S_PER_COUNT: f32 = 0.07326 * core::f32::consts::PI / 180.0;
+
     fn counts(omega_b: Vector3<f32>) -> [i16; 4] {
         let gyro = gyro_axes_b() * omega_b / RAD_S_PER_COUNT;
         core::array::from_fn(|plate| ComplexField::round(gyro[plate]) as i16)
     }
 
     #[test]
+    fn the_same_counts_in_a_quarter_of_the_range_are_a_quarter_of_the_angle() {
+        let turned = |rad_s_per_count| {
+            let mut integrator = Integrator::new(rad_s_per_count);
+            for at_us in [0, 10_000] {
+                integrator.add(Fast {
+                    at_us,
+                    counts: [0, 0, 0, 400],
+                });
+            }
+            integrator.take().angle_b[2]
+        };
+        assert_eq!(turned(RAD_S_PER_COUNT), 4.0 * turned(RAD_S_PER_COUNT / 4.0));
+        assert!(turned(RAD_S_PER_COUNT) > 0.0);
+    }
+
+    #[test]
     fn a_constant_rate_gives_rate_times_time() {
-        let mut integrator = Integrator::default();
+        let mut integrator = Integrator::new(RAD_S_PER_COUNT);
         let omega_b = Vector3::new(0.5, -1.0, 2.0);
         for sample in 0..21 {
             integrator.add(Fast {
@@ -193,7 +210,7 @@ mod tests {
             let (sin_t, cos_t) = (ComplexField::sin(OMEGA * t_s), ComplexField::cos(OMEGA * t_s));
             OMEGA * Vector3::new(-sin * sin_t, sin * cos_t, -(1.0 - cos))
         };
-        let mut integrator = Integrator::default();
+        let mut integrator = Integrator::new(RAD_S_PER_COUNT);
         let mut found = attitude(0.0);
         for sample in 0..=1000 {
             let at_us = 10_000 * sample;
@@ -220,7 +237,7 @@ mod tests {
 
     #[test]
     fn gaps_and_time_going_back_are_not_integrated() {
-        let mut integrator = Integrator::default();
+        let mut integrator = Integrator::new(RAD_S_PER_COUNT);
         let omega_b = Vector3::new(0.0, 0.0, 1.0);
         for at_us in [0, 10_000, 5_000, 15_000, 600_000, 610_000] {
             integrator.add(Fast {
@@ -233,7 +250,7 @@ mod tests {
 
     #[test]
     fn one_silent_gyro_costs_nothing_and_two_make_a_gap() {
-        let mut integrator = Integrator::default();
+        let mut integrator = Integrator::new(RAD_S_PER_COUNT);
         let omega_b = Vector3::new(0.3, 0.2, 1.0);
         let mut three = counts(omega_b);
         three[1] = NOT_READ;

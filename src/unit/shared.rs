@@ -52,7 +52,7 @@ pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>
 /// A line for the console, without its end.
 pub type Line = String<128>;
 
-/// How much of a dump has been read; the recorder's part fills it, the umbilical's empties it.
+/// A packet on its way from the recorder's part to the umbilical's.
 pub type DumpedPacket = [u8; PACKET_BYTES];
 
 /// The shared state. Everything in it is touched between two awaits only.
@@ -105,7 +105,7 @@ impl Shared {
             resume,
             crash,
             state: RefCell::new(State::resumed(resume)),
-            integrator: RefCell::default(),
+            integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
             discretes: Cell::default(),
             recorder: Cell::default(),
             recorder_refused: Cell::default(),

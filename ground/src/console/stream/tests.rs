@@ -27,7 +27,7 @@ fn derived() -> Derived {
         health: derived::Health(0),
         cycle_us: 8000,
         slots_us: [NO_SLOT; SENSOR_COUNT],
-        increments: Integrator::default().take(),
+        increments: Integrator::new(1.0).take(),
     }
 }
 
