@@ -12,10 +12,11 @@ use std::{
 
 use flate2::read::MultiGzDecoder;
 
+use packets::stream::Bytes5To8;
+
 use crate::{
     digest::{Digest, Entry},
     folder::{self, Folder, FolderError},
-    log::Bytes5To8,
     table,
 };
 

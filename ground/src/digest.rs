@@ -5,14 +5,12 @@
 
 use emems::{derived::Derived, sample::Reading};
 
-use crate::{
-    envelope::Envelope,
-    log::{
-        Bytes5To8, Decoder, Item, Reject,
-        sequence::{Sequence, Step},
-    },
-    summary::Summary,
+use packets::stream::{
+    Bytes5To8, Decoder, Item, Reject,
+    sequence::{Sequence, Step},
 };
+
+use crate::{envelope::Envelope, summary::Summary};
 
 /// Something found in the stream.
 #[derive(Clone, Debug, PartialEq)]

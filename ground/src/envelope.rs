@@ -7,7 +7,7 @@
 
 use emems::sample::Reading;
 
-use crate::channel::{self, CHANNEL_COUNT};
+use packets::channel::{self, CHANNEL_COUNT};
 
 /// Bins at most: more than the pixels a plot is wide on paper or screen.
 pub const MOST_BINS: usize = 1200;

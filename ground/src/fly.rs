@@ -20,10 +20,11 @@ use self::{
     source::{Source, SourceError},
     watch::{Seen, Watch},
 };
+use packets::stream::sequence::CYCLE_S;
+
 use crate::{
     console::{self, line},
     folder::{self, Folder, FolderError},
-    log::sequence::CYCLE_S,
 };
 
 /// Why a flight was not made, or not to its end.

@@ -10,10 +10,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use packets::stream::sequence::Step;
+
 use crate::{
     digest::Entry,
     envelope::Envelope,
-    log::sequence::Step,
     plot::{
         self, PlotError,
         page::{self, Heading},
@@ -282,7 +283,8 @@ mod tests {
     use emems::{packet::encode, sample::Reading};
 
     use super::*;
-    use crate::{digest::Digest, log::sequence::CYCLE_S};
+    use crate::digest::Digest;
+    use packets::stream::sequence::CYCLE_S;
 
     fn read(folder: &Path, name: &str) -> String {
         fs::read_to_string(folder.join(name)).unwrap_or_default()

@@ -1,13 +1,11 @@
 //! The ground side as a library.
 
-pub mod channel;
 pub mod console;
 pub mod decode;
 pub mod digest;
 pub mod envelope;
 pub mod fly;
 pub mod folder;
-pub mod log;
 pub mod plot;
 pub mod size;
 pub mod summary;

@@ -12,8 +12,9 @@ use plotters::{
     prelude::{BLACK, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, WHITE},
 };
 
+use packets::channel::{CHANNELS, Quantity};
+
 use crate::{
-    channel::{CHANNELS, Quantity},
     envelope::{Bin, Envelope},
     summary::Summary,
     table::SLOT_NAMES,

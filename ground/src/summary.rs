@@ -9,9 +9,9 @@ use emems::{
     sample::{NO_SLOT, Reading, SENSOR_COUNT},
 };
 
-use crate::{
+use packets::{
     channel,
-    log::{Reject, sequence::Step},
+    stream::{Reject, sequence::Step},
 };
 
 /// Least, most, mean and standard deviation of something.

@@ -10,7 +10,7 @@ use emems::{
     sample::{NO_SLOT, NOT_READ, Reading},
 };
 
-use crate::channel::{self, CHANNELS};
+use packets::channel::{self, CHANNELS};
 
 /// Header of the table in counts.
 pub fn counts_header() -> String {

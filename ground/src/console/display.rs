@@ -1,6 +1,6 @@
 //! How values are grouped, scaled and written on the screen.
 //!
-//! In: channels of [`crate::channel`] and their counts. Out: groups for tabs and plots, values in the unit an engineer
+//! In: channels of [`packets::channel`] and their counts. Out: groups for tabs and plots, values in the unit an engineer
 //! reads (rates in °/s, everything else as [`Quantity`] has it), and text for a cell.
 
 use emems::{
@@ -8,7 +8,7 @@ use emems::{
     sensor::hmc5883l::OVERFLOW,
 };
 
-use crate::channel::{CHANNELS, Quantity};
+use packets::channel::{CHANNELS, Quantity};
 
 /// Sensors of a kind, as plotted together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use crate::channel::CHANNEL_COUNT;
+use packets::channel::CHANNEL_COUNT;
 
 /// Oldest reading kept.
 pub const SPAN: Duration = Duration::from_secs(600);
@@ -16,7 +16,7 @@ const MOST: usize = 30_000;
 /// Readings a rate is taken over: two seconds at 5 Hz.
 const RATE_OVER: usize = 10;
 
-/// Counts of every channel as [`crate::channel::counts`] gives them.
+/// Counts of every channel as [`packets::channel::counts`] gives them.
 pub type Counts = [Option<i16>; CHANNEL_COUNT];
 
 /// Readings in order of arrival.

@@ -17,9 +17,9 @@ use super::{
     history::History,
     stream::{Found, Item},
 };
-use crate::{
+use packets::{
     channel,
-    log::sequence::{Sequence, Step},
+    stream::sequence::{Sequence, Step},
 };
 
 /// Lines of the log kept.

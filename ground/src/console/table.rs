@@ -15,7 +15,7 @@ use super::{
     display::{cells, short_name, unit},
     model::Model,
 };
-use crate::channel::{CHANNELS, Quantity};
+use packets::channel::{CHANNELS, Quantity};
 
 /// Columns it takes.
 pub const WIDTH: u16 = 58;

@@ -155,7 +155,8 @@ mod tests {
     use emems::{packet::encode, sample::Reading};
 
     use super::*;
-    use crate::{console::line, log::sequence::CYCLE_S};
+    use crate::console::line;
+    use packets::stream::sequence::CYCLE_S;
 
     const MILLISECOND: Nanos = 1_000_000;
 

@@ -3,7 +3,7 @@
 use emems::sample::{Errors, NOT_READ, Reading};
 
 use super::*;
-use crate::log::sequence::Step;
+use packets::stream::sequence::Step;
 
 fn reading(value: i16) -> Reading {
     Reading {

@@ -1,0 +1,1 @@
+//! The bench: calibrates the unit and measures its noise.

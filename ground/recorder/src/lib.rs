@@ -1,0 +1,1 @@
+//! The flight log on the ground: dumped, decoded, recovered.
