@@ -350,16 +350,16 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
     let one = |name: &str| Locality::Channel(name.to_owned());
     let injected = [
         Injected("gyro-bias-walk", &[5e-4], 0.0, 0.0, one("g2")),
-        Injected("stale-sample", &[0.03], 0.0, 0.0, one("m3x")),
+        Injected("stale-sample", &[0.1], 0.0, 0.0, one("m3x")),
         Injected("sampling-jitter", &[4e-3], 0.0, 0.0, Locality::Unit),
         Injected("coarse-quantisation", &[], -2.0, -2.0, one("a2y")),
         Injected("coarse-quantisation", &[], 3.0, 3.0, one("a2y")),
         Injected("bit-fault", &[], 7.0, 7.0, one("a1x")),
         Injected("stuck-channel", &[], 120.0, 120.0, one("m4y")),
-        Injected("packet-corruption", &[0.03], 0.0, 0.0, one("a3z")),
+        Injected("packet-corruption", &[0.1], 0.0, 0.0, one("a3z")),
         Injected("noise-level", &[0.4], 0.0, 0.0, one("g1")),
         Injected("vibration", &[0.5], 1.37, 0.0, one("a4x")),
-        Injected("shock", &[0.01], 20.0, 20.0, Locality::Unit),
+        Injected("shock", &[0.1], 20.0, 20.0, Locality::Unit),
     ];
     let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
     for Injected(name, theta, inject, look, locality) in injected {
@@ -407,6 +407,7 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
         assert!(idle < 6.0, "{name} is seen in a healthy log: {idle}");
         assert!(gain > 20.0, "{name} is not seen: {gain}");
         for (found, theta) in found.iter().zip(theta) {
+            // 1200 samples: 120 events scatter by 9 %, the terms of a walk by more.
             assert!((found / theta - 1.0).abs() < 0.35, "{name}: {found} for {theta}");
         }
         for &other in LIBRARY
