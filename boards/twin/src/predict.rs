@@ -12,6 +12,8 @@ mod chain;
 mod emems;
 mod grid;
 mod scene;
+#[cfg(test)]
+mod tests;
 mod unit;
 
 use std::borrow::Cow;
@@ -84,7 +86,8 @@ impl Twin {
             let slot_s = twin.unit.channels[index].slot_s;
             if !twin.felt.iter().any(|(slot, _)| *slot == slot_s) {
                 let instants_s = twin.instants_s(index).into_iter();
-                twin.felt.push((slot_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
+                twin.felt
+                    .push((slot_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
             }
         }
         twin.plain = (0..twin.unit.channels.len())

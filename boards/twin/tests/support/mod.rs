@@ -11,6 +11,7 @@ use twin::effect::Active;
 use twin::environment::Environment;
 use twin::motion::Recorded;
 use twin::predict::{Column, Scene, Twin, UnitDescription};
+use twin::recording::Table;
 
 /// The practice cases, beside the project; `None`, with a message, where they are not.
 pub fn shared(file: &str) -> Option<PathBuf> {
@@ -43,6 +44,46 @@ pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Option<Case> {
     let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
     let (counters, measured) = packets(&shared(&format!("practice/{name}/measured.txt.gz"))?, &unit);
     let starts_s = counters.iter().map(|&k| 0.2 * f64::from(k)).collect();
+    Some(Case {
+        twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
+        measured,
+    })
+}
+
+/// A log of a nine-axis unit with its optical reference smoothed at these corners [Hz], of attitude and position; samples the reference did not see are
+/// left out.
+pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Option<[f64; 2]>) -> Option<Case> {
+    let folder = shared(&format!("practice/{name}"))?;
+    let unit = UnitDescription::open(&folder.join("unit.toml")).unwrap();
+    let recorded = Recorded::open(&folder.join("motion.csv.gz")).unwrap();
+    let motion = corners_hz.map_or(recorded.clone(), |[attitude, position]| {
+        recorded.smoothed(attitude, position)
+    });
+    let environment = Environment {
+        gravity,
+        latitude: 52.51_f64.to_radians(),
+        field_n_ut: field_n_ut.into(),
+        temperature_c: 25.0,
+    };
+    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
+    let table = Table::open(&folder.join("measured.csv.gz"), &names).unwrap();
+    let starts_s: Vec<f64> = table.series([names[0]]).unwrap().series.t_s().to_vec();
+    // Half a second beside a gap the spline still bends towards it.
+    let lost = [(f64::MIN, recorded.span_s().0), (recorded.span_s().1, f64::MAX)]
+        .into_iter()
+        .chain(recorded.lost_s());
+    let lost: Vec<(f64, f64)> = lost.map(|(from_s, to_s)| (from_s - 0.5, to_s + 0.5)).collect();
+    let seen = |t_s: f64| !lost.iter().any(|(from_s, to_s)| *from_s < t_s && t_s < *to_s);
+    let channel = |name: &&str| {
+        let series = table.series([*name]).unwrap().series;
+        starts_s
+            .iter()
+            .map(|t_s| if seen(*t_s) { series.linear(*t_s).x } else { f64::NAN })
+            .collect()
+    };
+    let measured = names.iter().map(channel).collect();
+    let (from_s, to_s) = motion.span_s();
+    let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
     Some(Case {
         twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
         measured,
