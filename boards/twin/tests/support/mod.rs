@@ -131,6 +131,8 @@ pub struct Fit {
     /// Root mean square of the standardised residual of the channels looked at, before and after.
     pub before: f64,
     pub after: f64,
+    /// What the fit makes of each of these channels' samples; NaN where there is none.
+    pub explained: Vec<Vec<f64>>,
 }
 
 /// Gauss-Newton from zero on the effects and the calibration of these channels, each held by its prior.
@@ -139,7 +141,7 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
     let mut active = active.to_vec();
     let calibration: Vec<Column> = channels.iter().flat_map(|&channel| twin.calibration(channel)).collect();
     let mut psi = DVector::zeros(calibration.len());
-    let (mut before, mut after, mut sigma) = (0.0, 0.0, Vec::new());
+    let (mut before, mut after, mut sigma, mut explained) = (0.0, 0.0, Vec::new(), Vec::new());
     for step in 0..3 {
         let own: Vec<Column> = (0..active.len()).flat_map(|of| twin.jacobian(&active, of)).collect();
         let columns: Vec<&Column> = calibration.iter().chain(&own).collect();
@@ -153,6 +155,7 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
             DVector::zeros(columns.len()),
         );
         let (mut energy, mut count) = (0.0, 0.0);
+        explained.clear();
         for &channel in channels {
             let weight = 1.0 / twin.unit().channels[channel].sigma();
             let mut residual = twin.channel(channel, &active).into_owned();
@@ -169,6 +172,8 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
                     *residual -= psi[i] * value;
                 }
             }
+            let pairs = case.measured[channel].iter().zip(&residual);
+            explained.push(pairs.map(|(measured, residual)| measured - residual).collect());
             let present: Vec<usize> = (0..residual.len()).filter(|&k| residual[k].is_finite()).collect();
             energy += present.iter().map(|&k| (residual[k] * weight).powi(2)).sum::<f64>();
             count += present.len() as f64;
@@ -190,11 +195,14 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
         let covariance: DMatrix<f64> = normal.try_inverse().unwrap();
         let moved: DVector<f64> = &covariance * score;
         psi += moved.rows(0, psi.len());
-        let mut i = psi.len();
-        sigma = (i..columns.len()).map(|i| covariance[(i, i)].sqrt()).collect();
-        for theta in active.iter_mut().flat_map(|a| &mut a.theta) {
-            *theta += moved[i];
-            i += 1;
+        let open = psi.len();
+        sigma = (open..columns.len()).map(|i| covariance[(i, i)].sqrt()).collect();
+        for (theta, moved) in active
+            .iter_mut()
+            .flat_map(|a| &mut a.theta)
+            .zip(moved.iter().skip(open))
+        {
+            *theta += moved;
         }
     }
     Fit {
@@ -202,5 +210,6 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
         sigma,
         before,
         after,
+        explained,
     }
 }
