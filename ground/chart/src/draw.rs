@@ -44,8 +44,9 @@ pub fn panels(title: &str, columns: usize, panels: &[Panel]) -> Result<String, C
 
 /// Draws a map of shades with its values in percent.
 pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
-    const CELL: (i32, i32) = (150, 54);
-    const NAMES: (i32, i32) = (520, 330);
+    const CELL: (i32, i32) = (76, 28);
+    const NAMES: (i32, i32) = (260, 190);
+    const PX: u32 = 15;
     let size = (
         (NAMES.0 + CELL.0 * map.columns.len() as i32 + 20) as u32,
         (NAMES.1 + CELL.1 * map.rows.len() as i32 + 20) as u32,
@@ -54,19 +55,19 @@ pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
         let text =
             |text: &str, at: (i32, i32), style: TextStyle<'_>| root.draw(&Text::new(text.to_string(), at, style));
         for (column, name) in map.columns.iter().enumerate() {
-            let style = font(LABEL_PX - 4)
+            let style = font(PX)
                 .transform(FontTransform::Rotate270)
                 .pos(Pos::new(HPos::Left, VPos::Center));
             text(
                 name,
-                (NAMES.0 + CELL.0 * column as i32 + CELL.0 / 2, NAMES.1 - 14),
+                (NAMES.0 + CELL.0 * column as i32 + CELL.0 / 2, NAMES.1 - 8),
                 style,
             )?;
         }
         for (row, name) in map.rows.iter().enumerate() {
             let top = NAMES.1 + CELL.1 * row as i32;
-            let right = font(LABEL_PX - 4).pos(Pos::new(HPos::Right, VPos::Center));
-            text(name, (NAMES.0 - 14, top + CELL.1 / 2), right)?;
+            let right = font(PX).pos(Pos::new(HPos::Right, VPos::Center));
+            text(name, (NAMES.0 - 8, top + CELL.1 / 2), right)?;
             for (column, value) in map.values.get(row).into_iter().flatten().enumerate() {
                 let left = NAMES.0 + CELL.0 * column as i32;
                 if !value.is_finite() {
@@ -81,7 +82,7 @@ pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
                     fill.filled(),
                 ))?;
                 let ink = if share > 0.6 { &WHITE } else { &BLACK };
-                let style = font(LABEL_PX - 6).color(ink).pos(Pos::new(HPos::Center, VPos::Center));
+                let style = font(PX - 1).color(ink).pos(Pos::new(HPos::Center, VPos::Center));
                 text(
                     &format!("{:.0}", 100.0 * value),
                     (left + CELL.0 / 2, top + CELL.1 / 2),
@@ -109,9 +110,11 @@ fn draw(area: &Area, panel: &Panel) -> Drawn {
         panel.layers.iter().map(|layer| (layer, runs(layer, panel))).collect();
     let all = || placed.iter().flat_map(|(_, runs)| runs.iter().flatten());
     // Shaded stretches mark what is there; they do not widen an axis.
-    let x = panel
-        .x
-        .range(all().filter(|point| point.low.is_finite()).map(|point| point.x), 0.02);
+    let marked = all().filter(|point| point.low.is_finite());
+    let x = panel.x.range(
+        marked.flat_map(|point| [point.x - point.half, point.x + point.half]),
+        0.02,
+    );
     let y = panel.y.range(all().flat_map(|point| [point.low, point.high]), 0.06);
     let mut builder = ChartBuilder::on(area);
     builder
@@ -173,15 +176,12 @@ fn layer_on(chart: &mut Chart, layer: &Layer, runs: &[Vec<Placed>], x: &Range<f6
                 }))?;
             }
             Marks::Bars(_) => {
-                let steps = run
-                    .windows(2)
-                    .map(|pair| pair[1].x - pair[0].x)
-                    .filter(|step| *step > 0.0);
-                let half = 0.45 * steps.fold(1.0, f64::min);
-                let floor = 0f64.clamp(y.start, y.end);
-                chart.draw_series(
-                    line().map(|(at, top)| Rectangle::new([(at - half, floor), (at + half, top)], colour.filled())),
-                )?;
+                chart.draw_series(run.iter().map(|bar| {
+                    Rectangle::new(
+                        [(bar.x - bar.half, bar.low), (bar.x + bar.half, bar.high)],
+                        colour.filled(),
+                    )
+                }))?;
             }
             Marks::Spans(_) => {
                 chart.draw_series(run.chunks_exact(2).map(|ends| {
@@ -194,12 +194,14 @@ fn layer_on(chart: &mut Chart, layer: &Layer, runs: &[Vec<Placed>], x: &Range<f6
     Ok(())
 }
 
-/// A point in drawing units; `low` and `high` are the same except for bands and whiskers, NaN for the end of a span.
+/// A point in drawing units; `low` and `high` are the same except for bands, whiskers and bars (one of them zero), NaN
+/// for the end of a span. `half` is half of a bar's width.
 #[derive(Clone, Copy)]
 struct Placed {
     x: f64,
     low: f64,
     high: f64,
+    half: f64,
 }
 
 /// Unbroken runs of a layer's points, thinned to what can be seen.
@@ -208,10 +210,18 @@ fn runs(layer: &Layer, panel: &Panel) -> Vec<Vec<Placed>> {
         x: panel.x.place(x),
         low: panel.y.place(low),
         high: panel.y.place(high),
+        half: 0.0,
     };
     let points: Vec<Placed> = match &layer.marks {
-        Marks::Line(points) | Marks::Dashes(points) | Marks::Dots(points) | Marks::Bars(points) => {
+        Marks::Line(points) | Marks::Dashes(points) | Marks::Dots(points) => {
             points.iter().map(|(x, y)| place((*x, *y, *y))).collect()
+        }
+        Marks::Bars(points) => {
+            let steps = points.windows(2).map(|pair| pair[1].0 - pair[0].0);
+            let half = 0.45 * steps.filter(|step| *step > 0.0).fold(1.0, f64::min);
+            (points.iter().map(|(x, y)| place((*x, y.min(0.0), y.max(0.0)))))
+                .map(|bar| Placed { half, ..bar })
+                .collect()
         }
         Marks::Band(points) | Marks::Whiskers(points) => points.iter().copied().map(place).collect(),
         Marks::Spans(spans) => {

@@ -38,7 +38,7 @@ td { font-variant-numeric: tabular-nums; padding: .25rem 1.2rem .25rem 0 } tr + 
 pre { background: #f6f6f6; padding: .8rem 1rem; overflow-x: auto }
 ul { list-style: none; margin: 0 0 .3rem; padding: 0; display: flex; flex-wrap: wrap; gap: .2rem 1.4rem }
 i { display: inline-block; width: 1.3rem; height: .7rem; margin-right: .45rem; border: 1px solid #0002 }
-svg { width: 100%; height: auto; display: block }
+svg { max-width: 100%; height: auto; display: block }
 @media print { h2 { break-after: avoid } section { break-inside: avoid } }
 ";
 
