@@ -138,7 +138,11 @@ mod tests {
     #[test]
     fn samples_are_a_little_older_than_their_reading_and_differ_between_units() {
         let [one, other] = [1, 2].map(|seed| instants(seed).expect("derived frames"));
-        assert!(one.slots_s.iter().all(|slot| (0.0..OLDEST).contains(slot)), "{:?}", one.slots_s);
+        assert!(
+            one.slots_s.iter().all(|slot| (0.0..OLDEST).contains(slot)),
+            "{:?}",
+            one.slots_s
+        );
         assert_eq!(one.slots_s[0], one.slots_s[1]);
         assert_ne!(one.slots_s, other.slots_s);
     }

@@ -52,11 +52,21 @@ impl Wander {
                 .move_to(0.0, 3.0)
                 .coast(draw.uniform(rests_s.0, rests_s.1));
         }
-        let mut tone = |_: usize| (draw.sign() * draw.uniform(0.3, 1.0) * swing, draw.log_uniform(slowest, fastest), draw.uniform(-3.1, 3.1));
+        let mut tone = |_: usize| {
+            (
+                draw.sign() * draw.uniform(0.3, 1.0) * swing,
+                draw.log_uniform(slowest, fastest),
+                draw.uniform(-3.1, 3.1),
+            )
+        };
         let angles = [(); 3].map(|()| std::array::from_fn(&mut tone));
         let path = [(); 3].map(|()| (reach_m * draw.uniform(0.3, 1.0), draw.uniform(0.8, 3.0)));
         let temperature = match warm {
-            true => (draw.uniform(24.0, 32.0), draw.sign() * draw.uniform(6.0, 15.0), draw.uniform(0.02, 0.035)),
+            true => (
+                draw.uniform(24.0, 32.0),
+                draw.sign() * draw.uniform(6.0, 15.0),
+                draw.uniform(0.02, 0.035),
+            ),
             false => (25.0 + draw.uniform(-0.5, 0.5), 0.3, 0.02),
         };
         Wander {
@@ -80,9 +90,11 @@ impl Wander {
 
     fn angle(&self, axis: usize, t_s: f64) -> Jet {
         let envelope = self.envelope.at(t_s);
-        let sum = self.angles[axis].iter().fold(Jet::default(), |sum, (amplitude, rate, phase)| {
-            sum + Jet::sine(*amplitude, *rate, t_s + phase / rate)
-        });
+        let sum = self.angles[axis]
+            .iter()
+            .fold(Jet::default(), |sum, (amplitude, rate, phase)| {
+                sum + Jet::sine(*amplitude, *rate, t_s + phase / rate)
+            });
         envelope * sum
     }
 }

@@ -41,7 +41,13 @@ pub fn kind(quantity: Quantity) -> Kind {
         bandwidth_hz,
     };
     match quantity {
-        Quantity::SpecificForce => kind("accelerometer", [0.045, 0.02, 0.001, 0.002], [-60.2, 60.2], 12, Some(25.0)),
+        Quantity::SpecificForce => kind(
+            "accelerometer",
+            [0.045, 0.02, 0.001, 0.002],
+            [-60.2, 60.2],
+            12,
+            Some(25.0),
+        ),
         Quantity::Field => kind("magnetometer", [0.2, 0.1, 0.003, 0.003], [-188.0, 188.0], 12, None),
         Quantity::Rate => kind("gyro", [0.00344, 0.0015, 0.001, 0.002], [-5.585, 5.585], 14, Some(12.7)),
         Quantity::GyroTemperature => kind("thermometer", [0.12, 0.06, 0.001, 0.0], [-90.0, 100.0], 12, None),
@@ -86,13 +92,19 @@ pub fn toml(instants: &Instants) -> String {
             facts.noise, facts.bias, facts.scale, facts.axis_rad
         ));
         let [least, most] = facts.range;
-        put(format_args!("range = [{least}, {most}]\nbits = {}\nslot_s = {slot_s:.6}\n", facts.bits));
+        put(format_args!(
+            "range = [{least}, {most}]\nbits = {}\nslot_s = {slot_s:.6}\n",
+            facts.bits
+        ));
         if let Some(bandwidth_hz) = facts.bandwidth_hz {
             put(format_args!("bandwidth_hz = {bandwidth_hz}\n"));
         }
         if channel.quantity == Quantity::SpecificForce {
             let place = geometry::accelerometer_place_b(channel.plate);
-            put(format_args!("lever_m = [{:.9}, {:.9}, {:.9}]\n", place.x, place.y, place.z));
+            put(format_args!(
+                "lever_m = [{:.9}, {:.9}, {:.9}]\n",
+                place.x, place.y, place.z
+            ));
         }
     }
     text

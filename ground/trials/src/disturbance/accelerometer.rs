@@ -53,7 +53,9 @@ fn scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let s = strength * 0.008 * draw.vector();
-        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + s.component_mul(&force));
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
+            force + s.component_mul(&force)
+        });
     }
     channels(SpecificForce, &plates)
 }
@@ -75,7 +77,13 @@ fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<u
 fn misalignment(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
-        let skew = Matrix3::from_fn(|row, column| if row == column { 0.0 } else { strength * 0.008 * draw.normal() });
+        let skew = Matrix3::from_fn(|row, column| {
+            if row == column {
+                0.0
+            } else {
+                strength * 0.008 * draw.normal()
+            }
+        });
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + skew * force);
     }
     channels(SpecificForce, &plates)
@@ -86,7 +94,9 @@ fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
     let plates = plates(draw);
     for &plate in &plates {
         let a = strength * 6e-4 * draw.vector();
-        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + a.component_mul(&force.component_mul(&force)));
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
+            force + a.component_mul(&force.component_mul(&force))
+        });
     }
     channels(SpecificForce, &plates)
 }
@@ -127,7 +137,9 @@ fn range(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     let factor = if draw.chance(0.5) { 0.5 } else { 0.25 };
     for &plate in &plates {
-        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force: Vector3<f64>| force * factor);
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force: Vector3<f64>| {
+            force * factor
+        });
     }
     channels(SpecificForce, &plates)
 }

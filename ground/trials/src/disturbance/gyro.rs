@@ -58,7 +58,9 @@ fn warm_up(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (plates, tau_s) = (plates(draw), draw.log_uniform(30.0, 150.0));
     for &plate in &plates {
         let a = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.2 * DEG;
-        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| rate + a * (-t.max(0.0) / tau_s).exp());
+        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
+            rate + a * (-t.max(0.0) / tau_s).exp()
+        });
     }
     channels(Rate, &plates)
 }
@@ -91,7 +93,9 @@ fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
     let plates = plates(draw);
     for &plate in &plates {
         let a = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.004;
-        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| rate + a * rate.powi(3) * (1.0 - 0.02 * rate * rate));
+        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| {
+            rate + a * rate.powi(3) * (1.0 - 0.02 * rate * rate)
+        });
     }
     channels(Rate, &plates)
 }
@@ -103,7 +107,9 @@ fn misalignment(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
         // A turned axis, so its component along itself shrinks too.
         let turn = nalgebra::Rotation3::new(strength * draw.uniform(0.5, 1.5) * 0.01 * axis_b.cross(&draw.direction()));
         let (source, turned_b) = (scene.source.clone(), turn * axis_b);
-        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| rate + (turned_b - axis_b).dot(&source.at(t).rate_b));
+        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
+            rate + (turned_b - axis_b).dot(&source.at(t).rate_b)
+        });
     }
     channels(Rate, &plates)
 }
@@ -113,7 +119,9 @@ fn g_sensitivity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
     for &plate in &plates {
         let k = strength * 0.05 * DEG / 9.8 * draw.vector();
         let source = scene.source.clone();
-        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| rate + k.dot(&source.at(t).force_b));
+        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
+            rate + k.dot(&source.at(t).force_b)
+        });
     }
     channels(Rate, &plates)
 }

@@ -92,8 +92,13 @@ fn set_reset(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plate = draw.below(4);
     let onset_s = draw.uniform(60.0, 200.0);
     let (gain, offset) = (strength * draw.sign() * 0.02, strength * 0.5 * draw.vector());
-    scene.views.field_p_ut[plate] =
-        changed(&scene.views.field_p_ut[plate], move |t, field| if t < onset_s { field } else { field * (1.0 + gain) + offset });
+    scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
+        if t < onset_s {
+            field
+        } else {
+            field * (1.0 + gain) + offset
+        }
+    });
     channels(Field, &[plate])
 }
 
@@ -103,7 +108,11 @@ fn current_field(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
     for plate in ALL_PLATES {
         let field_p = strength * 0.5 * draw.vector();
         scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
-            if (t / period_s).fract() < share { field + field_p } else { field }
+            if (t / period_s).fract() < share {
+                field + field_p
+            } else {
+                field
+            }
         });
     }
     channels(Field, &ALL_PLATES)
@@ -148,7 +157,9 @@ fn field_gradient(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usiz
 fn axis_order(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
-        scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], |_, field| Vector3::new(field.x, field.z, field.y));
+        scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], |_, field| {
+            Vector3::new(field.x, field.z, field.y)
+        });
     }
     channels(Field, &plates)
 }

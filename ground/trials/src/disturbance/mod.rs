@@ -54,13 +54,24 @@ const fn gross(name: &'static str, apply: fn(&mut Scene, &mut Draw, f64) -> Vec<
 
 /// All that have a name.
 pub fn named() -> Vec<Disturbance> {
-    [gyro::ALL, accelerometer::ALL, magnetometer::ALL, reference::ALL, stream::ALL].concat()
+    [
+        gyro::ALL,
+        accelerometer::ALL,
+        magnetometer::ALL,
+        reference::ALL,
+        stream::ALL,
+    ]
+    .concat()
 }
 
 /// The plates a disturbance of single sensors strikes: mostly one, else all.
 fn plates(draw: &mut Draw) -> Vec<usize> {
     let one = draw.below(PLATES);
-    if draw.chance(0.6) { vec![one] } else { (0..PLATES).collect() }
+    if draw.chance(0.6) {
+        vec![one]
+    } else {
+        (0..PLATES).collect()
+    }
 }
 
 /// Channels of a quantity on some plates.
