@@ -6,11 +6,15 @@
 //! It meets the diagnosis in files only: a case folder one way, verdict.json the other.
 
 pub mod answer;
+pub mod blind;
+pub mod command;
 pub mod deal;
 pub mod disturbance;
 mod draw;
 mod flight;
+mod interval;
 pub mod motion;
 pub mod scene;
+pub mod score;
 mod sensitivity;
 mod unit;

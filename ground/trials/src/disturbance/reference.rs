@@ -53,7 +53,7 @@ fn gravity_value(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 
 /// The table stands askew: everything the record says is turned by a rotation fixed in n about a level axis.
 fn table_tilt(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    let way = draw.uniform(0.0, 6.28);
+    let way = draw.uniform(0.0, std::f64::consts::TAU);
     let tilt = UnitQuaternion::from_scaled_axis(strength * 0.005 * Vector3::new(way.cos(), way.sin(), 0.0));
     let record = scene.record.clone();
     scene.record = Arc::new(move |t| {
