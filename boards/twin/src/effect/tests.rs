@@ -7,6 +7,7 @@ use crate::environment::Environment;
 use crate::motion::{Attitude, Jet, Motion, Pose};
 use crate::predict::{Scene, Twin, emems, thesis_slot_s};
 
+mod physics;
 mod scatter;
 
 /// A motion that excites everything: all axes up to 130 deg/s, acceleration of the centre, temperature up and down.

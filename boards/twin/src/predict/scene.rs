@@ -179,7 +179,8 @@ impl Scene {
         }
     }
 
-    /// The rows of a table, at 0, 1, 2 s and so on; between them there is nothing. Their `t_s` is not looked at. At least one.
+    /// The rows of a table, at 0, 1, 2 s and so on; between them there is nothing, so the channels must have
+    /// neither bandwidth nor slots. The rows' `t_s` is not looked at. At least one row.
     pub fn table(rows: &[Feel]) -> Self {
         let mut rows = rows.to_vec();
         // A spline has two ends.
