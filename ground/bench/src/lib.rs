@@ -1,1 +1,5 @@
 //! The bench: calibrates the unit and measures its noise.
+
+pub mod least_squares;
+pub mod response;
+pub mod table;
