@@ -1,5 +1,12 @@
 //! The bench: calibrates the unit and measures its noise.
 
+pub mod consensus;
+pub mod controlled;
+pub mod ellipsoid;
+pub mod experiment;
+pub mod lean;
 pub mod least_squares;
 pub mod response;
 pub mod table;
+pub mod turntable;
+pub mod wiring;

@@ -87,9 +87,12 @@ impl Response {
         let reference_c = temperatures.sum::<f64>() / observations.len().max(1) as f64;
         let linear = Orders { scale: 0, ..orders };
         let mut parameters = DVector::zeros(3 + orders.bias + 1 + orders.scale);
-        let open = |error: Open, orders| ResponseError::Open(error.directions.iter().map(|d| name(d, orders)).collect());
+        let open =
+            |error: Open, orders| ResponseError::Open(error.directions.iter().map(|d| name(d, orders)).collect());
         let start = step(observations, &parameters, reference_c, linear).map_err(|error| open(error, linear))?;
-        parameters.rows_mut(0, start.parameters.len()).copy_from(&start.parameters);
+        parameters
+            .rows_mut(0, start.parameters.len())
+            .copy_from(&start.parameters);
         let mut solution = start;
         if orders.scale > 0 {
             let mut settled = false;
@@ -139,7 +142,10 @@ impl Response {
     /// Relative sigma of the scale.
     pub fn scale_sigma(&self) -> f64 {
         let axis_b = self.axis_b();
-        (axis_b.transpose() * self.sensitivity_covariance() * axis_b)[0].max(0.0).sqrt() / self.counts_per_unit()
+        (axis_b.transpose() * self.sensitivity_covariance() * axis_b)[0]
+            .max(0.0)
+            .sqrt()
+            / self.counts_per_unit()
     }
 
     /// Sigma of the axis about each of the two directions across it [rad], root mean square of both.

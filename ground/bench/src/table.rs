@@ -113,8 +113,15 @@ impl Table {
         if let Some(name) = repeated(&columns) {
             return Err(fail(names_line, &format!("two columns are called \"{name}\"")));
         }
-        if !columns.is_empty() && columns.iter().all(|name| number::parse(name, Decimal::Either).is_some()) {
-            return Err(fail(names_line, "the first line holds numbers; it must name the columns"));
+        if !columns.is_empty()
+            && columns
+                .iter()
+                .all(|name| number::parse(name, Decimal::Either).is_some())
+        {
+            return Err(fail(
+                names_line,
+                "the first line holds numbers; it must name the columns",
+            ));
         }
         let mut rows = Vec::new();
         for &(line, text) in body {
@@ -274,7 +281,10 @@ impl Said {
 }
 
 fn separator(names: &str) -> char {
-    ['\t', ';'].into_iter().find(|&mark| names.contains(mark)).unwrap_or(',')
+    ['\t', ';']
+        .into_iter()
+        .find(|&mark| names.contains(mark))
+        .unwrap_or(',')
 }
 
 fn split(line: &str, separator: char) -> Vec<String> {

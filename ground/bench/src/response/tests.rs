@@ -49,7 +49,12 @@ fn bias_and_scale_over_temperature_come_back_in_one_fit() {
     const ROUNDING: f64 = 1e-9;
     let found = Response::fit(&observed(|| 0.0), Orders { bias: 2, scale: 1 }).expect("fit");
     assert!((found.sensitivity_b - truth().sensitivity_b).norm() < ROUNDING);
-    for (found, truth) in found.bias.iter().zip(truth().bias).chain(found.scale.iter().zip(truth().scale)) {
+    for (found, truth) in found
+        .bias
+        .iter()
+        .zip(truth().bias)
+        .chain(found.scale.iter().zip(truth().scale))
+    {
         assert!((found - truth).abs() < ROUNDING, "{found} {truth}");
     }
     assert_eq!(found.valid_c, -10.0..=50.0);
@@ -80,11 +85,19 @@ fn intervals_over_temperature_cover_95_of_100() {
 
 #[test]
 fn what_was_not_excited_is_named() {
-    let flat: Vec<_> = observed(|| 0.0).into_iter().filter(|one| one.excitation_b.z == 0.0).collect();
+    let flat: Vec<_> = observed(|| 0.0)
+        .into_iter()
+        .filter(|one| one.excitation_b.z == 0.0)
+        .collect();
     let error = Response::fit(&flat, Orders::default()).expect_err("no z").to_string();
     assert_eq!(error, "not determined: excitation along z is missing");
-    let warm: Vec<_> = observed(|| 0.0).into_iter().filter(|one| one.temperature_c > 40.0).collect();
-    let error = Response::fit(&warm, Orders { bias: 1, scale: 0 }).expect_err("one temperature").to_string();
+    let warm: Vec<_> = observed(|| 0.0)
+        .into_iter()
+        .filter(|one| one.temperature_c > 40.0)
+        .collect();
+    let error = Response::fit(&warm, Orders { bias: 1, scale: 0 })
+        .expect_err("one temperature")
+        .to_string();
     assert!(error.contains("bias times temperature^1 is missing"), "{error}");
 }
 

@@ -67,7 +67,12 @@ fn headless_ragged_and_doubly_named_files_are_refused() {
 #[test]
 fn any_bytes_are_read_or_refused() {
     for seed in 0_u32..300 {
-        let mix = |k: u32| (seed.wrapping_mul(2_654_435_761).rotate_left(k % 31).wrapping_add(k * 97)) as u8;
+        let mix = |k: u32| {
+            (seed
+                .wrapping_mul(2_654_435_761)
+                .rotate_left(k % 31)
+                .wrapping_add(k * 97)) as u8
+        };
         let bytes: Vec<u8> = (0..200).map(|k| if k % 7 == 0 { b'\n' } else { mix(k) }).collect();
         if let Ok(table) = parse(&bytes) {
             for row in &table.rows {
