@@ -115,7 +115,9 @@ impl Ellipsoid {
     /// The field [unit] for some counts.
     pub fn field(&self, counts: &Vector3<f64>) -> Vector3<f64> {
         // T has a positive diagonal, so it has an inverse.
-        self.shape.solve_lower_triangular(&(counts - self.offset)).unwrap_or_default()
+        self.shape
+            .solve_lower_triangular(&(counts - self.offset))
+            .unwrap_or_default()
     }
 
     /// As Table 6.1 lists it, with sigmas propagated through the derivatives.
@@ -128,7 +130,11 @@ impl Ellipsoid {
             nudge[k] = 1e-6 * self.shape.norm();
             let at = |sign: f64| {
                 let moved = &nudge * sign;
-                angles(&(self.shape + triangle(&moved)), &(self.offset + moved.fixed_rows::<3>(6)), convention)
+                angles(
+                    &(self.shape + triangle(&moved)),
+                    &(self.offset + moved.fixed_rows::<3>(6)),
+                    convention,
+                )
             };
             let (up, down) = (at(1.0), at(-1.0));
             for row in 0..9 {
@@ -136,7 +142,10 @@ impl Ellipsoid {
             }
         }
         let covariance = gradient * self.covariance * gradient.transpose();
-        Nine { values, sigmas: std::array::from_fn(|k| covariance[(k, k)].max(0.0).sqrt()) }
+        Nine {
+            values,
+            sigmas: std::array::from_fn(|k| covariance[(k, k)].max(0.0).sqrt()),
+        }
     }
 }
 
@@ -148,7 +157,17 @@ pub fn shape(nine: &[f64; 9], convention: Convention) -> Matrix3<f64> {
         Convention::Standard => (lambda.sin(), phi.sin() * lambda.cos()),
     };
     let third = [c * x, c * y, c * phi.cos() * lambda.cos()];
-    Matrix3::new(a, 0.0, 0.0, b * rho.sin(), b * rho.cos(), 0.0, third[0], third[1], third[2])
+    Matrix3::new(
+        a,
+        0.0,
+        0.0,
+        b * rho.sin(),
+        b * rho.cos(),
+        0.0,
+        third[0],
+        third[1],
+        third[2],
+    )
 }
 
 fn angles(t: &Matrix3<f64>, offset: &Vector3<f64>, convention: Convention) -> [f64; 9] {
@@ -159,7 +178,17 @@ fn angles(t: &Matrix3<f64>, offset: &Vector3<f64>, convention: Convention) -> [f
     };
     let b = t[(1, 0)].hypot(t[(1, 1)]);
     let c = t.row(2).norm();
-    [t[(0, 0)], b, c, offset.x, offset.y, offset.z, t[(1, 0)].atan2(t[(1, 1)]), phi, lambda]
+    [
+        t[(0, 0)],
+        b,
+        c,
+        offset.x,
+        offset.y,
+        offset.z,
+        t[(1, 0)].atan2(t[(1, 1)]),
+        phi,
+        lambda,
+    ]
 }
 
 fn triangle(six: &DVector<f64>) -> Matrix3<f64> {
@@ -170,20 +199,39 @@ fn triangle(six: &DVector<f64>) -> Matrix3<f64> {
 fn algebraic(points: &[Vector3<f64>]) -> Result<(Matrix3<f64>, Vector3<f64>), EllipsoidError> {
     let design = DMatrix::from_fn(points.len(), 9, |row, k| {
         let v = &points[row];
-        [v.x * v.x, v.y * v.y, v.z * v.z, 2.0 * v.x * v.y, 2.0 * v.x * v.z, 2.0 * v.y * v.z, 2.0 * v.x, 2.0 * v.y, 2.0 * v.z][k]
+        [
+            v.x * v.x,
+            v.y * v.y,
+            v.z * v.z,
+            2.0 * v.x * v.y,
+            2.0 * v.x * v.z,
+            2.0 * v.y * v.z,
+            2.0 * v.x,
+            2.0 * v.y,
+            2.0 * v.z,
+        ][k]
     });
-    let s = least_squares::solve(&design, &DVector::from_element(points.len(), 1.0)).map_err(|_| EllipsoidError::Open)?;
+    let s =
+        least_squares::solve(&design, &DVector::from_element(points.len(), 1.0)).map_err(|_| EllipsoidError::Open)?;
     let s = s.parameters;
     let m = Matrix3::new(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]);
     let offset = -(m.try_inverse().ok_or(EllipsoidError::Shapeless)? * Vector3::new(s[6], s[7], s[8]));
     let k = 1.0 + offset.dot(&(m * offset));
     let inverse = (m / k).try_inverse().ok_or(EllipsoidError::Shapeless)?;
-    let shape = ((inverse + inverse.transpose()) / 2.0).cholesky().ok_or(EllipsoidError::Shapeless)?.l();
+    let shape = ((inverse + inverse.transpose()) / 2.0)
+        .cholesky()
+        .ok_or(EllipsoidError::Shapeless)?
+        .l();
     Ok((shape, offset))
 }
 
 /// One Gauss-Newton step; `variance` is that of one output, in the units of the points.
-fn step(points: &[Vector3<f64>], shape: &Matrix3<f64>, offset: &Vector3<f64>, variance: f64) -> Option<least_squares::Solution> {
+fn step(
+    points: &[Vector3<f64>],
+    shape: &Matrix3<f64>,
+    offset: &Vector3<f64>,
+    variance: f64,
+) -> Option<least_squares::Solution> {
     let mut design = DMatrix::zeros(points.len(), 9);
     let mut observed = DVector::zeros(points.len());
     let inverse = shape.try_inverse()?;
@@ -227,7 +275,8 @@ fn finish(
 ) -> Ellipsoid {
     let units = DVector::from_fn(9, |k, _| if k < 6 { size / strength } else { size });
     let residual = |v: &Vector3<f64>| 1.0 - shape.solve_lower_triangular(&(v - offset)).unwrap_or_default().norm();
-    let correlation = SMatrix::<f64, 9, 9>::from_fn(|row, column| step.covariance[(row, column)] * units[row] * units[column]);
+    let correlation =
+        SMatrix::<f64, 9, 9>::from_fn(|row, column| step.covariance[(row, column)] * units[row] * units[column]);
     Ellipsoid {
         shape: shape * (size / strength),
         offset: offset * size + centre,
@@ -241,8 +290,21 @@ fn finish(
 
 fn condition(points: &[Vector3<f64>], shape: &Matrix3<f64>, offset: &Vector3<f64>) -> f64 {
     let row = |v: &Vector3<f64>| {
-        let u = shape.solve_lower_triangular(&(v - offset)).unwrap_or_default().normalize();
-        [u.x * u.x, u.x * u.y, u.y * u.y, u.x * u.z, u.y * u.z, u.z * u.z, u.x, u.y, u.z]
+        let u = shape
+            .solve_lower_triangular(&(v - offset))
+            .unwrap_or_default()
+            .normalize();
+        [
+            u.x * u.x,
+            u.x * u.y,
+            u.y * u.y,
+            u.x * u.z,
+            u.y * u.z,
+            u.z * u.z,
+            u.x,
+            u.y,
+            u.z,
+        ]
     };
     let rows: Vec<[f64; 9]> = points.iter().map(row).collect();
     Information::of(&DMatrix::from_fn(rows.len(), 9, |r, k| rows[r][k])).map_or(f64::INFINITY, |known| known.condition)

@@ -121,10 +121,10 @@ impl Information {
 }
 
 /// Half-width of the two-sided 95 % interval in sigmas, for a sigma estimated with `freedom` degrees of freedom:
-/// Student's t after M. Abramowitz, I. A. Stegun (1964), 26.7.5 (to 3e-3 from five degrees on; their tables below).
+/// Student's t after M. Abramowitz, I. A. Stegun (1964), 26.7.5 (to 3e-3 from six degrees on; their tables below).
 pub fn student_95(freedom: usize) -> f64 {
     const Z: f64 = 1.959_963_985;
-    const FEW: [f64; 5] = [f64::INFINITY, 12.706, 4.303, 3.182, 2.776];
+    const FEW: [f64; 6] = [f64::INFINITY, 12.706, 4.303, 3.182, 2.776, 2.571];
     if let Some(&few) = FEW.get(freedom) {
         return few;
     }

@@ -13,7 +13,17 @@ fn large() -> [f64; 9] {
 /// Values of Table 6.1 of Marinho (2017).
 fn table_6_1() -> [f64; 9] {
     let rad = f64::to_radians;
-    [1.0855, 1.034, 1.0529, 199.9729, 80.5599, -110.4864, rad(0.0514), rad(0.0488), rad(-0.0033)]
+    [
+        1.0855,
+        1.034,
+        1.0529,
+        199.9729,
+        80.5599,
+        -110.4864,
+        rad(0.0514),
+        rad(0.0488),
+        rad(-0.0033),
+    ]
 }
 
 fn offset(nine: &[f64; 9]) -> Vector3<f64> {
@@ -52,8 +62,13 @@ fn both_conventions_give_the_golden_fields() {
     ] {
         for (convention, expected) in [(Convention::Standard, standard), (Convention::Thesis, thesis)] {
             let t = shape(&nine, convention);
-            let field = t.solve_lower_triangular(&(Vector3::from(counts) - offset(&nine))).expect("triangle");
-            assert!((field - Vector3::from(expected)).amax() < DIGITS, "{convention:?} {field}");
+            let field = t
+                .solve_lower_triangular(&(Vector3::from(counts) - offset(&nine)))
+                .expect("triangle");
+            assert!(
+                (field - Vector3::from(expected)).amax() < DIGITS,
+                "{convention:?} {field}"
+            );
         }
     }
 }
@@ -69,7 +84,10 @@ fn noise_free_points_give_all_nine_back_in_either_convention() {
     }
     let thesis = found.nine(Convention::Thesis).values;
     assert!((shape(&thesis, Convention::Thesis) - found.shape).norm() < SETTLED);
-    assert!((thesis[7] - large()[8]).abs() < 0.01 && (thesis[8] - large()[7]).abs() < 0.01, "phi and lambda change places");
+    assert!(
+        (thesis[7] - large()[8]).abs() < 0.01 && (thesis[8] - large()[7]).abs() < 0.01,
+        "phi and lambda change places"
+    );
 }
 
 #[test]
@@ -94,7 +112,10 @@ fn intervals_cover_95_of_100_and_a_large_offset_does_not_bias() {
         // Mean error of 1,000 within four of its own standard deviations: biased a tenth of a sigma it would not be.
         let mean = sum[k] / runs as f64;
         let spread = (squares[k] / runs as f64).sqrt();
-        assert!(mean.abs() < 4.0 * spread / (runs as f64).sqrt(), "parameter {k}: {mean} of {spread}");
+        assert!(
+            mean.abs() < 4.0 * spread / (runs as f64).sqrt(),
+            "parameter {k}: {mean} of {spread}"
+        );
     }
 }
 
@@ -108,17 +129,28 @@ fn left_at_the_algebraic_start_it_would_be_biased() {
         fitted_sum += Ellipsoid::fit(&points, 230.0).expect("fit").shape[(0, 0)] - 1.05;
     }
     let (algebraic, fitted) = (algebraic_sum / 200.0, fitted_sum / 200.0);
-    assert!(fitted.abs() < 5e-4 && algebraic.abs() > 3.0 * fitted.abs(), "{algebraic} {fitted}");
+    assert!(
+        fitted.abs() < 5e-4 && algebraic.abs() > 3.0 * fitted.abs(),
+        "{algebraic} {fitted}"
+    );
 }
 
 #[test]
 fn what_is_no_ellipsoid_is_refused() {
-    let flat: Vec<_> = cloud(&large(), 230.0, 50, 0.0, 1).iter().map(|v| Vector3::new(v.x, v.y, 3.0)).collect();
+    let flat: Vec<_> = cloud(&large(), 230.0, 50, 0.0, 1)
+        .iter()
+        .map(|v| Vector3::new(v.x, v.y, 3.0))
+        .collect();
     assert_eq!(Ellipsoid::fit(&flat, 230.0), Err(EllipsoidError::Open));
     let few = cloud(&large(), 230.0, 9, 0.0, 1);
     assert_eq!(Ellipsoid::fit(&few, 230.0), Err(EllipsoidError::Few(9)));
     let ways = |k: i32| f64::from(k % 5 - 2);
-    let saddle: Vec<_> = (0..25).map(|k| Vector3::new(ways(k), ways(k / 5), 0.5 * ways(k) * ways(k / 5) + ways(k * 7) * 0.1)).collect();
+    let saddle: Vec<_> = (0..25)
+        .map(|k| Vector3::new(ways(k), ways(k / 5), 0.5 * ways(k) * ways(k / 5) + ways(k * 7) * 0.1))
+        .collect();
     assert!(Ellipsoid::fit(&saddle, 1.0).is_err());
-    assert_eq!(Ellipsoid::fit(&[Vector3::zeros(); 20], 1.0), Err(EllipsoidError::Shapeless));
+    assert_eq!(
+        Ellipsoid::fit(&[Vector3::zeros(); 20], 1.0),
+        Err(EllipsoidError::Shapeless)
+    );
 }
