@@ -36,9 +36,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
-        Command::Calibrate(arguments) => {
-            bench::calibrate::run(&arguments)?;
-        }
+        Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
     }
     Ok(())

@@ -42,6 +42,9 @@ pub enum CalibrateError {
     /// A channel is not determined.
     #[error(transparent)]
     Calibration(#[from] crate::controlled::CalibrationError),
+    /// It was done, and the report says what is wrong.
+    #[error("not good; what is wrong stands above")]
+    NotGood,
     /// Anything else, with the file it is about.
     #[error("{file}: {why}")]
     File {
@@ -58,18 +61,20 @@ impl CalibrateError {
     }
 }
 
-/// Runs `ground calibrate`; `true` if the result is good.
+/// Runs `ground calibrate`.
 ///
 /// # Errors
-/// When files cannot be read or written, or do not determine what is asked for.
-pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
-    match &arguments.what {
+/// When files cannot be read or written, or do not determine what is asked for; and when the result is not good, so that
+/// a script does not take it for one.
+pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
+    let good = match &arguments.what {
         What::RateTable(arguments) => controlled::rate_table(arguments),
         What::MultiPosition(arguments) => controlled::multi_position(arguments),
         What::Ellipsoid(arguments) => ellipsoid::run(arguments),
         What::Diff(arguments) => sets::diff(arguments),
         What::Unit(arguments) => sets::unit(arguments).map(|()| true),
-    }
+    }?;
+    if good { Ok(()) } else { Err(CalibrateError::NotGood) }
 }
 
 /// Where the results go.

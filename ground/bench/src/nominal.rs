@@ -33,6 +33,8 @@ pub struct NominalChannel {
     pub noise_sigma: Option<f64>,
     /// Beyond it the channel clips.
     pub range: Option<[f64; 2]>,
+    /// Width of its code; none for a channel that is not rounded.
+    pub bits: Option<u32>,
 }
 
 impl Nominal {
@@ -71,9 +73,10 @@ impl Nominal {
 }
 
 impl NominalChannel {
-    /// Largest code that is still a measurement [counts]: the range, less a count.
+    /// Outputs from here on are no measurement [counts]: the range, less a count where the channel is rounded.
     pub fn limit_counts(&self) -> f64 {
-        let least = |[low, high]: [f64; 2]| low.abs().min(high.abs()) / self.lsb - 1.0;
+        let rounding = if self.bits.is_some() { 1.0 } else { 0.0 };
+        let least = |[low, high]: [f64; 2]| low.abs().min(high.abs()) / self.lsb - rounding;
         self.range.map_or(f64::INFINITY, least)
     }
 }
@@ -83,7 +86,7 @@ mod tests {
     use super::*;
 
     const UNIT: &str = "name = \"u\"\ncycle_s = 0.2\n[[channel]]\nname = \"g1\"\nsensor = \"gyro\"\n\
-        axis_b = [0.0, 0.6, 0.8]\nlsb = 0.5\nrange = [-100.0, 100.0]\nslot_s = 0.1\n";
+        axis_b = [0.0, 0.6, 0.8]\nlsb = 0.5\nrange = [-100.0, 100.0]\nbits = 14\nslot_s = 0.1\n";
 
     #[test]
     fn axes_and_limits_are_those_of_the_file() {
