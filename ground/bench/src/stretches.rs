@@ -8,11 +8,12 @@
 //! scatter. So half a log may be movement. Stretches are trimmed by half a window at each end, where the movement begins
 //! or rings out. Samples that were not read (`NaN`) are passed over; a window needs half of its samples.
 
-/// Scatter allowed in a still window, in noises: chance keeps a window of ten within 1.9.
-const QUIET: f64 = 2.0;
+/// Scatter allowed in a still window, in noises. The lower quartile over windows of ten is 0.8 of the true noise, so this
+/// is 2.4 of it, which chance passes once in a million windows.
+const QUIET: f64 = 3.0;
 
-/// Rise allowed over a still window, in noises.
-const LEVEL: f64 = 4.0;
+/// Rise allowed over a still window, in noises: chance alone lifts windows of ten by 1.1 true noises, this is 4.4 of that.
+const LEVEL: f64 = 6.0;
 
 /// Shortest window [samples].
 const LEAST: usize = 5;
