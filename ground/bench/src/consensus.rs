@@ -120,7 +120,7 @@ impl Scaled {
     fn of(claims: &[Claim]) -> Option<Self> {
         let channels = claims.first()?.values.len();
         let unit = claims.iter().map(|claim| claim.excitation_b.norm()).fold(0.0, f64::max);
-        if claims.len() < 6 || channels == 0 || !(unit > 0.0) {
+        if claims.len() < 6 || channels == 0 || unit <= 0.0 {
             return None;
         }
         let mut values = DMatrix::from_fn(claims.len(), channels, |row, k| claims[row].values[k]);

@@ -76,6 +76,9 @@ pub struct Layout<'a> {
     pub limit: &'a dyn Fn(&str) -> f64,
 }
 
+/// Row number and row to the value of every channel.
+pub type Outputs<'a> = dyn Fn(usize, &Row) -> Result<Vec<Option<f64>>, TableError> + 'a;
+
 impl Experiment {
     /// Reads a table that holds both excitations and outputs.
     ///
@@ -105,7 +108,7 @@ impl Experiment {
         table: &Table,
         layout: &Layout,
         channels: Vec<String>,
-        outputs: &dyn Fn(usize, &Row) -> Result<Vec<Option<f64>>, TableError>,
+        outputs: &Outputs,
     ) -> Result<Self, TableError> {
         let source = Source::of(table, layout.kind)?;
         let mut remarks = Vec::new();

@@ -90,7 +90,11 @@ impl Information {
         let largest = svd.singular_values.max();
         let least = svd.singular_values.min();
         let floor = OPEN * largest;
-        let open = svd.singular_values.iter().enumerate().filter(|&(_, &s)| !(s > floor));
+        let open = svd
+            .singular_values
+            .iter()
+            .enumerate()
+            .filter(|&(_, &s)| s.is_nan() || s <= floor);
         let directions: Vec<_> = open
             .map(|(k, _)| {
                 let direction = v_t.row(k).transpose();

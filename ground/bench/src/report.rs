@@ -106,19 +106,29 @@ impl Report {
     }
 }
 
+/// What a channel leaves over, as `(row, measured - predicted)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leftover {
+    /// The channel.
+    pub channel: String,
+    /// Rows of the fit.
+    pub fitted: Vec<(f64, f64)>,
+    /// The same rows, each predicted without it.
+    pub left_out: Vec<(f64, f64)>,
+}
+
 /// Residuals of every channel against the row's number, fitted and left out.
-pub fn residuals(
-    title: &str,
-    unit: &str,
-    channels: &[(String, Vec<(f64, f64)>, Vec<(f64, f64)>)],
-) -> Result<Figure, chart::ChartError> {
-    let panel = |(name, fitted, left_out): &(String, Vec<(f64, f64)>, Vec<(f64, f64)>)| Panel {
-        title: name.clone(),
+///
+/// # Errors
+/// When the plotting library refuses.
+pub fn residuals(title: &str, unit: &str, channels: &[Leftover]) -> Result<Figure, chart::ChartError> {
+    let panel = |one: &Leftover| Panel {
+        title: one.channel.clone(),
         x: Axis::linear("row"),
         y: Axis::linear(format!("measured − predicted [{unit}]")),
         layers: vec![
-            Layer::new("in the fit", 0, Marks::Dots(fitted.clone())),
-            Layer::new("left out", 1, Marks::Dots(left_out.clone())),
+            Layer::new("in the fit", 0, Marks::Dots(one.fitted.clone())),
+            Layer::new("left out", 1, Marks::Dots(one.left_out.clone())),
         ],
     };
     let panels: Vec<Panel> = channels.iter().map(panel).collect();
@@ -153,11 +163,12 @@ mod tests {
     #[test]
     fn the_page_holds_verdict_table_and_residuals_and_asks_for_nothing() {
         let mut report = report();
-        report.picture(residuals(
-            "Residuals",
-            "counts",
-            &[("g1".into(), vec![(1.0, 0.5), (2.0, -0.5)], vec![(1.0, 0.7)])],
-        ));
+        let one = Leftover {
+            channel: "g1".into(),
+            fitted: vec![(1.0, 0.5), (2.0, -0.5)],
+            left_out: vec![(1.0, 0.7)],
+        };
+        report.picture(residuals("Residuals", "counts", &[one]));
         let page = report.html("from run.csv");
         for part in ["verdict", "good", "-12.58", "<svg", "left out"] {
             assert!(page.contains(part), "{part}");

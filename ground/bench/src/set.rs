@@ -261,7 +261,7 @@ impl Entry {
         {
             return Err("holds something that is no number");
         }
-        if !(self.sensitivity().norm() > 0.0) {
+        if self.sensitivity().norm() == 0.0 {
             return Err("its sensitivity is zero");
         }
         if self.bias_counts.is_empty() {

@@ -9,7 +9,7 @@ use crate::{
     experiment::{Experiment, Kind, Layout},
     lean, log,
     nominal::{Nominal, NominalChannel},
-    report::{self, Report},
+    report::{self, Leftover, Report},
     response::Orders,
     set::Entry,
     stretches::{self, Stretch},
@@ -299,7 +299,7 @@ fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradi
                 "{}: as many rows as parameters, nothing checks them",
                 channel.name
             ));
-        } else if !(left_out <= CARRIES_OVER * fit.scatter + f64::EPSILON * fit.counts_per_unit()) {
+        } else if left_out.is_nan() || left_out > CARRIES_OVER * fit.scatter + f64::EPSILON * fit.counts_per_unit() {
             let text = "rows left out are predicted far worse than rows in the fit: add positions";
             report.wrong.push(format!("{}: {text}", channel.name));
         }
@@ -311,7 +311,11 @@ fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradi
                 .map(|(&row, value)| (row as f64 + 1.0, *value))
                 .collect()
         };
-        pictures.push((channel.name.clone(), points(&fit.residuals), points(&channel.held_out)));
+        pictures.push(Leftover {
+            channel: channel.name.clone(),
+            fitted: points(&fit.residuals),
+            left_out: points(&channel.held_out),
+        });
     }
     report.picture(report::residuals("Residuals", "counts", &pictures));
     if !found.consensus.contradictions.is_empty() {

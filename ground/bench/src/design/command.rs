@@ -107,12 +107,15 @@ fn means(arguments: &Arguments) -> Result<Means, DesignError> {
         .filter_map(|channel| channel.noise_sigma)
         .fold(0.0, f64::max);
     let numbers = [arguments.minutes, arguments.run, arguments.rate, arguments.step];
-    if axes_b.is_empty() || !(noise > 0.0) {
+    if axes_b.is_empty() || noise <= 0.0 {
         return Err(DesignError::Missing(format!(
             "the unit file has no {sensor} with axis_b and noise_sigma"
         )));
     }
-    if !numbers.iter().all(|number| number.is_finite() && *number > 0.0) || !(arguments.between >= 0.0) {
+    if !numbers.iter().all(|number| number.is_finite() && *number > 0.0)
+        || arguments.between.is_nan()
+        || arguments.between < 0.0
+    {
         return Err(DesignError::Missing(
             "minutes, run, rate and step must be positive numbers".into(),
         ));
