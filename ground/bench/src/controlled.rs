@@ -124,7 +124,7 @@ pub fn calibrate(experiment: &Experiment, options: &Options) -> Result<Calibrati
     let found_b: Vec<_> = channels.iter().map(|channel| channel.response.axis_b()).collect();
     Ok(Calibration {
         disagree: disagree.collect(),
-        repeated: repeated(experiment),
+        repeated: repeated(experiment, &excitation_b),
         wirings: wirings(&found_b, &options.nominal_b),
         channels,
         excitation_b,
@@ -222,13 +222,16 @@ pub fn antagonists(excitation_b: &[Option<Vector3<f64>>]) -> Vec<(usize, usize)>
     pairs
 }
 
-/// Rows whose excitation an earlier row had, at the same angles where these are known.
-fn repeated(experiment: &Experiment) -> Vec<(usize, usize)> {
+/// Rows whose excitation, as it is used, an earlier row had, at the same angles where these are known.
+fn repeated(experiment: &Experiment, excitation_b: &[Option<Vector3<f64>>]) -> Vec<(usize, usize)> {
     let trials = &experiment.trials;
     let same = |a: usize, b: usize| {
-        let (x, y) = (trials[a].excitation_b, trials[b].excitation_b);
-        let warmth = (trials[a].temperature_c - trials[b].temperature_c).abs() > 1.0;
-        (x - y).norm() < SAME * x.norm() && trials[a].pose == trials[b].pose && !warmth
+        let (Some(x), Some(y)) = (excitation_b[a], excitation_b[b]) else {
+            return false;
+        };
+        let as_warm = (trials[a].temperature_c - trials[b].temperature_c).abs() <= 1.0;
+        let warmth_unknown = trials[a].temperature_c.is_nan();
+        (x - y).norm() < SAME * x.norm() && trials[a].pose == trials[b].pose && (as_warm || warmth_unknown)
     };
     let earlier = |row: usize| (0..row).find(|&before| same(before, row)).map(|before| (row, before));
     (0..trials.len()).filter_map(earlier).collect()
