@@ -1,1 +1,3 @@
 //! The bench: calibrates the unit and measures its noise.
+
+pub mod allan;
