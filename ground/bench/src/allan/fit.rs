@@ -10,8 +10,9 @@
 //! uncertainty implies (Satterthwaite), which is where the intervals come from.
 //!
 //! A term is refused, and bounded from above instead, if its squared coefficient is less than [`SEEN`] standard
-//! deviations from zero or if it nowhere makes up [`VISIBLE`] of the variance at [`OCTAVES`] averaging times: a slope
-//! that short is a guess.
+//! deviations from zero or if it does not make up [`VISIBLE`] of the variance at [`OCTAVES`] averaging times: a slope
+//! that short is a guess. Refused terms of [`KEPT`] standard deviations stay in the fit all the same: left out, they would
+//! pass into the coefficients of the others.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,6 +25,8 @@ use super::{
 
 /// Standard deviations a squared coefficient must be from zero.
 const SEEN: f64 = 2.5;
+/// Standard deviations from zero below which a term is left out of the fit altogether.
+const KEPT: f64 = 1.0;
 /// Share of the variance that counts as visible.
 const VISIBLE: f64 = 0.2;
 /// At how many octaves a term must be visible.
@@ -129,16 +132,25 @@ fn fit_with(points: &[Point], terms: &[Term], covariance: &Covariance, confidenc
     let mut kept: Vec<usize> = (0..terms.len().min(problem.tau_s.len().saturating_sub(1))).collect();
     let solution = loop {
         let solution = problem.solve(&kept)?;
-        match problem.least_seen(&kept, &solution) {
-            Some(worst) => kept.retain(|term| *term != worst),
-            None => break solution,
+        let weakest = kept
+            .iter()
+            .copied()
+            .min_by(|a, b| solution.sigmas(*a).total_cmp(&solution.sigmas(*b)))?;
+        if solution.sigmas(weakest) >= KEPT {
+            break solution;
         }
+        kept.retain(|term| *term != weakest);
     };
     let findings = (0..terms.len()).map(|term| {
-        let finding = if kept.contains(&term) {
-            seen(solution.squared[term], solution.sigma[term], confidence)?
+        let finding = if !kept.contains(&term) {
+            let mut with = kept.clone();
+            with.truncate(problem.tau_s.len().saturating_sub(2));
+            with.push(term);
+            problem.solve(&with)?.not_seen(term)
+        } else if problem.is_seen(term, &solution) {
+            solution.seen(term, confidence)?
         } else {
-            problem.not_seen(&kept, term)?
+            solution.not_seen(term)
         };
         Some((terms[term], finding))
     });
@@ -211,36 +223,40 @@ impl Problem<'_> {
             .filter(|most| *most > 0.0)
     }
 
-    /// The term that is seen least among those not seen well enough.
-    fn least_seen(&self, kept: &[usize], solution: &Solution) -> Option<usize> {
-        let sigmas = |term: usize| solution.squared[term] / solution.sigma[term].max(f64::MIN_POSITIVE);
-        let visible = |term: usize| {
-            let part = |i: usize| solution.squared[term] * self.terms[term].variance(self.tau_s[i]);
-            (0..self.tau_s.len())
-                .filter(|&i| part(i) > VISIBLE * self.variance[i])
-                .count()
-        };
-        let poor = kept
-            .iter()
-            .copied()
-            .filter(|&term| sigmas(term) < SEEN || visible(term) < OCTAVES);
-        poor.min_by(|a, b| sigmas(*a).total_cmp(&sigmas(*b)))
-    }
-
-    fn not_seen(&self, kept: &[usize], term: usize) -> Option<Finding> {
-        let mut with = kept.to_vec();
-        with.truncate(self.tau_s.len().saturating_sub(2));
-        with.push(term);
-        let solution = self.solve(&with)?;
-        let most = solution.squared[term].max(0.0) + ONE_SIDED * solution.sigma[term];
-        Some(Finding::NotSeen { below: most.sqrt() })
+    fn is_seen(&self, term: usize, solution: &Solution) -> bool {
+        let part = |i: usize| solution.squared[term] * self.terms[term].variance(self.tau_s[i]);
+        let visible = (0..self.tau_s.len())
+            .filter(|&i| part(i) > VISIBLE * self.variance[i])
+            .count();
+        solution.sigmas(term) >= SEEN && visible >= OCTAVES
     }
 }
 
-fn seen(squared: f64, sigma: f64, confidence: f64) -> Option<Finding> {
-    let value = squared.sqrt();
-    let (low, high) = bounds::bounds(value, 2.0 * (squared / sigma).powi(2), confidence)?;
-    Some(Finding::Seen { value, low, high })
+impl Solution {
+    /// How many standard deviations a squared coefficient is from zero.
+    fn sigmas(&self, term: usize) -> f64 {
+        self.squared[term] / self.sigma[term].max(f64::MIN_POSITIVE)
+    }
+
+    fn seen(&self, term: usize, confidence: f64) -> Option<Finding> {
+        let value = self.squared[term].sqrt();
+        let (low, high) = bounds::bounds(value, 2.0 * self.sigmas(term).powi(2), confidence)?;
+        Some(Finding::Seen { value, low, high })
+    }
+
+    fn not_seen(&self, term: usize) -> Finding {
+        let normal = (self.squared[term].max(0.0) + ONE_SIDED * self.sigma[term]).sqrt();
+        // A term that is its own noise may have come out low by chance, the more so the fewer its degrees of freedom.
+        let sigmas = self.sigmas(term);
+        let skewed = if sigmas < KEPT {
+            None
+        } else {
+            bounds::bounds(self.squared[term].sqrt(), 2.0 * sigmas * sigmas, 0.9)
+        };
+        Finding::NotSeen {
+            below: skewed.map_or(normal, |(_, high)| high.max(normal)),
+        }
+    }
 }
 
 #[cfg(test)]

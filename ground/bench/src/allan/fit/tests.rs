@@ -54,7 +54,7 @@ fn intervals_hold_the_truth_in_93_to_97_of_100_records() {
     for (term, truth) in [
         (Term::Quantisation, 0.01),
         (Term::AngleWalk, 0.03),
-        (Term::RateWalk, 0.003),
+        (Term::RateWalk, 0.01),
     ] {
         let seen = fits
             .iter()
