@@ -40,7 +40,7 @@ fn intervals_hold_the_truth_in_93_to_97_of_100_records() {
     let noise = Noise {
         quantisation: 0.01,
         arw: 0.03,
-        rrw: 0.003,
+        rrw: 0.01,
         ..Noise::default()
     };
     let covariance = covariance_of(&points(&noise, 8_192, 0), STEP_S, &Term::POWER_LAWS);
