@@ -77,41 +77,57 @@ pub struct Layout<'a> {
 }
 
 impl Experiment {
-    /// Reads a table.
+    /// Reads a table that holds both excitations and outputs.
     ///
     /// # Errors
     /// When its meaning is not certain.
     pub fn read(table: &Table, layout: &Layout) -> Result<Self, TableError> {
-        let channels = channels(table, layout.channels)?;
+        let columns = channels(table, layout.channels)?;
+        let names: Vec<String> = columns.iter().map(|&column| table.columns[column].clone()).collect();
+        let outputs = |_: usize, row: &Row| columns.iter().map(|&column| table.number(row, column)).collect();
+        let experiment = Self::assemble(table, layout, names, &outputs)?;
+        for (k, &column) in columns.iter().enumerate() {
+            let mut values = experiment.trials.iter().filter_map(|trial| trial.values[k]);
+            let first = values.next();
+            if values.clone().next().is_some() && values.all(|value| Some(value) == first) {
+                let why = "never changes: is the channel connected, is the column the right one?";
+                return Err(table.error(0, column, why));
+            }
+        }
+        Ok(experiment)
+    }
+
+    /// Excitations from a table, outputs from elsewhere: row number and row to the value of every named channel.
+    ///
+    /// # Errors
+    /// When the table's meaning is not certain.
+    pub fn assemble(
+        table: &Table,
+        layout: &Layout,
+        channels: Vec<String>,
+        outputs: &dyn Fn(usize, &Row) -> Result<Vec<Option<f64>>, TableError>,
+    ) -> Result<Self, TableError> {
         let source = Source::of(table, layout.kind)?;
         let mut remarks = Vec::new();
         let mut trials = Vec::new();
         for (number, row) in table.rows.iter().enumerate() {
-            let mut values = Vec::new();
-            for &column in &channels {
-                let name = &table.columns[column];
-                let value = table.number(row, column)?;
-                let kept = value.filter(|value| value.abs() < (layout.limit)(name));
-                match (value, kept) {
-                    (None, _) => remarks.push(format!("line {}, {name}: empty, left out", row.line)),
-                    (Some(value), None) => {
-                        remarks.push(format!(
-                            "line {}, {name}: {value} is at the end of its range, left out",
-                            row.line
-                        ));
+            let mut values = outputs(number, row)?;
+            for (value, name) in values.iter_mut().zip(&channels) {
+                let why = match *value {
+                    None => "empty, left out".to_string(),
+                    Some(code) if code.abs() >= (layout.limit)(name) => {
+                        format!("{code} is at the end of its range, left out")
                     }
-                    _ => {}
-                }
-                values.push(kept);
+                    Some(_) => continue,
+                };
+                remarks.push(format!("line {}, {name}: {why}", row.line));
+                *value = None;
             }
             let (claimed_b, pose, rate_rad_s) = source.of_row(table, row)?;
             let of_angles = pose.map(|(pose, turning)| match turning {
                 Some(turning) => layout.mount.rate_b(pose, turning, rate_rad_s, &layout.site),
                 None => layout.mount.force_b(pose, &layout.site, [0.0; 2]),
             });
-            let Some(excitation_b) = of_angles.or(claimed_b) else {
-                return Err(table.error(row.line, channels[0], "the row says nothing about its excitation"));
-            };
             let seq = table.column("seq").and_then(|column| row.cells.get(column)).cloned();
             let temperature = table
                 .column("temperature_c")
@@ -124,26 +140,16 @@ impl Experiment {
                 line: row.line,
                 claimed_b,
                 pose,
-                excitation_b,
+                // A source has components or angles, so there is one.
+                excitation_b: of_angles.or(claimed_b).unwrap_or_default(),
                 temperature_c: temperature.flatten().unwrap_or(f64::NAN),
                 values,
             });
         }
-        for (k, &column) in channels.iter().enumerate() {
-            let mut values = trials.iter().filter_map(|trial: &Trial| trial.values[k]);
-            let first = values.next();
-            if trials.len() > 1 && values.all(|value| Some(value) == first) {
-                return Err(table.error(
-                    0,
-                    column,
-                    "never changes: is the channel connected, is the column the right one?",
-                ));
-            }
-        }
         Ok(Experiment {
             file: table.file.clone(),
             kind: layout.kind,
-            channels: channels.iter().map(|&column| table.columns[column].clone()).collect(),
+            channels,
             trials,
             remarks,
         })

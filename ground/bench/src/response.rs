@@ -124,7 +124,12 @@ impl Response {
 
     /// The output for an excitation [counts].
     pub fn predict(&self, excitation_b: &Vector3<f64>, temperature_c: f64) -> f64 {
-        let t = temperature_c - self.reference_c;
+        // Without a thermometer there is no polynomial either.
+        let t = if self.reference_c.is_finite() {
+            temperature_c - self.reference_c
+        } else {
+            0.0
+        };
         let series = |coefficients: &[f64]| coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c);
         (1.0 + t * series(&self.scale)) * self.sensitivity_b.dot(excitation_b) + series(&self.bias)
     }
