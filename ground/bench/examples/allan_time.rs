@@ -24,7 +24,11 @@ const FOUR: [Deviation; 4] = [Deviation::Oadev, Deviation::Mdev, Deviation::Tdev
 
 fn main() -> Result<(), Box<dyn Error>> {
     let given: Vec<usize> = env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
-    let lengths = if given.is_empty() { vec![145_312, 10_000_000] } else { given };
+    let lengths = if given.is_empty() {
+        vec![145_312, 10_000_000]
+    } else {
+        given
+    };
     for length in lengths {
         let series = Series::complete(0.05, rates(length))?;
         let mut least = Duration::MAX;
@@ -38,13 +42,26 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{length} points: {:.2} ms here", 1e3 * least.as_secs_f64());
         let Ok(python) = env::var("PYTHON") else { continue };
         let file = env::temp_dir().join(format!("allan-{}.f64", std::process::id()));
-        fs::write(&file, series.values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())?;
+        fs::write(
+            &file,
+            series
+                .values
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect::<Vec<u8>>(),
+        )?;
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/allan.py");
         let output = Command::new(python).arg(script).arg(&file).arg("20").output();
         fs::remove_file(&file)?;
         let text = String::from_utf8(output?.stdout)?;
-        let Some(peer_s) = text.lines().find_map(|line| line.strip_prefix("seconds ")?.parse::<f64>().ok()) else {
-            println!("  no allantools: {}", text.lines().next().unwrap_or("the script said nothing"));
+        let Some(peer_s) = text
+            .lines()
+            .find_map(|line| line.strip_prefix("seconds ")?.parse::<f64>().ok())
+        else {
+            println!(
+                "  no allantools: {}",
+                text.lines().next().unwrap_or("the script said nothing")
+            );
             continue;
         };
         let mut worst = 0.0_f64;

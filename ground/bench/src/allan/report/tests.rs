@@ -50,7 +50,13 @@ fn coefficients_come_in_customary_units() {
         .find(|(name, _)| name.starts_with("angle random walk"))
         .expect("a line")
         .1;
-    assert!(walk.starts_with("0.6") || walk.starts_with("0.59"), "{walk}");
+    // 0.01 deg/sqrt(s) is 0.6 deg/sqrt(h); 20,000 samples know it to about 1 %, three of which are allowed.
+    let value: f64 = walk
+        .split(' ')
+        .next()
+        .and_then(|cell| cell.parse().ok())
+        .expect("a number");
+    assert!((value / 0.6 - 1.0).abs() < 0.03, "{walk}");
     assert!(walk.ends_with("deg/sqrt(h)"));
     assert_eq!(customary(Term::RateWalk, "V"), (1.0, "V/sqrt(s)".into()));
 }
