@@ -29,6 +29,7 @@ enum What {
     RateTable(controlled::RateTable),
     MultiPosition(controlled::MultiPosition),
     Ellipsoid(ellipsoid::Arguments),
+    Drift(crate::drift::Arguments),
     Diff(sets::Diff),
     Unit(sets::Unit),
 }
@@ -42,6 +43,9 @@ pub enum CalibrateError {
     /// A channel is not determined.
     #[error(transparent)]
     Calibration(#[from] crate::controlled::CalibrationError),
+    /// A drift test is not conclusive.
+    #[error(transparent)]
+    Drift(#[from] crate::drift::DriftError),
     /// It was done, and the report says what is wrong.
     #[error("not good; what is wrong stands above")]
     NotGood,
@@ -71,6 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
         What::RateTable(arguments) => controlled::rate_table(arguments),
         What::MultiPosition(arguments) => controlled::multi_position(arguments),
         What::Ellipsoid(arguments) => ellipsoid::run(arguments),
+        What::Drift(arguments) => Ok(crate::drift::run(arguments).map(|()| true)?),
         What::Diff(arguments) => sets::diff(arguments),
         What::Unit(arguments) => sets::unit(arguments).map(|()| true),
     }?;

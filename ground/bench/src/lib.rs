@@ -1,10 +1,12 @@
 //! The bench: calibrates the unit and measures its noise.
 
+pub mod allan;
 pub mod calibrate;
 pub mod consensus;
 pub mod controlled;
 pub mod coverage;
 pub mod design;
+pub mod drift;
 pub mod ellipsoid;
 pub mod experiment;
 pub mod lean;
@@ -14,6 +16,7 @@ pub mod nominal;
 pub mod report;
 pub mod response;
 pub mod set;
+pub mod spectrum;
 pub mod stretches;
 pub mod table;
 pub mod turntable;
