@@ -59,7 +59,7 @@ pub async fn run<B: Board>(
         standing: [Standing::Lost; SENSOR_COUNT],
         health: Health::default(),
     };
-    if shared.reset == ResetCause::PowerOn {
+    if shared.start.reset == ResetCause::PowerOn {
         let started = shared.clock.until(Instant::from_millis(GYRO_START_MS));
         votes.waiting(Voter::Acquire, started).await;
     }
@@ -68,9 +68,9 @@ pub async fn run<B: Board>(
             .configure(slot, acquisition.budget.limit_us(0, 0, false))
             .await;
     }
-    let resume = shared.resume.unwrap_or_default();
+    let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
-    let resets = resume.resets.saturating_add(u16::from(shared.resume.is_some()));
+    let resets = resume.resets.saturating_add(u16::from(shared.start.resume.is_some()));
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
     // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.

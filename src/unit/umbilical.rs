@@ -23,7 +23,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         return;
     };
-    if let Some(crash) = &shared.crash {
+    if let Some(crash) = &shared.start.crash {
         shared.say(format_args!(
             "crash before this start: {:?} at {} {}",
             crash.cause, crash.at, crash.place
@@ -32,7 +32,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
     shared.say(format_args!(
         "e-MEMS {} started: {:?}",
         env!("CARGO_PKG_VERSION"),
-        shared.reset
+        shared.start.reset
     ));
     loop {
         let next = select4(
@@ -141,7 +141,7 @@ fn status(shared: &Shared) {
     let state = *shared.state.borrow();
     let (lift_off, micro_g) = shared.discretes.get();
     let recorder = shared.recorder.get();
-    let resets = shared.resume.map_or(0, |resume| resume.resets);
+    let resets = shared.start.resume.map_or(0, |resume| resume.resets);
     shared.say(format_args!(
         "G_ST {} task {} recording {} derived {}",
         state.mode.name(),
@@ -165,8 +165,15 @@ fn status(shared: &Shared) {
         recorder.used,
         recorder.capacity,
         if recorder.erasing.is_some() { "erasing" } else { "ready" },
-        shared.reset,
+        shared.start.reset,
         Instant::now().as_secs()
+    ));
+    let stack = (shared.start.stack_use)();
+    shared.say(format_args!(
+        "G_ST clock {} stack {} of {} bytes",
+        shared.start.oscillator.name(),
+        stack.used,
+        stack.size
     ));
 }
 
