@@ -70,7 +70,7 @@ pub async fn run<B: Board>(
     }
     let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
-    let resets = resume.resets.saturating_add(u16::from(shared.start.resume.is_some()));
+    let resets = shared.start.resets();
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
     // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.

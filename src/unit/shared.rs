@@ -69,6 +69,13 @@ pub struct Start {
     pub stack_use: fn() -> StackUse,
 }
 
+impl Start {
+    /// Resets since power-on, the one before this start among them.
+    pub fn resets(&self) -> u16 {
+        self.resume.map_or(0, |resume| resume.resets.saturating_add(1))
+    }
+}
+
 /// The shared state. Everything in it is touched between two awaits only.
 pub struct Shared {
     /// The clock all parts wait on.

@@ -141,7 +141,7 @@ fn status(shared: &Shared) {
     let state = *shared.state.borrow();
     let (lift_off, micro_g) = shared.discretes.get();
     let recorder = shared.recorder.get();
-    let resets = shared.start.resume.map_or(0, |resume| resume.resets);
+    let resets = shared.start.resets();
     shared.say(format_args!(
         "G_ST {} task {} recording {} derived {}",
         state.mode.name(),
