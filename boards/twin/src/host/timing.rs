@@ -11,7 +11,7 @@ pub const I2C_BIT: Nanos = 2_500;
 /// [ns] from an alarm to the firmware's next step.
 pub const WAKE: Nanos = 8_000;
 /// [ns] the firmware's work around one I2C transaction, besides the wake at its end.
-pub const I2C_OVERHEAD: Nanos = 2_400;
+pub const I2C_OVERHEAD: Nanos = 2_800;
 /// [ns] its work at each change of direction inside one.
 pub const I2C_TURN: Nanos = 11_700;
 /// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
@@ -21,4 +21,4 @@ pub const SPI_OVERHEAD: Nanos = 4_800;
 /// [ns] a byte on a UART, 115200 8N1.
 pub const UART_BYTE: Nanos = 86_806;
 /// [ns] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 126_000;
+pub const BOOT: Nanos = 320_300;
