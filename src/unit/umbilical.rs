@@ -3,10 +3,10 @@
 //! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
 
 use embassy_futures::select::{Either4, select4};
-use embassy_time::Instant;
 use embedded_io_async::Read;
 
 use super::{
+    clock::now,
     shared::Shared,
     telemetry::write,
     vote::{Voter, Votes},
@@ -76,7 +76,7 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
             }
         };
         for byte in heard {
-            if let Some(heard) = parser.hear(*byte, Instant::now().as_micros()) {
+            if let Some(heard) = parser.hear(*byte, now().as_micros()) {
                 answer(shared, heard).await;
             }
         }
@@ -97,7 +97,7 @@ async fn answer(shared: &Shared, heard: Heard) {
             ));
         }
     };
-    let verdict = shared.state.borrow_mut().command(command, Instant::now().as_micros());
+    let verdict = shared.state.borrow_mut().command(command, now().as_micros());
     let word = Printable(word_of(command));
     match verdict {
         Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
@@ -166,7 +166,7 @@ fn status(shared: &Shared) {
         recorder.capacity,
         if recorder.erasing.is_some() { "erasing" } else { "ready" },
         shared.start.reset,
-        Instant::now().as_secs()
+        now().as_secs()
     ));
     let stack = (shared.start.stack_use)();
     shared.say(format_args!(
