@@ -150,3 +150,16 @@ fn a_part_that_stretches_the_clock_too_long_is_cut_off_and_all_others_are_read()
     assert!(slots.iter().all(|slot| hit.contains(&(1 << slot))), "{errors:x?}");
     assert_eq!(errors.last(), Some(&0), "{errors:x?}");
 }
+
+#[test]
+fn a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most() {
+    // The magnetometer of the second plate, and so that plate's other two.
+    let plate = 0b0010_0000_0010_0010;
+    let mut tape = Tape::default();
+    let faults = [at(900, Fault::Stretching(5, 60_000 * MS))];
+    flown(&Options::default(), &faults, 2_300, &mut tape);
+    let errors = errors(&tape);
+    assert!(errors.len() >= 9, "a packet every 200 ms: {errors:x?}");
+    let last = *errors.last().expect("packets");
+    assert!(last & 1 << 5 != 0 && last & !plate == 0, "{errors:x?}");
+}
