@@ -87,7 +87,7 @@ fn a_hang_ends_in_a_reset_that_resumes_flight(fault: Fault) {
         .map(|(_, reading)| reading.counter)
         .collect();
     assert!(after.len() >= 10, "{fault:?}: {after:?}");
-    let before = flown.packets.iter().filter(|(at, _)| *at < struck).next_back();
+    let before = flown.packets.iter().rfind(|(at, _)| *at < struck);
     let step = after[0] - before.expect("packets before the reset").1.counter;
     assert!((1..=2).contains(&step), "{fault:?}: the counter went on by {step}");
 }

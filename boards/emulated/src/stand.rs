@@ -179,7 +179,7 @@ impl Mcu for Wired {
         self.dma_hung = false;
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);
         i2c.inherit(&mut self.sensor_port.i2c);
-        self.sensor_port.i2c = i2c;
+        self.sensor_port = SensorPort::new(i2c, self.sensor_port.plant.clone());
         self.bus_pins = BusPins::new(self.bus_pins.plant.clone());
         self.discrete_pins.gpio = Gpio::default();
     }
