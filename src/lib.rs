@@ -31,6 +31,7 @@ pub mod increments;
 pub mod mode;
 pub mod packet;
 pub mod recorder;
+pub mod redundancy;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
