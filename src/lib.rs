@@ -22,6 +22,7 @@ macro_rules! log_line {
 
 pub mod board;
 pub mod budget;
+pub mod calibration;
 pub mod command;
 pub mod crash;
 pub mod derived;
