@@ -27,6 +27,7 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod faults;
 pub mod geometry;
 pub mod increments;
 pub mod mode;

@@ -1,0 +1,242 @@
+//! Four gyros: detection by their one parity, and who it was.
+//!
+//! In, each cycle: what the gyros measured, and what the vectors say of which is at fault ([`vector_rate`]). Out: the rate,
+//! and what is held of each gyro.
+//!
+//! Four axes and three unknowns leave one dimension of parity, `p = n . y` with `n` the unit vector across the columns of
+//! the axes (`n_i` is the signed volume of the other three; nominally `(1, 1, 1, sqrt 0.9) / sqrt 3.9`). It says that a gyro
+//! is off by `p / n_i`, not which `i`. That is said by
+//!
+//! - the gyro itself, if it was not read, saturated or frozen;
+//! - the rate before: when the parity leaps, the rate without the faulty gyro goes on as it was and the three others leap;
+//! - the vectors: acceleration and field turned by the rate without each gyro in turn ([`vector_rate`]).
+//!
+//! Until one of them does, all four are used with the covariance widened, and the gyros are said not to be isolable. With a
+//! gyro out the other three are not checked; the excluded one is, and comes back.
+//!
+//! [`vector_rate`]: super::vector_rate
+
+use nalgebra::{ComplexField, Vector3};
+
+use super::{
+    health::Verdict,
+    watch::{Limits, Watch},
+};
+use crate::{
+    calibration::{Axis, Uncertainty},
+    geometry::PLATES,
+    redundancy::{Known, Solution, solve},
+};
+
+/// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a
+/// gyro's fault shows by half in the parity.
+const LIMITS: Limits = Limits { short: 5.2, long: 4.65 };
+/// Standard deviations of a leap of the parity in one cycle.
+const LEAP: f32 = 8.0;
+/// Standard deviations within which a rate goes on as it was.
+const GOES_ON: f32 = 7.0;
+/// [rad/s2] angular acceleration that may come at any time.
+const ANY_ACCELERATION: f32 = 0.2;
+const ALL: u16 = 0b1111;
+/// Quiet cycles after which a suspicion is dropped.
+const QUIET_CYCLES: u8 = 52;
+
+/// One cycle.
+pub(super) struct Cycle<'a> {
+    pub(super) values: &'a [f32; PLATES],
+    pub(super) present: u16,
+    pub(super) frozen: u16,
+    pub(super) dt_s: Option<f32>,
+}
+
+/// The rate, and how it changes.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    rate_b: Vector3<f32>,
+    /// [rad/s2]
+    acceleration: f32,
+}
+
+/// Four gyros under watch.
+#[derive(Clone, Debug)]
+pub(super) struct Gyros {
+    axes_b: [Vector3<f32>; PLATES],
+    noise: [f32; PLATES],
+    uncertainty: Uncertainty,
+    /// [s] by how much the sampling instants are unsure.
+    timing_s: f32,
+    parity: Watch,
+    watches: [Watch; PLATES],
+    course: Option<Course>,
+    usual_b: Option<Vector3<f32>>,
+    cycles: f32,
+    quiet_for: u8,
+    /// The parity is off and it is not known by whom.
+    pub(super) suspect: bool,
+}
+
+impl Gyros {
+    pub(super) fn new(axes: &[Axis; PLATES], uncertainty: Uncertainty, timing_s: f32) -> Self {
+        let allowed = uncertainty.bias * uncertainty.bias;
+        Gyros {
+            axes_b: core::array::from_fn(|k| axes[k].axis_b),
+            noise: core::array::from_fn(|k| axes[k].noise),
+            uncertainty,
+            timing_s,
+            parity: Watch::new(allowed),
+            // A gyro alone disagrees with the other three by the parity over its part in it, which is a half.
+            watches: [Watch::new(4.0 * allowed); PLATES],
+            course: None,
+            usual_b: None,
+            cycles: 0.0,
+            quiet_for: 0,
+            suspect: false,
+        }
+    }
+
+    /// Gyros that are not believed.
+    pub(super) fn excluded(&self) -> u16 {
+        let each = self.watches.iter().enumerate();
+        each.fold(0, |axes, (k, watch)| axes | u16::from(watch.excluded()) << k)
+    }
+
+    /// What is held of a gyro.
+    pub(super) fn verdict(&self, plate: usize) -> Verdict {
+        self.watches[plate].verdict
+    }
+
+    /// Takes a cycle.
+    pub(super) fn step(&mut self, cycle: &Cycle) -> Solution {
+        for k in (0..PLATES).filter(|k| cycle.frozen >> k & 1 == 1) {
+            self.blame(k, Verdict::Frozen);
+        }
+        let candidates = cycle.present & !self.excluded();
+        let systematic = self.systematic(cycle, candidates);
+        let variances = core::array::from_fn(|k| self.noise[k] * self.noise[k] + systematic);
+        let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
+        if candidates == ALL {
+            solution = self.check(cycle, &variances, systematic, solution);
+        } else {
+            self.suspect = false;
+        }
+        if solution.known == Known::All {
+            self.reconsider(cycle, &variances, systematic, &solution);
+            self.remember(cycle, &solution);
+        } else {
+            self.course = None;
+        }
+        solution
+    }
+
+    /// [rad2/s2] what does not average out: scale and direction away from where the parity was learned, and angular
+    /// acceleration within the uncertainty of the sampling instants.
+    fn systematic(&self, cycle: &Cycle, candidates: u16) -> f32 {
+        let rough_b = solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates).vector_b;
+        let Uncertainty { scale, direction, .. } = self.uncertainty;
+        let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
+        let acceleration = match (self.course, cycle.dt_s) {
+            (Some(course), Some(dt_s)) => (rough_b - course.rate_b).norm_squared() / (dt_s * dt_s),
+            _ => 0.0,
+        };
+        (scale * scale + direction * direction) * from_usual + self.timing_s * self.timing_s * acceleration
+    }
+
+    /// The parity of all four; the rate of those left.
+    fn check(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
+        let across = self.across();
+        let sum = |part: &dyn Fn(usize) -> f32| (0..PLATES).map(part).sum::<f32>();
+        let parity = sum(&|k| across[k] * cycle.values[k]) - self.parity.offset;
+        let noise = ComplexField::sqrt(sum(&|k| across[k] * across[k] * self.noise[k] * self.noise[k]));
+        let variance = noise * noise + systematic + self.parity.offset_variance;
+        if parity.abs() > LEAP * ComplexField::sqrt(variance) && !self.suspect {
+            if let Some(leapt) = self.leapt(cycle, variances) {
+                self.watches[leapt].strike(true);
+                if self.watches[leapt].alarm(LIMITS) >= 1.0 {
+                    self.blame(leapt, Verdict::Disagreeing);
+                }
+                return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
+            }
+        }
+        for watch in &mut self.watches {
+            watch.strike(false);
+        }
+        self.parity.note(parity, noise, systematic);
+        self.parity.learn(parity, variance, noise, LIMITS);
+        let alarm = self.parity.alarm(LIMITS);
+        self.quiet_for = if alarm < 0.6 {
+            self.quiet_for.saturating_add(1)
+        } else {
+            0
+        };
+        self.suspect = alarm > 1.0 || (self.suspect && self.quiet_for < QUIET_CYCLES);
+        let widened = if self.suspect {
+            1.0 + parity * parity / variance
+        } else {
+            1.0
+        };
+        Solution {
+            covariance_b: all.covariance_b * widened,
+            ..all
+        }
+    }
+
+    /// Unit vector of the parity: across the three columns of the axes.
+    fn across(&self) -> [f32; PLATES] {
+        let [a, b, c, d] = &self.axes_b;
+        let volume = |x: &Vector3<f32>, y: &Vector3<f32>, z: &Vector3<f32>| x.dot(&y.cross(z));
+        let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
+        let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
+        across.map(|part| part / length)
+    }
+
+    /// The one gyro without which the rate goes on as it was, if there is one.
+    fn leapt(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
+        let (course, dt_s) = (self.course?, cycle.dt_s?);
+        let goes_on = |k: &usize| {
+            let without = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << k));
+            let may = GOES_ON * ComplexField::sqrt(without.covariance_b.trace())
+                + (ANY_ACCELERATION + 2.0 * course.acceleration) * dt_s;
+            (without.vector_b - course.rate_b).norm() < may
+        };
+        let mut on = (0..PLATES).filter(goes_on);
+        on.next().filter(|_| on.next().is_none())
+    }
+
+    /// Excludes a gyro.
+    pub(super) fn blame(&mut self, plate: usize, verdict: Verdict) {
+        self.watches[plate].exclude(verdict);
+        self.parity.restart();
+        self.suspect = false;
+    }
+
+    /// Watches the excluded gyro, if it is the only one that is missing.
+    fn reconsider(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, solution: &Solution) {
+        let watched = cycle.present & self.excluded();
+        for k in (0..PLATES).filter(|k| watched >> k & 1 == 1) {
+            let (expected, variance) = solution.along(&self.axes_b[k]);
+            let share = (variances[k] + variance) / variances[k];
+            let watch = &mut self.watches[k];
+            let noise = self.noise[k] * ComplexField::sqrt(share);
+            watch.note(cycle.values[k] - expected, noise, systematic * share);
+            watch.reconsider();
+        }
+    }
+
+    fn remember(&mut self, cycle: &Cycle, solution: &Solution) {
+        let rate_b = solution.vector_b;
+        let acceleration = match (self.course, cycle.dt_s) {
+            (Some(course), Some(dt_s)) => (rate_b - course.rate_b).norm() / dt_s,
+            _ => 0.0,
+        };
+        self.course = Some(Course { rate_b, acceleration });
+        self.cycles = (self.cycles + 1.0).min(super::watch::MEMORY);
+        let usual_b = self.usual_b.get_or_insert(rate_b);
+        *usual_b += (rate_b - *usual_b) / self.cycles;
+    }
+
+    /// The rate without each gyro in turn; `None` unless all four are used.
+    pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
+        let without = |k: usize| solve(&self.axes_b, values, &[1.0; PLATES], ALL & !(1 << k)).vector_b;
+        (used == ALL).then(|| core::array::from_fn(without))
+    }
+}
