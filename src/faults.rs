@@ -37,7 +37,7 @@ use crate::{
     calibration::{Channel, Measured, Set},
     geometry::{PLATES, TRIAD_AXES},
     redundancy::{Known, Solution},
-    sample::{Kind, NOT_READ, Reading},
+    sample::{Kind, Reading},
 };
 
 use gyros::Gyros;
@@ -56,8 +56,9 @@ const GYRO_TIMING_S: f32 = 0.0012;
 const LONGEST_S: f32 = 1.0;
 /// [m/s2] within which the force is gravity's, for all this module needs: 0.9 to 1.1 g.
 const GRAVITY: core::ops::RangeInclusive<f32> = 8.8..=10.8;
-/// [rad/s] rate about a direction no gyro is left for: half their range.
-const UNKNOWN_RATE: f32 = 2.8;
+/// [rad/s] rate about a direction no gyro is left for, four turns a second: saturated ones say only that it is above
+/// 320 deg/s, and spin-stabilised rockets turn at two to four.
+const UNKNOWN_RATE: f32 = 25.0;
 
 /// A cycle's three vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +91,8 @@ pub struct Monitor {
 struct Turning {
     rate_b: Vector3<f32>,
     acceleration_b: Vector3<f32>,
+    /// [rad/s] what it may turn about a direction no gyro is left for.
+    missing: f32,
 }
 
 impl Monitor {
@@ -126,27 +129,34 @@ impl Monitor {
     /// Takes a cycle: `measured` is what `set` made of `reading`, `dt_s` [s] the time since the one before.
     pub fn step(&mut self, set: &Set, reading: &Reading, measured: &Measured, dt_s: f32) -> Vectors {
         let dt_s = (dt_s > 0.0 && dt_s < LONGEST_S).then_some(dt_s);
+        let present = measured.present;
         let rate_b = self.gyro.step(&gyros::Cycle {
             values: &measured.gyro,
-            present: measured.present.of(Kind::Gyro),
-            frozen: frozen(&mut self.gyro_repeats, |plate| [reading.gyro[plate]]),
+            present: present.of(Kind::Gyro),
+            frozen: frozen(&mut self.gyro_repeats, present.of(Kind::Gyro), |plate| {
+                [reading.gyro[plate]]
+            }),
             dt_s,
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
-        let rate = turning.rate_b.norm();
+        let rate = turning.rate_b.norm() + turning.missing;
         let force_b = self.acc.step(&triads::Cycle {
             values: &values,
-            present: measured.present.of(Kind::Accelerometer),
-            frozen: frozen(&mut self.acc_repeats, |plate| reading.acc_p[plate]),
+            present: present.of(Kind::Accelerometer),
+            frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), |plate| {
+                reading.acc_p[plate]
+            }),
             rate,
             dt_s,
             apart: unsure,
         });
         let field_b_ut = self.mag.step(&triads::Cycle {
             values: &measured.mag,
-            present: measured.present.of(Kind::Magnetometer),
-            frozen: frozen(&mut self.mag_repeats, |plate| reading.mag_p[plate]),
+            present: present.of(Kind::Magnetometer),
+            frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), |plate| {
+                reading.mag_p[plate]
+            }),
             rate,
             dt_s,
             apart: 0.0,
@@ -181,7 +191,9 @@ impl Monitor {
         let turning = Turning {
             rate_b: rate_b.vector_b,
             acceleration_b: change.map_or(Vector3::zeros(), |(last, dt_s)| (rate_b.vector_b - last.rate_b) / dt_s),
+            missing: if rate_b.known == Known::All { 0.0 } else { UNKNOWN_RATE },
         };
+        let missing = turning.missing.max(self.last.map_or(0.0, |last| last.missing));
         // The difference quotient is the acceleration of half an interval ago, and has the noise of two rates.
         let lag = change.map_or(0.0, |(last, _)| {
             (turning.acceleration_b - last.acceleration_b).norm() / 2.0
@@ -189,7 +201,6 @@ impl Monitor {
         let noise = change.map_or(0.0, |(_, dt_s)| {
             ComplexField::sqrt(2.0 * rate_b.covariance_b.trace() / 3.0) / dt_s
         });
-        let missing = if rate_b.known == Known::All { 0.0 } else { UNKNOWN_RATE };
         let rate = turning.rate_b.norm() + missing;
         let squared = rate * rate;
         let arm = set
@@ -228,18 +239,21 @@ fn direction(solution: &Solution, turned: f32) -> Option<Direction> {
 
 /// [m/s2] forces along the axes as at the centre: less `w' x r + w x (w x r)` of each plate's place.
 fn without_lever_arms(set: &Set, along: &[f32; TRIAD_AXES], turning: &Turning) -> [f32; TRIAD_AXES] {
-    let Turning { rate_b, acceleration_b } = turning;
+    let Turning {
+        rate_b, acceleration_b, ..
+    } = turning;
     let at_place: [Vector3<f32>; PLATES] = set
         .place_b
         .map(|place_b| acceleration_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b)));
     core::array::from_fn(|k| along[k] - set.acc[k].axis_b.dot(&at_place[k / 3]))
 }
 
-/// Axes of the sensors that repeat themselves, three bits or one a sensor.
-fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], counts: impl Fn(usize) -> [i16; N]) -> u16 {
+/// Axes of the sensors that repeat themselves, three bits or one a sensor. At the end of its range a healthy one does.
+fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], present: u16, counts: impl Fn(usize) -> [i16; N]) -> u16 {
     let each = repeats.iter_mut().enumerate().map(|(plate, repeats)| {
-        let read = Some(counts(plate)).filter(|counts| !counts.contains(&NOT_READ));
-        u16::from(repeats.frozen(read)) * ((1 << N) - 1) << (N * plate)
+        let axes = ((1 << N) - 1) << (N * plate);
+        let read = (present & axes == axes).then(|| counts(plate));
+        u16::from(repeats.frozen(read)) * axes
     });
     each.sum()
 }

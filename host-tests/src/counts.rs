@@ -11,7 +11,11 @@ use emems::{
     sample::{Errors, Kind, Reading},
 };
 use nalgebra::Vector3;
-use twin::{geometry, part::signal::Noise, truth::TruthSource};
+use twin::{
+    geometry,
+    part::signal::Noise,
+    truth::{Truth, TruthSource},
+};
 
 /// [s] from cycle to cycle.
 pub const PERIOD_S: f64 = 0.2;
@@ -24,7 +28,7 @@ pub const PER_COUNT: [f64; 3] = [3e-3 * 9.80665, 100.0 / 1090.0, 0.07326 * std::
 /// [s] between conversions: 50 Hz, 75 Hz, 256 Hz.
 const CONVERSION_S: [f64; 3] = [0.02, 1.0 / 75.0, 1.0 / 256.0];
 /// [counts] ends of the range.
-const ENDS: [f64; 3] = [2047.0, 2047.0, 4368.0];
+const ENDS: [(f64, f64); 3] = [(-2048.0, 2047.0), (-2048.0, 2047.0), (-4368.0, 4368.0)];
 
 /// What may befall an axis or a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +105,11 @@ impl Unit {
         self.begins_s + self.cycle as f64 * PERIOD_S
     }
 
+    /// The world at an instant.
+    pub fn truth(&self, now_s: f64) -> Truth {
+        self.world.at(now_s)
+    }
+
     /// [SI] what each axis is exposed to in a cycle, without bias and noise.
     fn exposed(&self, now_s: f64) -> [f64; CHANNELS] {
         let seen = |part: usize| {
@@ -152,9 +161,8 @@ impl Unit {
         let mut counts: [i16; CHANNELS] = std::array::from_fn(|n| {
             let kind = index(Channel(n as u8));
             let noise = NOISE[kind] * noisy[n] * self.noise.stream(n as u64).normal(self.cycle);
-            ((along[n] + self.bias[n] + noise) / PER_COUNT[kind])
-                .round()
-                .clamp(-ENDS[kind] - 1.0, ENDS[kind]) as i16
+            let codes = (along[n] + self.bias[n] + noise) / PER_COUNT[kind];
+            codes.round().clamp(ENDS[kind].0, ENDS[kind].1) as i16
         });
         for ill in present {
             match (ill, self.last) {

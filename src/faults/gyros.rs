@@ -18,10 +18,7 @@
 
 use nalgebra::{ComplexField, Vector3};
 
-use super::{
-    health::Verdict,
-    watch::{Limits, Watch},
-};
+use super::{health::Verdict, trace::Limits, watch::Watch};
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::PLATES,
@@ -30,7 +27,11 @@ use crate::{
 
 /// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a
 /// gyro's fault shows by half in the parity.
-const LIMITS: Limits = Limits { short: 5.2, long: 4.65 };
+const LIMITS: Limits = Limits {
+    short: 5.2,
+    long: 4.65,
+    squares: 90.0,
+};
 /// Standard deviations of a leap of the parity in one cycle.
 const LEAP: f32 = 8.0;
 /// Standard deviations within which a rate goes on as it was.

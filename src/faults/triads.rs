@@ -12,19 +12,19 @@
 
 use nalgebra::{ComplexField, Vector3};
 
-use super::{
-    consensus::Values,
-    health::Verdict,
-    watch::{Limits, Watch},
-};
+use super::{consensus::Values, health::Verdict, trace::Limits, watch::Watch};
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::TRIAD_AXES,
     redundancy::{Known, Solution, solve},
 };
 
-/// Means over one and five seconds: 1.1e-8 and 2.6e-7 a test of one axis.
-const LIMITS: Limits = Limits { short: 5.6, long: 5.15 };
+/// Means over one and five seconds: 1.1e-8 and 2.6e-7 a test of one axis. Sum of squares: chi-square of 26 degrees of freedom, 1e-8.
+const LIMITS: Limits = Limits {
+    short: 5.6,
+    long: 5.15,
+    squares: 90.0,
+};
 /// Faults whose traces in parity space have this cosine at least cannot be told apart.
 const ALIKE: f32 = 0.9;
 /// An axis at the alarm pulls others of its sensor along if they are at this part of it.
