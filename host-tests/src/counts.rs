@@ -50,6 +50,7 @@ pub enum Ill {
 }
 
 /// A unit in a world.
+#[derive(Clone)]
 pub struct Unit {
     world: Arc<dyn TruthSource>,
     noise: Noise,
@@ -103,11 +104,6 @@ impl Unit {
     /// [s] of the cycle that comes next.
     pub fn now_s(&self) -> f64 {
         self.begins_s + self.cycle as f64 * PERIOD_S
-    }
-
-    /// The world at an instant.
-    pub fn truth(&self, now_s: f64) -> Truth {
-        self.world.at(now_s)
     }
 
     /// [SI] what each axis is exposed to in a cycle, without bias and noise.

@@ -18,7 +18,11 @@
 
 use nalgebra::{ComplexField, Vector3};
 
-use super::{health::Verdict, trace::Limits, watch::Watch};
+use super::{
+    health::Verdict,
+    trace::Limits,
+    watch::{QUIET, Watch},
+};
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::PLATES,
@@ -29,7 +33,7 @@ use crate::{
 /// gyro's fault shows by half in the parity.
 const LIMITS: Limits = Limits {
     short: 5.2,
-    long: 4.65,
+    long: 4.8,
     squares: 90.0,
 };
 /// Standard deviations of a leap of the parity in one cycle.
@@ -72,6 +76,9 @@ pub(super) struct Gyros {
     usual_b: Option<Vector3<f32>>,
     cycles: f32,
     quiet_for: u8,
+    /// Parity of the cycle before, in standard deviations of the noise.
+    last_sigmas: f32,
+    leaping: Option<usize>,
     /// The parity is off and it is not known by whom.
     pub(super) suspect: bool,
 }
@@ -91,6 +98,8 @@ impl Gyros {
             usual_b: None,
             cycles: 0.0,
             quiet_for: 0,
+            last_sigmas: 0.0,
+            leaping: None,
             suspect: false,
         }
     }
@@ -149,14 +158,12 @@ impl Gyros {
         let parity = sum(&|k| across[k] * cycle.values[k]) - self.parity.offset;
         let noise = ComplexField::sqrt(sum(&|k| across[k] * across[k] * self.noise[k] * self.noise[k]));
         let variance = noise * noise + systematic + self.parity.offset_variance;
-        if parity.abs() > LEAP * ComplexField::sqrt(variance) && !self.suspect {
-            if let Some(leapt) = self.leapt(cycle, variances) {
-                self.watches[leapt].strike(true);
-                if self.watches[leapt].alarm(LIMITS) >= 1.0 {
-                    self.blame(leapt, Verdict::Disagreeing);
-                }
-                return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
+        if let Some(leapt) = self.leap(cycle, variances, parity / noise) {
+            self.watches[leapt].strike(true);
+            if self.watches[leapt].alarm(LIMITS) >= 1.0 {
+                self.blame(leapt, Verdict::Disagreeing);
             }
+            return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
         }
         for watch in &mut self.watches {
             watch.strike(false);
@@ -164,7 +171,7 @@ impl Gyros {
         self.parity.note(parity, noise, systematic);
         self.parity.learn(parity, variance, noise, LIMITS);
         let alarm = self.parity.alarm(LIMITS);
-        self.quiet_for = if alarm < 0.6 {
+        self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
         } else {
             0
@@ -190,8 +197,19 @@ impl Gyros {
         across.map(|part| part / length)
     }
 
+    /// The gyro that has leapt in this cycle or goes on leaping, if the parity is `sigmas` and it is one only.
+    fn leap(&mut self, cycle: &Cycle, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
+        let sudden = self.last_sigmas < LEAP / 2.0 || self.leaping.is_some();
+        let leapt = (sigmas.abs() > LEAP && sudden)
+            .then(|| self.alone(cycle, variances))
+            .flatten();
+        self.last_sigmas = sigmas.abs();
+        self.leaping = leapt.filter(|leapt| self.leaping.is_none_or(|before| before == *leapt));
+        self.leaping
+    }
+
     /// The one gyro without which the rate goes on as it was, if there is one.
-    fn leapt(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
+    fn alone(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
         let (course, dt_s) = (self.course?, cycle.dt_s?);
         let goes_on = |k: &usize| {
             let without = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << k));
@@ -203,9 +221,16 @@ impl Gyros {
         on.next().filter(|_| on.next().is_none())
     }
 
-    /// Excludes a gyro.
+    /// Excludes a gyro. One that is frozen explains what others were accused of on the parity's word.
     pub(super) fn blame(&mut self, plate: usize, verdict: Verdict) {
         self.watches[plate].exclude(verdict);
+        if verdict == Verdict::Frozen {
+            for watch in self.watches.iter_mut().filter(|watch| watch.verdict.is_unnamed()) {
+                watch.verdict = Verdict::Sound;
+                watch.restart();
+            }
+        }
+        self.leaping = None;
         self.parity.restart();
         self.suspect = false;
     }
@@ -235,9 +260,12 @@ impl Gyros {
         *usual_b += (rate_b - *usual_b) / self.cycles;
     }
 
-    /// The rate without each gyro in turn; `None` unless all four are used.
+    /// The rate without each gyro in turn; `None` unless all four are used. The parity's learned offset is taken out across
+    /// all four, which leaves the rate of all as it is and gives each of these the same bias.
     pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
-        let without = |k: usize| solve(&self.axes_b, values, &[1.0; PLATES], ALL & !(1 << k)).vector_b;
+        let across = self.across();
+        let values: [f32; PLATES] = core::array::from_fn(|k| values[k] - across[k] * self.parity.offset);
+        let without = |k: usize| solve(&self.axes_b, &values, &[1.0; PLATES], ALL & !(1 << k)).vector_b;
         (used == ALL).then(|| core::array::from_fn(without))
     }
 }

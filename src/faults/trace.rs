@@ -111,7 +111,7 @@ impl Trace {
 
 fn clipped(sigmas: f32) -> i16 {
     let sigmas = if sigmas.is_nan() { MOST_SIGMAS } else { sigmas };
-    (sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA) as i16
+    ComplexField::round(sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA) as i16
 }
 
 fn squared_sigmas(squares: i32) -> f32 {

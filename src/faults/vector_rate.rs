@@ -7,7 +7,7 @@
 //! stretch of up to [`STRETCH_S`] are carried along; a fault of gyro `i` by `b` turns every hypothesis but the `i`-th away
 //! by `1.2 b t`. The cost of a hypothesis is half the squared angle between carried and measured, in variances: of the
 //! directions, of the gyros' noise (as the square root of time) and of their biases (as time). Accepted is a hypothesis that
-//! fits, with every other worse by [`MARGIN`], 400 times less likely. What turns about the only direction there is (field
+//! fits, with every other worse by [`MARGIN`], some thousand times less likely. What turns about the only direction there is (field
 //! alone in micro-gravity) makes no difference and leaves the question open.
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -19,7 +19,7 @@ const STRETCH_S: f32 = 10.0;
 /// [s] before which noise says little.
 const SHORTEST_S: f32 = 2.0;
 /// Between the costs of the best and the second hypothesis.
-const MARGIN: f32 = 6.0;
+const MARGIN: f32 = 8.0;
 /// Cost up to which a hypothesis fits: chi-square of four degrees of freedom, 1e-4, halved.
 const FITS: f32 = 12.0;
 

@@ -21,7 +21,7 @@ pub(super) const MEMORY: f32 = 1000.0;
 /// Standard deviations of the calibration's uncertainty that an offset may reach.
 const OFFSET_LIMIT: f32 = 6.0;
 /// Nothing is learned from a window that is this near to an alarm.
-const QUIET: f32 = 0.6;
+pub(super) const QUIET: f32 = 0.75;
 /// Cycles in a row beyond the gate that make a fault.
 const STRIKES: u8 = 3;
 /// An excluded axis comes back below these.
