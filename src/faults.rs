@@ -84,6 +84,8 @@ pub struct Monitor {
     mag_repeats: [Repeats<3>; PLATES],
     gyro_repeats: [Repeats<1>; PLATES],
     last: Option<Turning>,
+    /// [rad/s] known bias of the rate.
+    bias_b: Vector3<f32>,
 }
 
 /// How the unit turned in a cycle.
@@ -113,7 +115,15 @@ impl Monitor {
             mag_repeats: core::array::from_fn(|plate| triad(&set.mag, plate)),
             gyro_repeats: core::array::from_fn(|plate| Repeats::new([counts(&set.gyro[plate])])),
             last: None,
+            bias_b: Vector3::zeros(),
         }
+    }
+
+    /// Takes what a filter knows of the bias of `rate_b` [rad/s] and the standard deviation of a component of it. Without it
+    /// the vectors are held against the calibration's biases, and small faults of gyros stay "not isolable".
+    pub fn know_bias(&mut self, bias_b: Vector3<f32>, sigma: f32) {
+        self.bias_b = bias_b;
+        self.vector_rate.error.bias = sigma;
     }
 
     /// What is held of an axis.
@@ -220,6 +230,7 @@ impl Monitor {
             direction(field_b_ut, MAG_TIMING_S * rate).filter(|_| !self.mag.undecided),
         ];
         let without = self.gyro.without_each(&measured.gyro, rate_b.used);
+        let without = without.map(|rates_b| rates_b.map(|rate_b| rate_b - self.bias_b));
         let contradicted = self.vector_rate.step(without, dt_s, directions);
         if let Some(plate) = contradicted.filter(|_| self.gyro.suspect) {
             self.gyro.blame(plate, Verdict::Disagreeing);

@@ -11,11 +11,7 @@ use emems::{
     sample::{Errors, Kind, Reading},
 };
 use nalgebra::Vector3;
-use twin::{
-    geometry,
-    part::signal::Noise,
-    truth::{Truth, TruthSource},
-};
+use twin::{geometry, part::signal::Noise, truth::TruthSource};
 
 /// [s] from cycle to cycle.
 pub const PERIOD_S: f64 = 0.2;
@@ -104,6 +100,11 @@ impl Unit {
     /// [s] of the cycle that comes next.
     pub fn now_s(&self) -> f64 {
         self.begins_s + self.cycle as f64 * PERIOD_S
+    }
+
+    /// Whether the world does not turn now, but with the Earth.
+    pub fn at_rest(&self) -> bool {
+        self.world.at(self.now_s()).rate_b.norm() < 1e-4
     }
 
     /// [SI] what each axis is exposed to in a cycle, without bias and noise.

@@ -1,6 +1,7 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
 pub mod counts;
+pub mod reference;
 
 use std::sync::Arc;
 

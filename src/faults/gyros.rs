@@ -38,10 +38,8 @@ const LIMITS: Limits = Limits {
 };
 /// Standard deviations of a leap of the parity in one cycle.
 const LEAP: f32 = 8.0;
-/// Standard deviations within which a rate goes on as it was.
-const GOES_ON: f32 = 7.0;
-/// [rad/s2] angular acceleration that may come at any time.
-const ANY_ACCELERATION: f32 = 0.2;
+/// A gyro has leapt if without it the rate changed so many times less than without any other.
+const FAR: f32 = 3.0;
 const ALL: u16 = 0b1111;
 /// Quiet cycles after which a suspicion is dropped.
 const QUIET_CYCLES: u8 = 52;
@@ -54,14 +52,6 @@ pub(super) struct Cycle<'a> {
     pub(super) dt_s: Option<f32>,
 }
 
-/// The rate, and how it changes.
-#[derive(Clone, Copy, Debug)]
-struct Course {
-    rate_b: Vector3<f32>,
-    /// [rad/s2]
-    acceleration: f32,
-}
-
 /// Four gyros under watch.
 #[derive(Clone, Debug)]
 pub(super) struct Gyros {
@@ -72,7 +62,8 @@ pub(super) struct Gyros {
     timing_s: f32,
     parity: Watch,
     watches: [Watch; PLATES],
-    course: Option<Course>,
+    /// [rad/s] rate of the cycle before.
+    course_b: Option<Vector3<f32>>,
     usual_b: Option<Vector3<f32>>,
     cycles: f32,
     quiet_for: u8,
@@ -92,9 +83,8 @@ impl Gyros {
             uncertainty,
             timing_s,
             parity: Watch::new(allowed),
-            // A gyro alone disagrees with the other three by the parity over its part in it, which is a half.
-            watches: [Watch::new(4.0 * allowed); PLATES],
-            course: None,
+            watches: [Watch::new(allowed); PLATES],
+            course_b: None,
             usual_b: None,
             cycles: 0.0,
             quiet_for: 0,
@@ -131,9 +121,9 @@ impl Gyros {
         }
         if solution.known == Known::All {
             self.reconsider(cycle, &variances, systematic, &solution);
-            self.remember(cycle, &solution);
+            self.remember(&solution);
         } else {
-            self.course = None;
+            self.course_b = None;
         }
         solution
     }
@@ -144,8 +134,17 @@ impl Gyros {
         let rough_b = solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates).vector_b;
         let Uncertainty { scale, direction, .. } = self.uncertainty;
         let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
-        let acceleration = match (self.course, cycle.dt_s) {
-            (Some(course), Some(dt_s)) => (rough_b - course.rate_b).norm_squared() / (dt_s * dt_s),
+        let acceleration = match (self.course_b, cycle.dt_s) {
+            (Some(course_b), Some(dt_s)) => {
+                // While one gyro leaps the others say how the unit turns.
+                let change = match self.leaping {
+                    Some(leaping) => {
+                        solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates & !(1 << leaping)).vector_b
+                    }
+                    None => rough_b,
+                } - course_b;
+                change.norm_squared() / (dt_s * dt_s)
+            }
             _ => 0.0,
         };
         (scale * scale + direction * direction) * from_usual + self.timing_s * self.timing_s * acceleration
@@ -165,8 +164,8 @@ impl Gyros {
             }
             return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
         }
-        for watch in &mut self.watches {
-            watch.strike(false);
+        if self.leaping.is_none() {
+            self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
         self.parity.note(parity, noise, systematic);
         self.parity.learn(parity, variance, noise, LIMITS);
@@ -199,31 +198,41 @@ impl Gyros {
 
     /// The gyro that has leapt in this cycle or goes on leaping, if the parity is `sigmas` and it is one only.
     fn leap(&mut self, cycle: &Cycle, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
-        let sudden = self.last_sigmas < LEAP / 2.0 || self.leaping.is_some();
-        let leapt = (sigmas.abs() > LEAP && sudden)
-            .then(|| self.alone(cycle, variances))
-            .flatten();
-        self.last_sigmas = sigmas.abs();
-        self.leaping = leapt.filter(|leapt| self.leaping.is_none_or(|before| before == *leapt));
-        self.leaping
+        let before = core::mem::replace(&mut self.last_sigmas, sigmas.abs());
+        if sigmas.abs() < LEAP {
+            self.leaping = None;
+            return None;
+        }
+        if before > LEAP / 2.0 && self.leaping.is_none() {
+            return None;
+        }
+        let leapt = self
+            .alone(cycle, variances)
+            .filter(|k| self.leaping.is_none_or(|before| before == *k));
+        self.leaping = self.leaping.or(leapt);
+        leapt
     }
 
-    /// The one gyro without which the rate goes on as it was, if there is one.
+    /// The one gyro without which the rate changed far less than without any other, if there is one.
     fn alone(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
-        let (course, dt_s) = (self.course?, cycle.dt_s?);
-        let goes_on = |k: &usize| {
+        let course_b = self.course_b?;
+        let changes: [f32; PLATES] = core::array::from_fn(|k| {
             let without = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << k));
-            let may = GOES_ON * ComplexField::sqrt(without.covariance_b.trace())
-                + (ANY_ACCELERATION + 2.0 * course.acceleration) * dt_s;
-            (without.vector_b - course.rate_b).norm() < may
-        };
-        let mut on = (0..PLATES).filter(goes_on);
-        on.next().filter(|_| on.next().is_none())
+            (without.vector_b - course_b).norm()
+        });
+        let least = (0..PLATES).fold(0, |least, k| if changes[k] < changes[least] { k } else { least });
+        let clear = |k: usize| k == least || changes[k] > FAR * changes[least];
+        (0..PLATES).all(clear).then_some(least)
     }
 
     /// Excludes a gyro. One that is frozen explains what others were accused of on the parity's word.
     pub(super) fn blame(&mut self, plate: usize, verdict: Verdict) {
-        self.watches[plate].exclude(verdict);
+        // What it disagreed by before is what the parity has learned, over its part in the parity.
+        let part = self.across()[plate];
+        let watch = &mut self.watches[plate];
+        watch.exclude(verdict);
+        watch.offset = self.parity.offset / part;
+        watch.offset_variance = self.parity.offset_variance / (part * part);
         if verdict == Verdict::Frozen {
             for watch in self.watches.iter_mut().filter(|watch| watch.verdict.is_unnamed()) {
                 watch.verdict = Verdict::Sound;
@@ -243,18 +252,14 @@ impl Gyros {
             let share = (variances[k] + variance) / variances[k];
             let watch = &mut self.watches[k];
             let noise = self.noise[k] * ComplexField::sqrt(share);
-            watch.note(cycle.values[k] - expected, noise, systematic * share);
+            watch.note(cycle.values[k] - watch.offset - expected, noise, systematic * share);
             watch.reconsider();
         }
     }
 
-    fn remember(&mut self, cycle: &Cycle, solution: &Solution) {
+    fn remember(&mut self, solution: &Solution) {
         let rate_b = solution.vector_b;
-        let acceleration = match (self.course, cycle.dt_s) {
-            (Some(course), Some(dt_s)) => (rate_b - course.rate_b).norm() / dt_s,
-            _ => 0.0,
-        };
-        self.course = Some(Course { rate_b, acceleration });
+        self.course_b = Some(rate_b);
         self.cycles = (self.cycles + 1.0).min(super::watch::MEMORY);
         let usual_b = self.usual_b.get_or_insert(rate_b);
         *usual_b += (rate_b - *usual_b) / self.cycles;

@@ -20,6 +20,8 @@ const STRETCH_S: f32 = 10.0;
 const SHORTEST_S: f32 = 2.0;
 /// Between the costs of the best and the second hypothesis.
 const MARGIN: f32 = 8.0;
+/// Variance of the worst component of a rate out of three gyros, in that of one: 2 1.054^2 + 0.667^2 (errata of section 3.4).
+const OUT_OF_THREE: f32 = 2.7;
 /// Cost up to which a hypothesis fits: chi-square of four degrees of freedom, 1e-4, halved.
 const FITS: f32 = 12.0;
 
@@ -37,7 +39,7 @@ pub(super) struct Direction {
 pub(super) struct RateError {
     /// [rad/s] of the noise of one gyro in one cycle.
     pub(super) noise: f32,
-    /// [rad/s] of the bias of one gyro.
+    /// [rad/s] of a component of the bias that is left.
     pub(super) bias: f32,
 }
 
@@ -51,10 +53,10 @@ struct Carried {
 /// The stretch.
 #[derive(Clone, Debug)]
 pub(super) struct VectorRate {
-    error: RateError,
+    pub(super) error: RateError,
     carried: [Option<Carried>; 2],
-    /// [rad/s] rates of the cycle before.
-    rates_b: Option<[Vector3<f32>; PLATES]>,
+    /// [rad/s] rates of the cycle before, and of the one before that.
+    rates_b: [Option<[Vector3<f32>; PLATES]>; 2],
     elapsed_s: f32,
 }
 
@@ -63,7 +65,7 @@ impl VectorRate {
         VectorRate {
             error,
             carried: [None; 2],
-            rates_b: None,
+            rates_b: [None; 2],
             elapsed_s: 0.0,
         }
     }
@@ -75,15 +77,21 @@ impl VectorRate {
         dt_s: Option<f32>,
         directions: [Option<Direction>; 2],
     ) -> Option<usize> {
-        let before_b = core::mem::replace(&mut self.rates_b, rates_b);
+        let [before_b, earlier_b] = self.rates_b;
+        self.rates_b = [rates_b, before_b];
         let (Some(now_b), Some(before_b), Some(dt_s)) = (rates_b, before_b, dt_s) else {
+            self.rates_b = [rates_b, None];
             self.begin(directions);
             return None;
         };
         self.elapsed_s += dt_s;
         for k in 0..PLATES {
-            // Rate over the interval: the mean of its ends.
-            let back = UnitQuaternion::from_scaled_axis((now_b[k] + before_b[k]) * (-0.5 * dt_s));
+            // Through three points where there are (Adams and Moulton): a tumble at 5 Hz bends too much for two.
+            let mean_b = match earlier_b {
+                Some(earlier_b) => (now_b[k] * 5.0 + before_b[k] * 8.0 - earlier_b[k]) / 12.0,
+                None => (now_b[k] + before_b[k]) / 2.0,
+            };
+            let back = UnitQuaternion::from_scaled_axis(mean_b * -dt_s);
             for carried in self.carried.iter_mut().flatten() {
                 carried.now_b[k] = back * carried.now_b[k];
             }
@@ -112,8 +120,7 @@ impl VectorRate {
     fn contradicted(&self, dt_s: f32, directions: [Option<Direction>; 2]) -> Option<usize> {
         let drift = self.error.bias * self.elapsed_s;
         let walk = self.error.noise * self.error.noise * dt_s * self.elapsed_s;
-        // A rate out of three gyros has this much more variance in a component than one gyro: (0.5 + 0.5 + 1) / 3 and more.
-        let turned = 1.2 * (drift * drift + walk);
+        let turned = drift * drift + OUT_OF_THREE * walk;
         let mut costs = [0.0; PLATES];
         for (carried, now) in self.carried.iter().zip(directions) {
             let (Some(carried), Some(now)) = (carried, now) else {

@@ -19,9 +19,9 @@ pub enum Known {
     Nothing,
 }
 
-/// A direction of which less than this part of the mean information is known is unknown. Three orders above f32 rounding
-/// of a determinant, and a hundred times below what an axis with ten times the noise still tells.
-const UNKNOWN: f32 = 1e-4;
+/// A direction of which less than this part of the mean information is known is unknown. Two orders above f32 rounding
+/// of a determinant, and far below what an axis with ten times the noise still tells.
+const UNKNOWN: f32 = 1e-5;
 
 /// Covariance on what is known, and what is.
 pub(super) fn invert(information: &Matrix3<f32>) -> (Matrix3<f32>, Known) {
