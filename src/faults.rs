@@ -28,9 +28,6 @@ mod triads;
 mod vector_rate;
 mod watch;
 
-#[cfg(test)]
-mod tests;
-
 use nalgebra::{ComplexField, Vector3};
 
 use crate::{

@@ -2,6 +2,7 @@
 
 pub mod counts;
 pub mod reference;
+pub mod watched;
 
 use std::sync::Arc;
 
