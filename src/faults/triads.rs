@@ -246,7 +246,7 @@ impl Triads {
                 *kept + (off - *kept) / LIKENESS_CYCLES
             };
         }
-        let [itself, reversed, next, after] = self.likeness[k].map(|off| ComplexField::sqrt(off));
+        let [itself, reversed, next, after] = self.likeness[k].map(ComplexField::sqrt);
         let watch = &mut self.watches[k];
         if watch.verdict.is_unnamed() && watch.seen_long() && itself > DIFFERS {
             if reversed < RESEMBLES {
