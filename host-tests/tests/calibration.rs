@@ -177,7 +177,7 @@ fn table_4_7_by_mt_is_specific_force() {
     let force = |acc: &[i16; 12]| force_e(&nominal(), acc);
     let first = Vector3::new(-10.125_907, 0.016_724_22, 0.062_413_906);
     assert!((force(&TABLE_4_7[0]) - first).norm() < FORCE_ROUNDING);
-    let all = Vector3::new(-10.147_204, 0.005_211_115, 0.074_668_865);
+    let all = Vector3::new(-10.147_204, 0.005_211_115, 0.074_668_86);
     assert!((mean(&TABLE_4_7, force) - all).norm() < FORCE_ROUNDING);
 }
 
