@@ -22,15 +22,18 @@ macro_rules! log_line {
 
 pub mod board;
 pub mod budget;
+pub mod calibration;
 pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod faults;
 pub mod geometry;
 pub mod increments;
 pub mod mode;
 pub mod packet;
 pub mod recorder;
+pub mod redundancy;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
