@@ -20,6 +20,7 @@ macro_rules! log_line {
     };
 }
 
+pub mod attitude;
 pub mod board;
 pub mod budget;
 pub mod command;
@@ -30,8 +31,10 @@ pub mod geometry;
 pub mod increments;
 pub mod mode;
 pub mod packet;
+pub mod quest;
 pub mod recorder;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
+pub mod triad;
 pub mod unit;
