@@ -29,6 +29,7 @@ pub mod derived;
 pub mod discrete;
 pub mod geometry;
 pub mod increments;
+pub mod kalman;
 pub mod mode;
 pub mod packet;
 pub mod quest;

@@ -1,0 +1,131 @@
+//! The field that is expected, and the mean field of a window against it.
+//!
+//! In: norm, dip and declination, given or learnt, and a window's mean field in n. Out: two scalars across the field in
+//! parts of its norm `n0`, with what they see of the attitude. With `m0 = (cos dip, 0, sin dip)` in magnetic axes, an
+//! attitude error `a` turns the mean field found to `m = m0 - a x m0`:
+//!
+//! * east: `-m_E/n0 = cos(dip) a_D - sin(dip) a_N`, the residual taken as an angle, `-cos(dip) atan2(m_E, m_N)`, so that
+//!   it grows up to half a turn;
+//! * meridian: `dip0 - dip = -a_E`.
+//!
+//! The variance of each is that of the reference plus what is seen of a disturbance: `(|m|/n0 - 1)^2 + (dip - dip0)^2`
+//! holds two of its three components, and the third is as large on average.
+
+use nalgebra::{ComplexField, RealField, Vector3};
+
+use super::{Params, Quantity, square, window::Means};
+
+/// The expected field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// [uT] norm.
+    pub norm_ut: f32,
+    /// [rad] below the horizontal.
+    pub dip: f32,
+    /// [rad] magnetic north, east of north.
+    pub declination: f32,
+    /// [s] for how long it has been learnt; infinite for one that was given.
+    pub learnt_s: f32,
+}
+
+/// A scalar of the field.
+pub struct Scalar {
+    pub quantity: Quantity,
+    pub residual: f32,
+    pub rows: [(usize, f32); 3],
+    pub variance: f32,
+}
+
+/// The field of a window.
+pub struct Compared {
+    pub scalars: [Scalar; 2],
+    /// Norm and dip are those of the reference: if it is rejected all the same, the attitude is wrong.
+    pub trusted: bool,
+}
+
+/// Norm and dip within this part of the reference are undisturbed.
+const UNDISTURBED: f32 = 0.1;
+
+impl Reference {
+    /// As given, or one to be learnt.
+    pub fn new(given: Option<Reference>) -> Self {
+        given.unwrap_or(Reference {
+            norm_ut: 0.0,
+            dip: 0.0,
+            declination: 0.0,
+            learnt_s: 0.0,
+        })
+    }
+
+    /// The field of a window against this one, which learns from it while it is young. `None` for a field of zero, or
+    /// one along the vertical: it tells no heading.
+    pub(super) fn compare(&mut self, params: &Params, means: &Means) -> Option<Compared> {
+        let mag_n = means.mag_n?;
+        let (north, east) = self.magnetic(&mag_n);
+        let (norm, horizontal) = (mag_n.norm(), ComplexField::sqrt(north * north + east * east));
+        let dip = RealField::atan2(mag_n.z, horizontal);
+        if !(horizontal > 1e-3 * norm) {
+            return None;
+        }
+        self.learn(params, means.duration_s, norm, dip);
+        let (sin, cos) = ComplexField::sin_cos(self.dip);
+        let disturbance = self.deviation(norm, dip);
+        let seen = square(params.disturbance) * disturbance + means.mag_unrest(params) / square(self.norm_ut);
+        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
+        let (sin_d, cos_d) = ComplexField::sin_cos(self.declination);
+        Some(Compared {
+            scalars: [
+                Scalar {
+                    quantity: Quantity::FieldEast,
+                    residual: -cos * RealField::atan2(east, north),
+                    rows: [(0, -sin * cos_d), (1, -sin * sin_d), (2, cos)],
+                    variance: square(params.heading_sd * cos) + seen,
+                },
+                Scalar {
+                    quantity: Quantity::FieldMeridian,
+                    residual: self.dip - dip,
+                    rows: [(0, sin_d), (1, -cos_d), (2, 0.0)],
+                    variance: square(params.dip_sd) + seen,
+                },
+            ],
+            trusted: disturbance < square(UNDISTURBED),
+        })
+    }
+
+    /// Where the field lies as seen from above, in n.
+    pub(super) fn heading_n(&self) -> Vector3<f32> {
+        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        Vector3::new(cos, sin, 0.0)
+    }
+
+    /// [1] square of what norm and dip of a mean field show of a disturbance, the vertical being where mean specific
+    /// force has it; zero before anything is known of the field.
+    pub(super) fn disturbance(&self, mag_n: &Vector3<f32>, acc_n: &Vector3<f32>) -> f32 {
+        if self.learnt_s == 0.0 {
+            return 0.0;
+        }
+        let down = -acc_n / acc_n.norm();
+        let dip = RealField::atan2(mag_n.dot(&down), mag_n.cross(&down).norm());
+        self.deviation(mag_n.norm(), dip)
+    }
+
+    fn deviation(&self, norm_ut: f32, dip: f32) -> f32 {
+        square(norm_ut / self.norm_ut - 1.0) + square(dip - self.dip)
+    }
+
+    /// Components along magnetic north and magnetic east.
+    fn magnetic(&self, v_n: &Vector3<f32>) -> (f32, f32) {
+        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
+    }
+
+    /// The mean of norm and dip so far, while the reference is young.
+    fn learn(&mut self, params: &Params, duration_s: f32, norm_ut: f32, dip: f32) {
+        if self.learnt_s < params.learn_s {
+            self.learnt_s += duration_s;
+            let part = duration_s / self.learnt_s;
+            self.norm_ut += part * (norm_ut - self.norm_ut);
+            self.dip += part * (dip - self.dip);
+        }
+    }
+}
