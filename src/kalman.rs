@@ -35,6 +35,7 @@
 mod covariance;
 mod field;
 mod innovation;
+mod iron;
 mod params;
 mod window;
 
@@ -44,6 +45,7 @@ pub use self::{
     covariance::STATES,
     field::Reference,
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
+    iron::HardIron,
     params::{Delays, Params, Rest},
 };
 use self::{
@@ -131,6 +133,8 @@ pub struct Filter {
     pub covariance: Covariance,
     /// The field that is expected.
     pub reference: Reference,
+    /// Hard iron that the calibration does not know.
+    pub iron: HardIron,
     /// Whether the attitude has been found.
     pub aligned: bool,
     window: Window,
@@ -149,7 +153,8 @@ impl Filter {
             gyro_matrix: Matrix3::zeros(),
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
-            reference: Reference::new(params.field),
+            reference: params.field,
+            iron: HardIron::none(),
             aligned: false,
             window: Window::default(),
             rate_b: Vector3::zeros(),
@@ -252,18 +257,14 @@ impl Filter {
             let late_s = (sampled.at_us as i64).wrapping_sub(step.at_us as i64) as f32 * 1e-6;
             let offset_s = late_s + delays.gyro_s - delay_s;
             let near = offset_s > -window_s && offset_s < window_s;
-            near.then(|| {
-                (
-                    dcm * (from_rotation_vector(rate_b * offset_s) * sampled.value_b),
-                    sampled.variance,
-                )
-            })
+            near.then(|| (sampled, dcm * dcm_nb(&from_rotation_vector(rate_b * offset_s))))
         };
-        if let Some((acc_n, variance)) = carried(step.acc, delays.acc_s) {
-            self.window.take_acc(&acc_n, variance, self.params.gravity);
+        if let Some((acc, dcm)) = carried(step.acc, delays.acc_s) {
+            self.window
+                .take_acc(&(dcm * acc.value_b), acc.variance, self.params.gravity);
         }
-        if let Some((mag_n, variance)) = carried(step.mag, delays.mag_s) {
-            self.window.take_mag(&mag_n, variance);
+        if let Some((mag, dcm)) = carried(step.mag, delays.mag_s) {
+            self.window.take_mag(&mag.value_b, &dcm, mag.variance);
         }
     }
 
@@ -271,9 +272,9 @@ impl Filter {
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
         let window = core::mem::take(&mut self.window);
         let means = window.means(&self.params, lift_off);
-        if !self.aligned || self.covariance.attitude().diagonal().max() > square(self.params.lost_sd) {
+        if !self.aligned {
             self.covariance.predict(&self.params, &window, &means);
-            outcome.aligned = self.align(&means);
+            outcome.aligned = self.align(&means, UNKNOWN);
             return;
         }
         self.velocity_n += means.velocity_change_n;
@@ -287,11 +288,7 @@ impl Filter {
             self.velocity_n = Vector2::zeros();
             self.covariance.forget_velocity(self.params.velocity_sd);
         }
-        let field = means
-            .mag_n
-            .is_some()
-            .then(|| self.compare_field(&means, &mut correction))
-            .flatten();
+        let field = self.compare_field(&means, &mut correction);
         self.inject(&correction);
         outcome.innovations = correction.innovations;
         let bounded = self.covariance.keep_bounds();
@@ -308,7 +305,7 @@ impl Filter {
                 .iter()
                 .any(|rejected_s| *rejected_s >= self.params.recovery_s)
         {
-            outcome.aligned = self.align(&means);
+            outcome.aligned = self.align(&means, UNKNOWN);
         }
     }
 
@@ -351,7 +348,11 @@ impl Filter {
     /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
     /// disturbed for its rejection to say anything of the attitude.
     fn compare_field(&mut self, means: &Means, correction: &mut Correction) -> Option<bool> {
-        let compared = self.reference.compare(&self.params, means)?;
+        let sums = means.field?;
+        self.iron.learn(&self.params, &sums);
+        self.reference
+            .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
+        let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
         let mut accepted = true;
         for scalar in &compared.scalars {
             let quantity = scalar.quantity;
@@ -380,12 +381,14 @@ impl Filter {
         self.velocity_n += error.fixed_rows::<2>(VELOCITY);
     }
 
-    /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could.
-    fn align(&mut self, means: &Means) -> bool {
-        let (Some(mag_n), true) = (means.mag_n, means.near_one_g) else {
+    /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could, with no
+    /// variance above `most` \[rad^2\].
+    fn align(&mut self, means: &Means, most: f32) -> bool {
+        let (Some(sums), true) = (means.field, means.near_one_g) else {
             return false;
         };
-        let disturbance = self.reference.disturbance(&mag_n, &means.acc_n);
+        let mean = sums.mean(&self.iron.iron_b);
+        let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
         let down = Sighting {
             seen_b: -means.acc_n,
             known_n: Vector3::z(),
@@ -393,14 +396,17 @@ impl Filter {
             known_sd: 0.0,
         };
         let field = Sighting {
-            seen_b: mag_n,
+            seen_b: mean.mag_n,
             known_n: self.reference.heading_n(),
-            seen_sd: means.field_direction_sd(&self.params, disturbance),
+            seen_sd: mean.direction_sd(&self.params, disturbance),
             known_sd: 0.0,
         };
         let Ok(found) = triad(&down, &field) else {
             return false;
         };
+        if found.covariance_b.diagonal().max() > most {
+            return false;
+        }
         self.q_nb = renormalised(found.q_nb * self.q_nb);
         let dcm = dcm_nb(&found.q_nb);
         self.covariance.align(&(dcm * found.covariance_b * dcm.transpose()));
@@ -426,9 +432,16 @@ impl Filter {
             && finite(self.bias_b.as_slice())
             && finite(self.gyro_matrix.as_slice())
             && finite(self.velocity_n.as_slice())
+            && self.iron.is_finite()
             && self.covariance.is_finite()
     }
 }
+
+/// [rad^2] more than any attitude's variance: whatever TRIAD finds is better than nothing.
+const UNKNOWN: f32 = 1e3;
+
+/// A window that begins afresh throws the history away: only for a variance this many times smaller.
+const MUCH_BETTER: f32 = 0.1;
 
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;

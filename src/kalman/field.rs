@@ -11,9 +11,12 @@
 //! The variance of each is that of the reference plus what is seen of a disturbance: `(|m|/n0 - 1)^2 + (dip - dip0)^2`
 //! holds two of its three components, and the third is as large on average.
 
-use nalgebra::{ComplexField, RealField, Vector3};
+use nalgebra::{ComplexField, Matrix3, RealField, Vector3};
 
-use super::{Params, Quantity, square, window::Means};
+use super::{
+    Params, Quantity, square,
+    window::{FieldSums, MeanField},
+};
 
 /// The expected field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +27,11 @@ pub struct Reference {
     pub dip: f32,
     /// [rad] magnetic north, east of north.
     pub declination: f32,
-    /// [s] for how long it has been learnt; infinite for one that was given.
-    pub learnt_s: f32,
+    learnt_s: f32,
+    /// [uT] mean in n while it was learnt, hard iron included.
+    raw_n: Vector3<f32>,
+    /// Mean attitude meanwhile.
+    turned: Matrix3<f32>,
 }
 
 /// A scalar of the field.
@@ -47,30 +53,38 @@ pub struct Compared {
 const UNDISTURBED: f32 = 0.1;
 
 impl Reference {
-    /// As given, or one to be learnt.
-    pub fn new(given: Option<Reference>) -> Self {
-        given.unwrap_or(Reference {
-            norm_ut: 0.0,
-            dip: 0.0,
-            declination: 0.0,
-            learnt_s: 0.0,
-        })
+    /// The field of a site: norm \[uT\], dip and declination \[rad\].
+    pub const fn known(norm_ut: f32, dip: f32, declination: f32) -> Self {
+        Reference {
+            norm_ut,
+            dip,
+            declination,
+            learnt_s: f32::INFINITY,
+            raw_n: Vector3::new(0.0, 0.0, 0.0),
+            turned: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        }
     }
 
-    /// The field of a window against this one, which learns from it while it is young. `None` for a field of zero, or
-    /// one along the vertical: it tells no heading.
-    pub(super) fn compare(&mut self, params: &Params, means: &Means) -> Option<Compared> {
-        let mag_n = means.mag_n?;
-        let (north, east) = self.magnetic(&mag_n);
-        let (norm, horizontal) = (mag_n.norm(), ComplexField::sqrt(north * north + east * east));
-        let dip = RealField::atan2(mag_n.z, horizontal);
-        if !(horizontal > 1e-3 * norm) {
+    /// One to be learnt; north is magnetic.
+    pub const fn unknown() -> Self {
+        Reference {
+            learnt_s: 0.0,
+            ..Reference::known(0.0, 0.0, 0.0)
+        }
+    }
+
+    /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
+    /// heading.
+    pub(super) fn compare(&self, params: &Params, mean: &MeanField) -> Option<Compared> {
+        let (north, east) = self.magnetic(&mean.mag_n);
+        let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
+        let dip = RealField::atan2(mean.mag_n.z, horizontal);
+        if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
             return None;
         }
-        self.learn(params, means.duration_s, norm, dip);
         let (sin, cos) = ComplexField::sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
-        let seen = square(params.disturbance) * disturbance + means.mag_unrest(params) / square(self.norm_ut);
+        let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
         // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
         let (sin_d, cos_d) = ComplexField::sin_cos(self.declination);
         Some(Compared {
@@ -119,13 +133,22 @@ impl Reference {
         (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 
-    /// The mean of norm and dip so far, while the reference is young.
-    fn learn(&mut self, params: &Params, duration_s: f32, norm_ut: f32, dip: f32) {
+    /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
+    pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
+        if self.learnt_s.is_infinite() {
+            return;
+        }
         if self.learnt_s < params.learn_s {
             self.learnt_s += duration_s;
             let part = duration_s / self.learnt_s;
-            self.norm_ut += part * (norm_ut - self.norm_ut);
-            self.dip += part * (dip - self.dip);
+            self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
+            self.turned += (sums.turned / sums.count - self.turned) * part;
         }
+        let field_n = self.raw_n - self.turned * iron_b;
+        self.norm_ut = field_n.norm();
+        self.dip = RealField::atan2(field_n.z, ComplexField::sqrt(field_n.xy().norm_squared()));
     }
 }
+
+/// Horizontal part of the field that still tells a heading.
+const LEAST_HORIZONTAL: f32 = 1e-3;

@@ -63,8 +63,15 @@ pub struct Params {
     pub gravity: f32,
     /// [rad/s] the Earth's rate in n; zero where it is not known.
     pub earth_rate_n: Vector3<f32>,
-    /// The field at the site; `None`: norm and dip are learnt in the first [`Params::learn_s`], and north is magnetic.
-    pub field: Option<Reference>,
+    /// [uT] hard iron on each axis that may have come with the unit, standard deviation. Zero: none is looked for.
+    /// Large: gradients of a room are taken for iron sooner.
+    pub iron_sd_ut: f32,
+    /// [uT] what else moves the field within a window.
+    pub iron_noise_ut: f32,
+    /// [1] by how much more a window counts less whose field moves.
+    pub iron_per_spread: f32,
+    /// The field at the site, or one to be learnt in the first [`Params::learn_s`].
+    pub field: Reference,
     /// [s] how long the field is learnt.
     pub learn_s: f32,
 }
@@ -135,7 +142,10 @@ impl Params {
         },
         gravity: 9.806_65,
         earth_rate_n: Vector3::new(0.0, 0.0, 0.0),
-        field: None,
+        iron_sd_ut: 3.0,
+        iron_noise_ut: 2.0,
+        iron_per_spread: 30.0,
+        field: Reference::unknown(),
         learn_s: 30.0,
     };
 }

@@ -24,7 +24,48 @@ pub struct Window {
     rate_square: f32,
     acc: Sum,
     far_from_one_g: bool,
-    mag: Sum,
+    mag: FieldSums,
+}
+
+/// Sums of the field's samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FieldSums {
+    /// Samples.
+    pub count: f32,
+    /// [uT] in n.
+    pub total_n: Vector3<f32>,
+    /// [uT] in b.
+    pub total_b: Vector3<f32>,
+    /// Attitude matrices that took b to n.
+    pub turned: Matrix3<f32>,
+    squares: f32,
+    variance: f32,
+}
+
+/// The mean field of a window without hard iron.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanField {
+    /// [uT] in n.
+    pub mag_n: Vector3<f32>,
+    /// [uT^2] mean square distance of the samples from it.
+    pub spread: f32,
+    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise.
+    pub white: f32,
+}
+
+impl FieldSums {
+    /// Without `iron_b` \[uT\]; there must be samples.
+    pub fn mean(&self, iron_b: &Vector3<f32>) -> MeanField {
+        let mag_n = (self.total_n - self.turned * iron_b) / self.count;
+        let squares = (self.squares - 2.0 * iron_b.dot(&self.total_b)) / self.count + iron_b.norm_squared();
+        let noise = self.variance / self.count;
+        let spread = (squares - mag_n.norm_squared() - 3.0 * noise).max(0.0);
+        MeanField {
+            mag_n,
+            spread,
+            white: (spread + noise) / self.count,
+        }
+    }
 }
 
 /// Sum of a vector's samples.
@@ -85,18 +126,16 @@ pub struct Means {
     /// [rad] of the direction of mean specific force as the vertical.
     pub tilt_sd: f32,
     acc_spread: f32,
-    /// [uT] mean field, in n.
-    pub mag_n: Option<Vector3<f32>>,
-    /// [uT^2] mean square distance of the field from its mean, in n.
-    pub mag_spread: f32,
-    /// Samples of the field.
-    pub mag_count: f32,
-    /// [uT^2] white variance of a component of the mean field.
-    pub mag_variance: f32,
+    /// The field, if it was sampled.
+    pub field: Option<FieldSums>,
 }
 
-/// Mean specific force is taken for the vertical within this part of one g.
-const NEAR_ONE_G: f32 = 0.1;
+/// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
+/// stays within it, a climb or a fall does not.
+const MEAN_NEAR_ONE_G: f32 = 0.2;
+
+/// After lift-off every sample must be within this part of one g.
+const SAMPLE_NEAR_ONE_G: f32 = 0.1;
 
 /// [rad] error of the first vertical found: half a degree of accelerometer bias and as much of everything else.
 const START_TILT_SD: f32 = 0.0175;
@@ -127,13 +166,19 @@ impl Window {
 
     /// A sample of specific force.
     pub fn take_acc(&mut self, acc_n: &Vector3<f32>, variance: f32, gravity: f32) {
-        self.far_from_one_g |= !is_near(acc_n.norm(), gravity);
+        self.far_from_one_g |= !is_near(acc_n.norm(), gravity, SAMPLE_NEAR_ONE_G);
         self.acc.take(acc_n, variance);
     }
 
     /// A sample of the field.
-    pub fn take_mag(&mut self, mag_n: &Vector3<f32>, variance: f32) {
-        self.mag.take(mag_n, variance);
+    pub fn take_mag(&mut self, mag_b: &Vector3<f32>, dcm_nb: &Matrix3<f32>, variance: f32) {
+        let sums = &mut self.mag;
+        sums.count += 1.0;
+        sums.total_n += dcm_nb * mag_b;
+        sums.total_b += mag_b;
+        sums.turned += dcm_nb;
+        sums.squares += mag_b.norm_squared();
+        sums.variance += variance;
     }
 
     /// What it all says.
@@ -148,7 +193,7 @@ impl Window {
         } else {
             (0.0, 0.0)
         };
-        let near_one_g = sampled && is_near(acc_n.norm(), params.gravity);
+        let near_one_g = sampled && is_near(acc_n.norm(), params.gravity, MEAN_NEAR_ONE_G);
         let vertical = near_one_g && !(lift_off && self.far_from_one_g);
         let vertical_s = if vertical { self.duration_s } else { 0.0 };
         let rest = !lift_off
@@ -160,7 +205,6 @@ impl Window {
         let between = (acc_noise + 0.5 * acc_spread) / self.acc.count.max(1.0);
         let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
         let tilt_variance = (START_SPREAD + 1.0 / self.acc.count.max(1.0)) * acc_spread / square(params.gravity);
-        let mag = (self.mag.count > 0.0).then_some(self.mag);
         Means {
             duration_s: self.duration_s,
             rate_b,
@@ -174,36 +218,32 @@ impl Window {
             velocity_variance: if rest { square(params.velocity_rest_sd) } else { moving },
             tilt_sd: ComplexField::sqrt(square(START_TILT_SD) + tilt_variance),
             acc_spread,
-            mag_n: mag.map(|mag| mag.mean()),
-            mag_spread: mag.map_or(0.0, |mag| mag.spread()),
-            mag_count: self.mag.count,
-            mag_variance: mag.map_or(0.0, |mag| mag.noise() / mag.count),
+            field: (self.mag.count > 0.0).then_some(self.mag),
         }
     }
 }
 
-impl Means {
-    /// [uT^2] variance of the mean field by what moved or turned within the window.
-    pub fn mag_unrest(&self, params: &Params) -> f32 {
-        (square(params.field_spread) + 1.0 / self.mag_count.max(1.0)) * self.mag_spread + self.mag_variance
+impl MeanField {
+    /// [uT^2] variance of a component of the mean in a window like others.
+    pub fn unrest(&self, params: &Params) -> f32 {
+        square(params.field_spread) * self.spread + self.white
     }
 
-    /// [rad] of the mean field's direction at the start, `disturbance` being the square of what is seen of one.
-    pub fn field_direction_sd(&self, params: &Params, disturbance: f32) -> f32 {
-        let norm_square = self
-            .mag_n
-            .map_or(1.0, |mag_n| mag_n.norm_squared().max(f32::MIN_POSITIVE));
-        let spread = (START_SPREAD + 1.0 / self.mag_count.max(1.0)) * self.mag_spread + self.mag_variance;
+    /// [rad] of its direction at the start, `disturbance` being the square of what is seen of one.
+    pub fn direction_sd(&self, params: &Params, disturbance: f32) -> f32 {
+        let unrest = (START_SPREAD * self.spread + self.white) / self.mag_n.norm_squared().max(f32::MIN_POSITIVE);
         let disturbed = square(params.disturbance) * disturbance;
-        ComplexField::sqrt(square(params.start_field_sd) + disturbed + spread / norm_square)
+        ComplexField::sqrt(square(params.start_field_sd) + disturbed + unrest)
     }
+}
 
+impl Means {
     /// [m/s] velocity at the start.
     pub fn start_velocity_sd(&self, params: &Params) -> f32 {
         ComplexField::sqrt(square(params.velocity_sd) + 0.1 * self.acc_spread)
     }
 }
 
-fn is_near(norm: f32, gravity: f32) -> bool {
-    ComplexField::abs(norm - gravity) < NEAR_ONE_G * gravity
+fn is_near(norm: f32, gravity: f32, part: f32) -> bool {
+    ComplexField::abs(norm - gravity) < part * gravity
 }
