@@ -275,6 +275,9 @@ impl Filter {
         if !self.aligned {
             self.covariance.predict(&self.params, &window, &means);
             outcome.aligned = self.align(&means, UNKNOWN);
+            if !outcome.aligned {
+                self.covariance.forget_attitude();
+            }
             return;
         }
         self.velocity_n += means.velocity_change_n;
@@ -292,21 +295,28 @@ impl Filter {
         self.inject(&correction);
         outcome.innovations = correction.innovations;
         let bounded = self.covariance.keep_bounds();
-        for (rejected_s, accepted) in self.rejected_s.iter_mut().zip([velocity, field]) {
+        outcome.aligned = self.recover(&means, bounded, [velocity, field]);
+    }
+
+    /// Counts rejections that say something of the attitude, and finds it afresh where it must be. Whether it did.
+    fn recover(&mut self, means: &Means, bounded: bool, accepted: [Option<bool>; 2]) -> bool {
+        for (rejected_s, accepted) in self.rejected_s.iter_mut().zip(accepted) {
             match accepted {
                 Some(false) => *rejected_s += means.duration_s,
                 Some(true) => *rejected_s = 0.0,
                 None => {}
             }
         }
+        let worst = self.covariance.attitude().diagonal().max();
         if !bounded
             || self
                 .rejected_s
-                .iter()
-                .any(|rejected_s| *rejected_s >= self.params.recovery_s)
+                .into_iter()
+                .any(|rejected_s| rejected_s >= self.params.recovery_s)
         {
-            outcome.aligned = self.align(&means, UNKNOWN);
+            return self.align(means, UNKNOWN);
         }
+        worst > square(self.params.lost_sd) && self.align(means, MUCH_BETTER * worst)
     }
 
     /// At rest the gyros measure their own bias and the Earth's rate.

@@ -155,6 +155,12 @@ impl Covariance {
         self.0.fixed_view_mut::<3, 3>(0, 0).copy_from(covariance_n);
     }
 
+    /// Nothing known of the attitude.
+    pub(super) fn forget_attitude(&mut self) {
+        let unknown = square(core::f32::consts::PI);
+        self.align(&Matrix3::from_diagonal_element(unknown));
+    }
+
     /// Velocity known to `sd` [m/s] only.
     pub(super) fn forget_velocity(&mut self, sd: f32) {
         for index in VELOCITY..STATES {
