@@ -142,6 +142,8 @@ pub struct Filter {
     last_us: Option<u64>,
     /// [s] for how long each kind of measurement has been rejected without a break: velocity, field.
     rejected_s: [f32; 2],
+    /// [s] for how long the field has been disturbed without a break.
+    disturbed_s: f32,
 }
 
 impl Filter {
@@ -160,6 +162,7 @@ impl Filter {
             rate_b: Vector3::zeros(),
             last_us: None,
             rejected_s: [0.0; 2],
+            disturbed_s: 0.0,
             params,
         }
     }
@@ -363,19 +366,21 @@ impl Filter {
         self.reference
             .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
         let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
+        let disturbed = compared.disturbance > self.params.field_gate;
+        self.disturbed_s = if disturbed {
+            self.disturbed_s + means.duration_s
+        } else {
+            0.0
+        };
+        correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
         let mut accepted = true;
         for scalar in &compared.scalars {
-            let quantity = scalar.quantity;
-            accepted &= correction.compare(
-                &mut self.covariance,
-                quantity,
-                0.0,
-                scalar.residual,
-                &scalar.rows,
-                scalar.variance,
-            );
+            let (quantity, rows) = (scalar.quantity, &scalar.rows);
+            let covariance = &mut self.covariance;
+            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.variance);
         }
-        compared.trusted.then_some(accepted)
+        correction.usable = true;
+        (!disturbed).then_some(accepted)
     }
 
     fn inject(&mut self, correction: &Correction) {

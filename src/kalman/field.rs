@@ -45,12 +45,9 @@ pub struct Scalar {
 /// The field of a window.
 pub struct Compared {
     pub scalars: [Scalar; 2],
-    /// Norm and dip are those of the reference: if it is rejected all the same, the attitude is wrong.
-    pub trusted: bool,
+    /// [1] what norm and dip show of a disturbance.
+    pub disturbance: f32,
 }
-
-/// Norm and dip within this part of the reference are undisturbed.
-const UNDISTURBED: f32 = 0.1;
 
 impl Reference {
     /// The field of a site: norm \[uT\], dip and declination \[rad\].
@@ -102,7 +99,7 @@ impl Reference {
                     variance: square(params.dip_sd) + seen,
                 },
             ],
-            trusted: disturbance < square(UNDISTURBED),
+            disturbance: ComplexField::sqrt(disturbance),
         })
     }
 

@@ -47,6 +47,8 @@ pub struct Innovation {
 /// What the scalars of a window correct together.
 pub(super) struct Correction {
     gate: f32,
+    /// Scalars compared while this is `false` are recorded and not used.
+    pub usable: bool,
     /// The error state as estimated so far.
     pub error: SVector<f32, STATES>,
     /// What was compared.
@@ -57,6 +59,7 @@ impl Correction {
     pub fn new(gate: f32) -> Self {
         Correction {
             gate,
+            usable: true,
             error: SVector::zeros(),
             innovations: Innovations::new(),
         }
@@ -77,7 +80,7 @@ impl Correction {
         let seen = covariance.seen(rows, variance);
         let test_ratio = residual * residual / (self.gate * self.gate * seen.variance);
         // Not greater than one, so that NaN is rejected too.
-        let accepted = test_ratio <= 1.0;
+        let accepted = self.usable && test_ratio <= 1.0;
         if accepted {
             self.error += seen.column * (residual / seen.variance);
             covariance.update(&seen);

@@ -41,6 +41,11 @@ pub struct Params {
     pub dip_sd: f32,
     /// [1] how far a disturbance is believed to reach across the field, in parts of what norm and dip show of it.
     pub disturbance: f32,
+    /// [1] a field whose norm and dip are off by more (in parts of the norm, and radians) is not used. Small: coasts on
+    /// the gyros often; large: follows iron.
+    pub field_gate: f32,
+    /// [s] but for no longer than this without a break: after it the field is used with its variance, for what it is.
+    pub coast_s: f32,
     /// [1] how much of the field's spread within a window adds to its uncertainty.
     pub field_spread: f32,
     /// [1] gate in standard deviations of the innovation. Small: good data are lost; large: bad data get in.
@@ -119,9 +124,11 @@ impl Params {
         velocity_rest_sd: 0.1,
         acc_error: 0.03,
         heading_sd: 15.0 * DEG,
-        start_field_sd: 1.1 * DEG,
-        dip_sd: 8.0 * DEG,
+        start_field_sd: 2.2 * DEG,
+        dip_sd: 12.0 * DEG,
         disturbance: 1.0,
+        field_gate: 0.15,
+        coast_s: 60.0,
         field_spread: 0.2,
         gate: 5.0,
         recovery_s: 5.0,
@@ -146,6 +153,6 @@ impl Params {
         iron_noise_ut: 2.0,
         iron_per_spread: 30.0,
         field: Reference::unknown(),
-        learn_s: 30.0,
+        learn_s: 20.0,
     };
 }

@@ -60,7 +60,7 @@ pub fn replay(mode: Mode) -> Replay {
         params: Params {
             delays: Delays {
                 gyro_s: 0.004,
-                acc_s: 0.0025,
+                acc_s: 0.004,
                 mag_s: 0.015,
             },
             gravity: 9.82,

@@ -52,10 +52,7 @@ impl Replay {
         let mut filter = Filter::new(self.params);
         let mut score = Score::default();
         for (step, row) in self.steps(rows) {
-            let o = filter.step(&step);
-            if o.aligned && std::env::var("DBG").is_ok() {
-                eprint!(" {:.0}", row.t_s);
-            }
+            filter.step(&step);
             if let (true, true, Some(reference_nb)) = (filter.aligned, row.scored, row.reference_nb) {
                 score.add(&filter.attitude().cast(), &reference_nb);
             }
