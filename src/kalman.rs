@@ -294,7 +294,7 @@ impl Filter {
             self.velocity_n = Vector2::zeros();
             self.covariance.forget_velocity(self.params.velocity_sd);
         }
-        let field = self.compare_field(&means, &mut correction);
+        let field = self.compare_field(&window, &means, &mut correction);
         self.inject(&correction);
         outcome.innovations = correction.innovations;
         let bounded = self.covariance.keep_bounds();
@@ -360,7 +360,7 @@ impl Filter {
 
     /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
     /// disturbed for its rejection to say anything of the attitude.
-    fn compare_field(&mut self, means: &Means, correction: &mut Correction) -> Option<bool> {
+    fn compare_field(&mut self, window: &Window, means: &Means, correction: &mut Correction) -> Option<bool> {
         let sums = means.field?;
         self.iron.learn(&self.params, &sums);
         self.reference
@@ -375,7 +375,7 @@ impl Filter {
         correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
         let mut accepted = true;
         for scalar in &compared.scalars {
-            let (quantity, rows) = (scalar.quantity, &scalar.rows);
+            let (quantity, rows) = (scalar.quantity, &window.mean_rows(&scalar.row_n));
             let covariance = &mut self.covariance;
             accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.variance);
         }

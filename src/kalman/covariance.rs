@@ -1,7 +1,7 @@
 //! The covariance of the error state: over a window, and after a scalar.
 //!
 //! Error state: attitude 3 \[rad, in n\], bias 3 \[rad/s\], gyro matrix 9 \[1, row by row\], velocity 2 \[m/s, north and
-//! east\]. Over a window `x <- F x` with `a <- a + A (b, M)`, `v <- v + T (a x f)_h` for `f = (0, 0, -g)`; only these
+//! east\]. Over a window `x <- F x` with `a <- a + A (b, M)`, `v <- v + T (a x f)_h` for `f = (0, 0, -g)` and the mean `a`; only these
 //! blocks of F differ from the identity and nothing else is multiplied. The true horizontal force is left out of F: it is
 //! known only as well as its noisy samples, and a filter that believes them sees heading in the noise.
 //!
@@ -68,32 +68,42 @@ impl Covariance {
 
     /// Over a window.
     pub(super) fn predict(&mut self, params: &Params, window: &Window, means: &Means) {
-        self.turn(window);
-        self.drift(params, means.duration_s);
-        // v_N gains -g T a_E, v_E gains g T a_N.
+        // v_N loses g T a_E, v_E gains g T a_N: first with the attitude error before the window, then with what the
+        // gyros' errors added to it on average.
         let tilt = params.gravity * means.vertical_s;
         self.add_row(VELOCITY, 1, -tilt);
         self.add_row(VELOCITY + 1, 0, tilt);
+        let mut drive = SMatrix::<f32, 5, DRIVERS>::zeros();
+        drive.fixed_rows_mut::<3>(0).copy_from(&window.drive);
+        drive.row_mut(3).copy_from(&(window.mean_drive.row(1) * -tilt));
+        drive.row_mut(4).copy_from(&(window.mean_drive.row(0) * tilt));
+        self.drive(&drive);
+        for axis in 0..BIAS {
+            self.0[(axis, axis)] += window.angle_variance;
+        }
+        self.drift(params, means.duration_s);
         for axis in VELOCITY..STATES {
             self.0[(axis, axis)] += means.velocity_change_variance;
         }
     }
 
-    /// `a <- a + A (b, M)`.
-    fn turn(&mut self, window: &Window) {
+    /// Attitude and velocity gain `drive` times bias and gyro matrix.
+    fn drive(&mut self, drive: &SMatrix<f32, 5, DRIVERS>) {
+        const DRIVEN: [usize; 5] = [0, 1, 2, VELOCITY, VELOCITY + 1];
         let p = &mut self.0;
-        let driven: SMatrix<f32, 3, STATES> = window.drive * p.fixed_rows::<DRIVERS>(BIAS);
-        let own = driven.fixed_columns::<DRIVERS>(BIAS) * window.drive.transpose();
-        for row in 0..3 {
-            for column in row..STATES {
-                let mut sum = p[(row, column)] + driven[(row, column)];
-                if column < BIAS {
-                    sum += driven[(column, row)] + 0.5 * (own[(row, column)] + own[(column, row)]);
-                }
+        let gained: SMatrix<f32, 5, STATES> = drive * p.fixed_rows::<DRIVERS>(BIAS);
+        let own = gained.fixed_columns::<DRIVERS>(BIAS) * drive.transpose();
+        for (k, row) in DRIVEN.into_iter().enumerate() {
+            for column in BIAS..VELOCITY {
+                let sum = p[(row, column)] + gained[(k, column)];
                 p[(row, column)] = sum;
                 p[(column, row)] = sum;
             }
-            p[(row, row)] += window.angle_variance;
+            for (l, column) in DRIVEN.into_iter().enumerate().skip(k) {
+                let sum = p[(row, column)] + gained[(k, column)] + gained[(l, row)] + 0.5 * (own[(k, l)] + own[(l, k)]);
+                p[(row, column)] = sum;
+                p[(column, row)] = sum;
+            }
         }
     }
 

@@ -38,7 +38,8 @@ pub struct Reference {
 pub struct Scalar {
     pub quantity: Quantity,
     pub residual: f32,
-    pub rows: [(usize, f32); 3],
+    /// What it sees of the attitude error, in n.
+    pub row_n: Vector3<f32>,
     pub variance: f32,
 }
 
@@ -89,13 +90,13 @@ impl Reference {
                 Scalar {
                     quantity: Quantity::FieldEast,
                     residual: -cos * RealField::atan2(east, north),
-                    rows: [(0, -sin * cos_d), (1, -sin * sin_d), (2, cos)],
+                    row_n: Vector3::new(-sin * cos_d, -sin * sin_d, cos),
                     variance: square(params.heading_sd * cos) + seen,
                 },
                 Scalar {
                     quantity: Quantity::FieldMeridian,
                     residual: self.dip - dip,
-                    rows: [(0, sin_d), (1, -cos_d), (2, 0.0)],
+                    row_n: Vector3::new(sin_d, -cos_d, 0.0),
                     variance: square(params.dip_sd) + seen,
                 },
             ],

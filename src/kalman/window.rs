@@ -5,7 +5,7 @@
 
 use nalgebra::{ComplexField, Matrix3, SMatrix, Vector2, Vector3};
 
-use super::{Params, square};
+use super::{Params, covariance::BIAS, square};
 
 /// Gyro error states that drive the attitude: bias 3, matrix 9.
 pub const DRIVERS: usize = 12;
@@ -17,6 +17,8 @@ pub struct Window {
     pub duration_s: f32,
     /// Attitude error by bias \[s\] and matrix \[rad\]: `-integral dcm_nb (1, gyro)`.
     pub drive: SMatrix<f32, 3, DRIVERS>,
+    /// Its mean over the window: what a mean over the window saw of it.
+    pub mean_drive: SMatrix<f32, 3, DRIVERS>,
     /// [rad^2] white variance of the attitude about each axis.
     pub angle_variance: f32,
     covered_s: f32,
@@ -153,6 +155,7 @@ impl Window {
         if covered_s > 0.0 {
             self.rate_square += gyro_b.norm_squared() / covered_s;
         }
+        let before = self.drive;
         for axis in 0..3 {
             let column = dcm_nb.column(axis);
             for row in 0..3 {
@@ -162,6 +165,9 @@ impl Window {
                 }
             }
         }
+        // A running mean, weighted by time.
+        let part = (covered_s + gap_s) / self.duration_s.max(f32::MIN_POSITIVE);
+        self.mean_drive += ((before + self.drive) * 0.5 - self.mean_drive) * part;
     }
 
     /// A sample of specific force.
@@ -179,6 +185,16 @@ impl Window {
         sums.turned += dcm_nb;
         sums.squares += mag_b.norm_squared();
         sums.variance += variance;
+    }
+
+    /// What a mean over the window sees of the error state, if at any instant it sees `row_n` of the attitude error: less
+    /// of what the gyros' errors added than there is at its end.
+    pub fn mean_rows(&self, row_n: &Vector3<f32>) -> [(usize, f32); BIAS + DRIVERS] {
+        let missed = (self.mean_drive - self.drive).transpose() * row_n;
+        core::array::from_fn(|index| match index {
+            0..BIAS => (index, row_n[index]),
+            _ => (index, missed[index - BIAS]),
+        })
     }
 
     /// What it all says.

@@ -22,6 +22,7 @@ pub struct Mekf {
     params: Params,
     /// Transition over the window so far.
     transition: SMatrix<f64, N, N>,
+    mean_transition: SMatrix<f64, N, N>,
     angle_variance: f64,
     duration_s: f64,
     acc: (f64, Vector3<f64>, f64, f64),
@@ -48,6 +49,7 @@ impl Mekf {
             velocity_n: Vector2::zeros(),
             params,
             transition: SMatrix::identity(),
+            mean_transition: SMatrix::zeros(),
             angle_variance: 0.0,
             duration_s: 0.0,
             acc: (0.0, Vector3::zeros(), 0.0, 0.0),
@@ -75,7 +77,13 @@ impl Mekf {
                 }
             }
         }
-        self.transition = f * self.transition;
+        // The wrong vertical turns gravity into velocity, by the mean attitude error over the step.
+        let mut fall = SMatrix::<f64, N, N>::identity();
+        fall[(15, 1)] = -f64::from(self.params.gravity) * dt_s / 2.0;
+        fall[(16, 0)] = -fall[(15, 1)];
+        let before = self.transition;
+        self.transition = fall * f * fall * before;
+        self.mean_transition += (before + self.transition) * (dt_s / 2.0);
         self.angle_variance += f64::from(step.angle_variance)
             + f64::from(self.params.angle_noise).powi(2) * dt_s
             + f64::from(self.params.turn_noise).powi(2) * turned.norm();
@@ -111,12 +119,8 @@ impl Mekf {
             mean(std::mem::replace(&mut self.acc, (0.0, Vector3::zeros(), 0.0, 0.0)));
         let (mag, mag_spread, mag_noise, mag_n) =
             mean(std::mem::replace(&mut self.mag, (0.0, Vector3::zeros(), 0.0, 0.0)));
-        let mut f = std::mem::replace(&mut self.transition, SMatrix::identity());
-        // Tilt at the window's end turns gravity into velocity.
-        let mut tilt = SMatrix::<f64, N, N>::identity();
-        tilt[(15, 1)] = -f64::from(p.gravity) * t_s;
-        tilt[(16, 0)] = f64::from(p.gravity) * t_s;
-        f = tilt * f;
+        let f = std::mem::replace(&mut self.transition, SMatrix::identity());
+        let mean_f = std::mem::replace(&mut self.mean_transition, SMatrix::zeros()) / t_s;
         let mut q = SMatrix::<f64, N, N>::zeros();
         for index in 3..15 {
             q[(index, index)] = t_s
@@ -130,7 +134,6 @@ impl Mekf {
         for index in 0..3 {
             q[(index, index)] = angle_variance;
         }
-        q = tilt * q * tilt.transpose();
         for index in 15..17 {
             q[(index, index)] += t_s * t_s * (square(p.acc_error) + (acc_noise + 0.5 * acc_spread) / acc_n);
         }
@@ -152,6 +155,8 @@ impl Mekf {
         h[(0, 0)] = -dip0.sin();
         h[(0, 2)] = dip0.cos();
         h[(1, 1)] = -1.0;
+        // The mean field saw the mean attitude of the window: the state carried back to its start and on to there.
+        let h = h * mean_f * f.try_inverse().expect("a transition");
         let residual = Vector2::new(-dip0.cos() * mag.y.atan2(mag.x), dip0 - dip);
         let noise = Vector2::new(
             (f64::from(p.heading_sd) * dip0.cos()).powi(2) + seen,
