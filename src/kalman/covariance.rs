@@ -78,12 +78,23 @@ impl Covariance {
         drive.row_mut(3).copy_from(&(window.mean_drive.row(1) * -tilt));
         drive.row_mut(4).copy_from(&(window.mean_drive.row(0) * tilt));
         self.drive(&drive);
-        for axis in 0..BIAS {
-            self.0[(axis, axis)] += window.angle_variance;
-        }
+        self.wander(window.angle_variance, tilt);
         self.drift(params, means.duration_s);
         for axis in VELOCITY..STATES {
             self.0[(axis, axis)] += means.velocity_change_variance;
+        }
+    }
+
+    /// The attitude's random walk by `variance` over the window, and what it does to the velocity meanwhile: the mean of
+    /// a walk has a third of the variance of its end, and half of it in common with it.
+    fn wander(&mut self, variance: f32, tilt: f32) {
+        for axis in 0..BIAS {
+            self.0[(axis, axis)] += variance;
+        }
+        for (velocity, axis, tilt) in [(VELOCITY, 1, -tilt), (VELOCITY + 1, 0, tilt)] {
+            self.0[(velocity, velocity)] += tilt * tilt * variance / 3.0;
+            self.0[(velocity, axis)] += tilt * variance / 2.0;
+            self.0[(axis, velocity)] = self.0[(velocity, axis)];
         }
     }
 

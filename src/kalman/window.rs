@@ -155,7 +155,6 @@ impl Window {
         if covered_s > 0.0 {
             self.rate_square += gyro_b.norm_squared() / covered_s;
         }
-        let before = self.drive;
         for axis in 0..3 {
             let column = dcm_nb.column(axis);
             for row in 0..3 {
@@ -165,9 +164,9 @@ impl Window {
                 }
             }
         }
-        // A running mean, weighted by time.
+        // A running mean, weighted by time; samples are taken at the ends of steps.
         let part = (covered_s + gap_s) / self.duration_s.max(f32::MIN_POSITIVE);
-        self.mean_drive += ((before + self.drive) * 0.5 - self.mean_drive) * part;
+        self.mean_drive += (self.drive - self.mean_drive) * part;
     }
 
     /// A sample of specific force.

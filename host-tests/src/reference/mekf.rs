@@ -77,13 +77,12 @@ impl Mekf {
                 }
             }
         }
-        // The wrong vertical turns gravity into velocity, by the mean attitude error over the step.
+        // The wrong vertical turns gravity into velocity, by the attitude error at the step's end, where it is sampled.
         let mut fall = SMatrix::<f64, N, N>::identity();
-        fall[(15, 1)] = -f64::from(self.params.gravity) * dt_s / 2.0;
+        fall[(15, 1)] = -f64::from(self.params.gravity) * dt_s;
         fall[(16, 0)] = -fall[(15, 1)];
-        let before = self.transition;
-        self.transition = fall * f * fall * before;
-        self.mean_transition += (before + self.transition) * (dt_s / 2.0);
+        self.transition = fall * f * self.transition;
+        self.mean_transition += self.transition * dt_s;
         self.angle_variance += f64::from(step.angle_variance)
             + f64::from(self.params.angle_noise).powi(2) * dt_s
             + f64::from(self.params.turn_noise).powi(2) * turned.norm();
@@ -133,6 +132,12 @@ impl Mekf {
         let angle_variance = std::mem::take(&mut self.angle_variance);
         for index in 0..3 {
             q[(index, index)] = angle_variance;
+        }
+        let fall = f64::from(p.gravity) * t_s;
+        for (velocity, axis, fall) in [(15, 1, -fall), (16, 0, fall)] {
+            q[(velocity, velocity)] += fall * fall * angle_variance / 3.0;
+            q[(velocity, axis)] += fall * angle_variance / 2.0;
+            q[(axis, velocity)] += fall * angle_variance / 2.0;
         }
         for index in 15..17 {
             q[(index, index)] += t_s * t_s * (square(p.acc_error) + (acc_noise + 0.5 * acc_spread) / acc_n);
