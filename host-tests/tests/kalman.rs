@@ -174,7 +174,7 @@ impl Flight {
 }
 
 const FLIGHTS: usize = 500;
-const WINDOWS: usize = 60;
+const WINDOWS: usize = 120;
 
 /// For each window: mean NEES of the attitude, 3 degrees of freedom, and mean NIS of a scalar, over all flights.
 fn consistency(motion: Motion) -> Vec<(f64, f64)> {
