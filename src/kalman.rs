@@ -37,6 +37,8 @@ mod field;
 mod innovation;
 mod iron;
 mod params;
+mod start;
+mod step;
 mod window;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
@@ -47,74 +49,15 @@ pub use self::{
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
     iron::HardIron,
     params::{Delays, Params, Rest},
+    step::{Outcome, Refusal, Sampled, Step},
 };
 use self::{
     covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
     innovation::Correction,
+    start::UNKNOWN,
     window::{Means, Window},
 };
-use crate::{
-    attitude::{dcm_nb, from_rotation_vector, renormalised},
-    triad::{Sighting, triad},
-};
-
-/// A vector sampled at an instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampled {
-    /// Components in b: specific force \[m/s2\] or field \[uT\].
-    pub value_b: Vector3<f32>,
-    /// White variance of each component, in the square of that unit.
-    pub variance: f32,
-    /// [us] when it was sampled, as stamped; [`Params::delays`] are taken off.
-    pub at_us: u64,
-}
-
-/// What came since the step before.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// [us] end of the increment.
-    pub at_us: u64,
-    /// [s] time the increment covers; what is missing to the step before is a gap.
-    pub covered_s: f32,
-    /// [rad] rotation vector that the gyros saw over it, in b.
-    pub angle_b: Vector3<f32>,
-    /// [rad^2] white variance of each component of it.
-    pub angle_variance: f32,
-    /// [rad/s] rate at its end, in b: carries samples over the few milliseconds to their instants.
-    pub rate_b: Vector3<f32>,
-    /// A gyro stood at the end of its range: the increment is a lower bound.
-    pub saturated: bool,
-    /// Specific force, if it was sampled.
-    pub acc: Option<Sampled>,
-    /// Field, if it was sampled.
-    pub mag: Option<Sampled>,
-    /// After lift-off nothing is taken for rest, and specific force for the vertical only if every sample of a window
-    /// is near one g.
-    pub lift_off: bool,
-}
-
-/// Why a step, or a part of it, was left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub enum Refusal {
-    /// Increment or rate is not finite, or the increment is longer than a turn: the step counts as a gap.
-    NotARotation,
-    /// It does not end later than the step before: left out.
-    NotLater,
-    /// The gap before it is too long: the attitude starts afresh.
-    Gap,
-}
-
-/// What a step led to.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Outcome {
-    /// What was wrong with it.
-    pub refusal: Option<Refusal>,
-    /// One for each scalar compared, when it closed a window.
-    pub innovations: Innovations,
-    /// The attitude was found afresh with TRIAD.
-    pub aligned: bool,
-}
+use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
 /// The filter: its parameters and its whole state.
 #[derive(Clone, Debug)]
@@ -140,6 +83,8 @@ pub struct Filter {
     window: Window,
     rate_b: Vector3<f32>,
     last_us: Option<u64>,
+    /// [s] since the gyros were last heard.
+    silent_s: f32,
     /// [s] for how long each kind of measurement has been rejected without a break: velocity, field.
     rejected_s: [f32; 2],
     /// [s] for how long the field has been disturbed without a break.
@@ -161,6 +106,7 @@ impl Filter {
             window: Window::default(),
             rate_b: Vector3::zeros(),
             last_us: None,
+            silent_s: 0.0,
             rejected_s: [0.0; 2],
             disturbed_s: 0.0,
             params,
@@ -203,13 +149,13 @@ impl Filter {
             None => step.covered_s,
         };
         self.last_us = Some(step.at_us);
-        let rotation = is_a_rotation(step);
+        let rotation = step.is_a_rotation();
         if !rotation {
             outcome.refusal = Some(Refusal::NotARotation);
         }
         let covered_s = if rotation { step.covered_s.min(since_s) } else { 0.0 };
         let gap_s = since_s - covered_s;
-        if !(gap_s < self.params.longest_gap_s) {
+        if self.silent_s + gap_s >= self.params.longest_gap_s {
             outcome.refusal = Some(Refusal::Gap);
             self.lose(since_s);
             return outcome;
@@ -239,7 +185,10 @@ impl Filter {
         let params = &self.params;
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
             + params.turn_noise * params.turn_noise * turned_b.norm();
-        variance += square(params.gap_rate_sd * gap_s);
+        // The rate missed is one and the same all through a gap, however many steps it lasts.
+        let silent_s = self.silent_s + gap_s.max(0.0);
+        variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
+        self.silent_s = if rotation { 0.0 } else { silent_s };
         if rotation {
             variance += step.angle_variance;
             self.rate_b = step.rate_b - self.gyro_matrix * step.rate_b - self.bias_b;
@@ -256,7 +205,7 @@ impl Filter {
         let delays = self.params.delays;
         let (rate_b, window_s) = (self.rate_b, self.params.window_s);
         let carried = |sampled: Option<Sampled>, delay_s: f32| {
-            let sampled = sampled.filter(is_sampled)?;
+            let sampled = sampled.filter(Sampled::is_believable)?;
             let late_s = (sampled.at_us as i64).wrapping_sub(step.at_us as i64) as f32 * 1e-6;
             let offset_s = late_s + delays.gyro_s - delay_s;
             let near = offset_s > -window_s && offset_s < window_s;
@@ -299,27 +248,6 @@ impl Filter {
         outcome.innovations = correction.innovations;
         let bounded = self.covariance.keep_bounds();
         outcome.aligned = self.recover(&means, bounded, [velocity, field]);
-    }
-
-    /// Counts rejections that say something of the attitude, and finds it afresh where it must be. Whether it did.
-    fn recover(&mut self, means: &Means, bounded: bool, accepted: [Option<bool>; 2]) -> bool {
-        for (rejected_s, accepted) in self.rejected_s.iter_mut().zip(accepted) {
-            match accepted {
-                Some(false) => *rejected_s += means.duration_s,
-                Some(true) => *rejected_s = 0.0,
-                None => {}
-            }
-        }
-        let worst = self.covariance.attitude().diagonal().max();
-        if !bounded
-            || self
-                .rejected_s
-                .into_iter()
-                .any(|rejected_s| rejected_s >= self.params.recovery_s)
-        {
-            return self.align(means, UNKNOWN);
-        }
-        worst > square(self.params.lost_sd) && self.align(means, MUCH_BETTER * worst)
     }
 
     /// At rest the gyros measure their own bias and the Earth's rate.
@@ -396,51 +324,6 @@ impl Filter {
         self.velocity_n += error.fixed_rows::<2>(VELOCITY);
     }
 
-    /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could, with no
-    /// variance above `most` \[rad^2\].
-    fn align(&mut self, means: &Means, most: f32) -> bool {
-        let (Some(sums), true) = (means.field, means.near_one_g) else {
-            return false;
-        };
-        let mean = sums.mean(&self.iron.iron_b);
-        let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
-        let down = Sighting {
-            seen_b: -means.acc_n,
-            known_n: Vector3::z(),
-            seen_sd: means.tilt_sd,
-            known_sd: 0.0,
-        };
-        let field = Sighting {
-            seen_b: mean.mag_n,
-            known_n: self.reference.heading_n(),
-            seen_sd: mean.direction_sd(&self.params, disturbance),
-            known_sd: 0.0,
-        };
-        let Ok(found) = triad(&down, &field) else {
-            return false;
-        };
-        if found.covariance_b.diagonal().max() > most {
-            return false;
-        }
-        self.q_nb = renormalised(found.q_nb * self.q_nb);
-        let dcm = dcm_nb(&found.q_nb);
-        self.covariance.align(&(dcm * found.covariance_b * dcm.transpose()));
-        self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
-        self.velocity_n = Vector2::zeros();
-        self.rejected_s = [0.0; 2];
-        self.aligned = true;
-        true
-    }
-
-    /// The attitude is not known any more; bias and matrix have aged.
-    fn lose(&mut self, since_s: f32) {
-        self.window = Window::default();
-        self.aligned = false;
-        self.rate_b = Vector3::zeros();
-        self.velocity_n = Vector2::zeros();
-        self.covariance.age(&self.params, since_s);
-    }
-
     fn is_finite(&self) -> bool {
         let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
         finite(self.q_nb.as_vector().as_slice())
@@ -452,37 +335,11 @@ impl Filter {
     }
 }
 
-/// [rad^2] more than any attitude's variance: whatever TRIAD finds is better than nothing.
-const UNKNOWN: f32 = 1e3;
-
-/// A window that begins afresh throws the history away: only for a variance this many times smaller.
-const MUCH_BETTER: f32 = 0.1;
-
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;
 
-/// [rad] longest increment that is believed: the rotation vector of more than a turn has lost count.
-const LONGEST_TURN: f32 = core::f32::consts::TAU;
-
 fn square(x: f32) -> f32 {
     x * x
-}
-
-/// Comparisons with NaN are false.
-fn is_a_rotation(step: &Step) -> bool {
-    step.angle_b.norm_squared() < LONGEST_TURN * LONGEST_TURN
-        && step.rate_b.norm_squared() < 1e6
-        && step.covered_s > 0.0
-        && step.angle_variance >= 0.0
-        && step.angle_variance < 1.0
-}
-
-/// Longer than any specific force or field that a sensor could give: what is beyond is a fault.
-const LONGEST_SAMPLE: f32 = 1e4;
-
-fn is_sampled(sampled: &Sampled) -> bool {
-    let norm = sampled.value_b.norm();
-    norm < LONGEST_SAMPLE && sampled.variance >= 0.0 && sampled.variance < LONGEST_SAMPLE
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ pub fn quest(sightings: &[Sighting]) -> Result<Observation, Unobservable> {
         profile += known_n * seen_b.transpose() * weight;
     }
     let spread = information_b.symmetric_eigenvalues();
-    if !(spread.min() > LEAST_INFORMATION * spread.max()) {
+    if spread.min() <= LEAST_INFORMATION * spread.max() {
         return Err(Unobservable::Collinear);
     }
     let covariance_b = information_b.try_inverse().ok_or(Unobservable::Collinear)? / total;

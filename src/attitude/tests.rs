@@ -1,3 +1,6 @@
+// Golden numbers are written with the digits they were printed with.
+#![allow(clippy::excessive_precision)]
+
 use core::f32::consts::{FRAC_PI_2, PI};
 
 use super::*;

@@ -195,7 +195,7 @@ impl Covariance {
         let start = Covariance::new(params);
         for index in 0..STATES {
             let most = start.0[(index, index)];
-            if !(self.0[(index, index)] < most) {
+            if self.0[(index, index)] >= most {
                 self.forget(index, most);
             }
         }
@@ -220,7 +220,7 @@ impl Covariance {
             let variance = &mut self.0[(index, index)];
             // A state that is switched off stands at exactly zero.
             sound &= *variance >= 0.0;
-            if *variance != 0.0 && !(*variance >= floor) {
+            if *variance != 0.0 && *variance < floor {
                 *variance = floor;
             }
         }
