@@ -20,6 +20,7 @@ macro_rules! log_line {
     };
 }
 
+pub mod attitude;
 pub mod board;
 pub mod budget;
 pub mod calibration;
@@ -30,11 +31,14 @@ pub mod discrete;
 pub mod faults;
 pub mod geometry;
 pub mod increments;
+pub mod kalman;
 pub mod mode;
 pub mod packet;
+pub mod quest;
 pub mod recorder;
 pub mod redundancy;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
+pub mod triad;
 pub mod unit;
