@@ -39,6 +39,11 @@ impl<const N: usize> Spline<N> {
         self.samples.span_s()
     }
 
+    /// [s] the instants of the samples.
+    pub fn t_s(&self) -> &[f64] {
+        self.samples.t_s()
+    }
+
     /// Value and derivatives at `t_s`.
     pub fn at(&self, t_s: f64) -> Sample<N> {
         let (i, s) = self.samples.interval(t_s);
