@@ -9,6 +9,7 @@
 //! left out and counted in [`crate::log::Masked`].
 
 mod measured;
+mod subject;
 mod text;
 
 use std::{
@@ -24,6 +25,7 @@ use crate::{
 };
 
 pub use measured::read_measured;
+pub use subject::Subject;
 pub use text::read_bytes;
 
 /// Why a case cannot be judged.
@@ -52,7 +54,10 @@ pub enum CaseError {
     Unit(#[from] twin::predict::UnitError),
     /// The motion is unusable.
     #[error(transparent)]
-    Motion(#[from] twin::predict::ReferenceError),
+    Motion(#[from] twin::recording::FileError),
+    /// The unit's description names an effect there is not.
+    #[error(transparent)]
+    Effect(#[from] twin::effect::UnknownEffect),
 }
 
 impl CaseError {

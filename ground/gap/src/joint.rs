@@ -6,8 +6,6 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::gram::Gram;
-
 /// One channel's columns.
 #[derive(Clone, Debug)]
 pub struct Columns {
@@ -97,18 +95,10 @@ impl Joint {
     }
 }
 
-/// The Gram matrix of one channel's columns and residual, for [`crate::gram`]; the nuisances' prior sigmas are then 1.
-pub fn gram(columns: &Columns, residual: &DVector<f64>) -> Gram {
-    let open = columns.nuisance.ncols();
-    let mut all = columns.nuisance.clone().resize_horizontally(open + columns.effects.ncols(), 0.0);
-    all.columns_mut(open, columns.effects.ncols()).copy_from(&columns.effects);
-    Gram::new(open, &all, residual)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::Screen;
+    use crate::{evidence::Screen, gram::Normal};
 
     /// Double precision over some hundred operations on numbers near one.
     const ROUNDING: f64 = 1e-9;
@@ -127,7 +117,9 @@ mod tests {
         let joint = Joint::new(vec![columns(0.1), columns(0.7)], &sigmas).fit(&residuals);
         let mut screen = Screen::zeros(sigmas.to_vec());
         for (phase, residual) in [0.1, 0.7].into_iter().zip(&residuals) {
-            screen.add(&[0, 1], &gram(&columns(phase), residual).marginalise(&[1.0, 1.0]));
+            let Columns { nuisance, effects } = columns(phase);
+            let factor = Cholesky::new(DMatrix::identity(2, 2) + nuisance.tr_mul(&nuisance));
+            screen.add(&[0, 1], &Normal::marginal(&nuisance, factor.as_ref(), &effects, residual));
         }
         let estimate = screen.estimate(&[0, 1]).expect("finite");
         assert!((joint.parameters - estimate.parameters).norm() < ROUNDING);

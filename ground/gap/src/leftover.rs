@@ -168,7 +168,7 @@ impl Shapes {
 
     /// Sums over bins, in units of their noise.
     fn binned(&self, rest: &DVector<f64>) -> DVector<f64> {
-        let mut sums = DVector::zeros(BINS);
+        let mut sums = DVector::<f64>::zeros(BINS);
         for (bin, value) in self.bin_of.iter().zip(rest.iter()) {
             sums[*bin] += value;
         }

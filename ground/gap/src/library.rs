@@ -81,8 +81,8 @@ impl Library {
             .collect();
         for (done, effect) in smooth.iter().enumerate() {
             let (localities, variants) = (effect.localities(unit), effect.variants(log_s));
-            let rivals = (2 * smooth.len() * localities.len() * variants.len()).max(1);
-            let log_prior = 0.5f64.ln() - (rivals as f64 / 2.0).ln() - 0.5f64.ln();
+            let rivals = smooth.len() * localities.len() * variants.len();
+            let log_prior = -(rivals.max(1) as f64).ln();
             let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
             for locality in &localities {
                 for variant in &variants {

@@ -6,13 +6,14 @@
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
 //! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
     effect::Active,
     predict::{Accuracy, Column, Kind, Twin},
 };
 
 use crate::{
+    gram::Normal,
     joint::Columns,
     log::Series,
     windows::{Fit, Span},
@@ -42,6 +43,16 @@ pub struct Frame {
     pub nuisance: DMatrix<f64>,
     /// Names and prior sigmas of those columns.
     pub nuisance_names: Vec<(String, f64)>,
+    /// `r'Pr` with no effect in.
+    pub quiet_energy: f64,
+    factor: Option<Cholesky<f64, Dyn>>,
+}
+
+impl Frame {
+    /// Normal equations of some columns with the calibration marginalised.
+    pub fn normal(&self, effects: &DMatrix<f64>, residual: &DVector<f64>) -> Normal {
+        Normal::marginal(&self.nuisance, self.factor.as_ref(), effects, residual)
+    }
 }
 
 /// The least-squares problem of a case.
@@ -78,19 +89,28 @@ impl<'a> Problem<'a> {
                 let column = &columns[column];
                 column.entries[0].1[series.rows[row] as usize] * column.sigma / weight_sigma
             });
+            let open = nuisance.ncols();
             frames.push(Frame {
+                quiet_energy: 0.0,
+                factor: Cholesky::new(DMatrix::identity(open, open) + nuisance.tr_mul(&nuisance)),
                 series: series.clone(),
                 weight_sigma,
                 nuisance,
                 nuisance_names: columns.into_iter().map(|column| (column.name, column.sigma)).collect(),
             });
         }
-        Problem {
+        let mut problem = Problem {
             twin,
             frames,
             sigmas,
             reference: twin.field_columns(accuracy),
+        };
+        for channel in 0..problem.frames.len() {
+            let residual = problem.residual(channel, &[]);
+            let frame = &mut problem.frames[channel];
+            frame.quiet_energy = frame.normal(&DMatrix::zeros(residual.len(), 0), &residual).energy;
         }
+        problem
     }
 
     /// Readings of one channel at every row of the log.
