@@ -1,12 +1,23 @@
 //! Zero shift since the calibration: the sensor reads `b` where there is nothing to read.
 
-use super::{Effect, Nature, Page, Scope, Site, Symbol};
+use super::{Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
-/// `gyro-bias`.
-pub struct GyroBias;
+/// The effects of this file, told apart by their pages.
+pub struct Bias(pub &'static Page);
 
-const GYRO: Page = Page {
+impl Effect for Bias {
+    fn page(&self) -> &'static Page {
+        self.0
+    }
+
+    fn act<'a>(&self, theta: &'a [f64], _variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
+        chain.bias += theta[0];
+    }
+}
+
+/// `gyro-bias`.
+pub const GYRO: Page = Page {
     name: "gyro-bias",
     physics: "The gyro reads a rate at rest: its zero has moved since the calibration, as after every switching on.",
     equation: "y = n.w + b",
@@ -21,24 +32,26 @@ const GYRO: Page = Page {
         "earth-rate",
     ],
     confirm_by: "Rest in two attitudes at one temperature: the shift is the same in both.",
-    nature: Nature::Smooth,
-    scope: Scope::Channel,
-    common: false,
     sensors: &[Kind::Gyro],
-    parameters: &[Symbol {
-        name: "b",
-        unit: "rad/s",
-        prior_sigma: 0.01,
-        signed: true,
-    }],
+    parameters: &[Symbol::signed("b", "rad/s", 0.01)],
+    ..Page::SMOOTH
 };
 
-impl Effect for GyroBias {
-    fn page(&self) -> &'static Page {
-        &GYRO
-    }
-
-    fn act<'a>(&self, theta: &'a [f64], _variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
-        chain.bias += theta[0];
-    }
-}
+/// `accel-bias`.
+pub const ACCEL: Page = Page {
+    name: "accel-bias",
+    physics: "The accelerometer's zero has moved since the calibration.",
+    equation: "y = n.f + b",
+    source: "LIS331HH data sheet: zero-g offset 70 mg; a few mg after a calibration",
+    excited_by: "any attitude; told from other causes by six",
+    siblings: &[
+        "table-tilt",
+        "accel-bias-temperature",
+        "accel-hysteresis",
+        "accel-vibration-rectification",
+    ],
+    confirm_by: "The six faces up and down: the mean of opposite readings is the shift.",
+    sensors: &[Kind::Accelerometer],
+    parameters: &[Symbol::signed("b", "m/s^2", 0.1)],
+    ..Page::SMOOTH
+};

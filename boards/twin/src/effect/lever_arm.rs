@@ -2,20 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Effect, Nature, Page, Scope, Site, Symbol};
+use super::{Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `lever-arm`.
 pub struct LeverArm;
-
-const fn offset(name: &'static str) -> Symbol {
-    Symbol {
-        name,
-        unit: "m",
-        prior_sigma: 0.01,
-        signed: true,
-    }
-}
 
 const PAGE: Page = Page {
     name: "lever-arm",
@@ -26,11 +17,15 @@ const PAGE: Page = Page {
     excited_by: "fast spin and angular acceleration",
     siblings: &["accel-nonlinearity", "plate-flexing"],
     confirm_by: "Spin at two rates: the residual goes with the square of the rate, and turns with its direction.",
-    nature: Nature::Smooth,
     scope: Scope::Plate,
     common: true,
     sensors: &[Kind::Accelerometer],
-    parameters: &[offset("dx"), offset("dy"), offset("dz")],
+    parameters: &[
+        Symbol::signed("dx", "m", 0.01),
+        Symbol::signed("dy", "m", 0.01),
+        Symbol::signed("dz", "m", 0.01),
+    ],
+    ..Page::SMOOTH
 };
 
 impl Effect for LeverArm {

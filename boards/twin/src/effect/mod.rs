@@ -8,7 +8,7 @@
 //! ```text
 //! for effect in LIBRARY
 //!   for locality in effect.localities(unit)          one sensor, one plate, each its own, all alike, the unit
-//!     for variant in effect.variants(log_s)          usually one: 0
+//!     for variant in effect.variants(starts_s)       usually one: 0
 //!       cause = Cause { effect, locality, variant }
 //!       cause.parameters(unit)                       names, units, prior sigmas; theta = 0 is "no effect"
 //!       twin.predict(&[Active { cause, theta }])     readings of every channel
@@ -19,39 +19,130 @@
 //! no parameters); a `Spread` one by the likelihood of the residual ([`Effect::log_likelihood`]), for it changes how readings
 //! scatter and not what they are.
 
+mod accel_range;
+mod axis_order;
 mod bias;
+mod bias_temperature;
 mod cause;
+mod clock_rate;
+mod cross_field;
+mod current_field;
+mod earth_rate;
+mod eddy_current;
+mod field_gradient;
+mod field_model;
+mod g2_sensitivity;
+mod g_sensitivity;
+mod gravity_value;
+mod gyro_lag;
+mod gyro_supply;
+mod hard_iron;
+mod high_pass;
+mod hysteresis;
+mod latency;
 mod lever_arm;
+mod mains_alias;
+mod misalignment;
+mod mounting;
+mod nonlinearity;
+mod packet_loss;
 mod page;
+mod plate_flexing;
+mod plate_rotation;
+mod plate_swap;
+mod read_skew;
+mod reference_lag;
+mod reference_rate_scale;
+mod reference_sign;
+mod saturation;
 mod scale;
+mod scale_temperature;
+mod set_reset;
+mod sine_response;
+mod site;
+mod soft_iron;
+mod table_tilt;
+mod temperature_hysteresis;
+mod vibration_rectification;
+mod warm_up;
 
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{Nature, Page, Scope, Symbol};
+pub use site::Site;
 
-use crate::environment::Environment;
-use crate::predict::{Chain, Channel, UnitDescription};
+use crate::predict::{Chain, UnitDescription};
 
-/// All effects, in the order of their pages.
-pub const LIBRARY: &[&dyn Effect] = &[&bias::GyroBias, &scale::GyroScale, &lever_arm::LeverArm];
+/// All effects: gyros, accelerometers, magnetometers, reference and environment, timing.
+pub const LIBRARY: &[&dyn Effect] = &[
+    &bias::Bias(&bias::GYRO),
+    &bias_temperature::BiasTemperature(&bias_temperature::GYRO),
+    &temperature_hysteresis::TemperatureHysteresis,
+    &warm_up::WarmUp,
+    &scale::Scale(&scale::GYRO),
+    &scale_temperature::ScaleTemperature(&scale_temperature::GYRO),
+    &nonlinearity::GyroNonlinearity,
+    &misalignment::Misalignment(&misalignment::GYRO),
+    &g_sensitivity::GSensitivity,
+    &g2_sensitivity::G2Sensitivity,
+    &earth_rate::EarthRate,
+    &gyro_lag::GyroLag,
+    &gyro_supply::GyroSupply,
+    &saturation::Saturation,
+    &sine_response::SineResponse,
+    &bias::Bias(&bias::ACCEL),
+    &bias_temperature::BiasTemperature(&bias_temperature::ACCEL),
+    &scale::Scale(&scale::ACCEL),
+    &scale_temperature::ScaleTemperature(&scale_temperature::ACCEL),
+    &misalignment::Misalignment(&misalignment::ACCEL),
+    &nonlinearity::AccelNonlinearity,
+    &lever_arm::LeverArm,
+    &vibration_rectification::VibrationRectification,
+    &hysteresis::Hysteresis,
+    &high_pass::HighPass,
+    &accel_range::AccelRange,
+    &hard_iron::HardIron,
+    &soft_iron::SoftIron,
+    &scale_temperature::ScaleTemperature(&scale_temperature::MAG),
+    &bias_temperature::BiasTemperature(&bias_temperature::MAG),
+    &cross_field::CrossField,
+    &set_reset::SetReset,
+    &current_field::CurrentField,
+    &eddy_current::EddyCurrent,
+    &field_gradient::FieldGradient,
+    &mains_alias::MainsAlias,
+    &axis_order::AxisOrder,
+    &plate_rotation::PlateRotation,
+    &plate_swap::PlateSwap,
+    &gravity_value::GravityValue,
+    &table_tilt::TableTilt,
+    &mounting::Mounting,
+    &reference_rate_scale::ReferenceRateScale,
+    &reference_lag::ReferenceLag,
+    &reference_sign::ReferenceSign,
+    &field_model::FieldModel,
+    &plate_flexing::PlateFlexing,
+    &latency::Latency(&latency::ALL),
+    &latency::Latency(&latency::GYRO),
+    &latency::Latency(&latency::ACCEL),
+    &latency::Latency(&latency::MAG),
+    &read_skew::ReadSkew,
+    &clock_rate::ClockRate,
+    &packet_loss::PacketLoss,
+];
 
 /// The effect of that name.
 pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
     LIBRARY.iter().copied().find(|effect| effect.page().name == name)
 }
 
-/// Where an effect acts when it acts on one channel.
-#[derive(Clone, Copy)]
-pub struct Site<'a> {
-    /// The unit.
-    pub unit: &'a UnitDescription,
-    /// Index of the channel.
-    pub index: usize,
-    /// The channel.
-    pub channel: &'a Channel,
-    /// Where the unit is.
-    pub environment: &'a Environment,
-    /// [s] first and last cycle of the log.
-    pub log_s: (f64, f64),
+/// Instants that divide a log evenly; an effect that begins at some instant is tried at these. Between them the onset is
+/// free: any instant is a variant.
+const ONSETS: usize = 15;
+
+/// [s] the onsets to try.
+fn onsets(starts_s: &[f64]) -> impl Iterator<Item = f64> {
+    let (from_s, to_s) = (*starts_s.first().unwrap_or(&0.0), *starts_s.last().unwrap_or(&0.0));
+    (1..=ONSETS).map(move |k| from_s + (to_s - from_s) * k as f64 / (ONSETS + 1) as f64)
 }
 
 /// A physical effect.
@@ -64,8 +155,8 @@ pub trait Effect: Sync {
     fn act<'a>(&self, theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>);
 
     /// The values to try of a parameter in which the effect is not smooth (an onset, a time constant, a choice), for a log
-    /// from the first to the second instant [s].
-    fn variants(&self, _log_s: (f64, f64)) -> Vec<f64> {
+    /// whose cycles begin at these instants [s].
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0]
     }
 

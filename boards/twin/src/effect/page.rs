@@ -37,6 +37,26 @@ pub struct Symbol {
     pub signed: bool,
 }
 
+impl Symbol {
+    /// One that may have either sign.
+    pub(super) const fn signed(name: &'static str, unit: &'static str, prior_sigma: f64) -> Self {
+        Self {
+            name,
+            unit,
+            prior_sigma,
+            signed: true,
+        }
+    }
+
+    /// One that is physically zero or above.
+    pub(super) const fn positive(name: &'static str, unit: &'static str, prior_sigma: f64) -> Self {
+        Self {
+            signed: false,
+            ..Self::signed(name, unit, prior_sigma)
+        }
+    }
+}
+
 /// The page of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Page {
@@ -64,4 +84,22 @@ pub struct Page {
     pub sensors: &'static [Kind],
     /// The parameters of one block.
     pub parameters: &'static [Symbol],
+}
+
+impl Page {
+    /// What most pages begin with: smooth, a block a channel.
+    pub(super) const SMOOTH: Page = Page {
+        name: "",
+        physics: "",
+        equation: "",
+        source: "",
+        excited_by: "",
+        siblings: &[],
+        confirm_by: "",
+        nature: Nature::Smooth,
+        scope: Scope::Channel,
+        common: false,
+        sensors: &[],
+        parameters: &[],
+    };
 }
