@@ -23,8 +23,11 @@ mod accel_range;
 mod axis_order;
 mod bias;
 mod bias_temperature;
+mod bias_walk;
+mod bit_fault;
 mod cause;
 mod clock_rate;
+mod coarse_quantisation;
 mod cross_field;
 mod current_field;
 mod earth_rate;
@@ -44,7 +47,9 @@ mod lever_arm;
 mod mains_alias;
 mod misalignment;
 mod mounting;
+mod noise_level;
 mod nonlinearity;
+mod packet_corruption;
 mod packet_loss;
 mod page;
 mod plate_flexing;
@@ -54,25 +59,33 @@ mod read_skew;
 mod reference_lag;
 mod reference_rate_scale;
 mod reference_sign;
+mod sampling_jitter;
 mod saturation;
 mod scale;
 mod scale_temperature;
 mod set_reset;
+mod shock;
 mod sine_response;
 mod site;
 mod soft_iron;
+mod spread;
+mod stale_sample;
+mod stuck_channel;
 mod table_tilt;
 mod temperature_hysteresis;
+mod vibration;
 mod vibration_rectification;
 mod warm_up;
 
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{Nature, Page, Scope, Symbol};
 pub use site::Site;
+pub use spread::{View, most_likely};
 
+use crate::part::signal::Noise;
 use crate::predict::{Chain, UnitDescription};
 
-/// All effects: gyros, accelerometers, magnetometers, reference and environment, timing.
+/// All effects: gyros, accelerometers, magnetometers, reference and environment, timing, noise and bits.
 pub const LIBRARY: &[&dyn Effect] = &[
     &bias::Bias(&bias::GYRO),
     &bias_temperature::BiasTemperature(&bias_temperature::GYRO),
@@ -128,6 +141,16 @@ pub const LIBRARY: &[&dyn Effect] = &[
     &read_skew::ReadSkew,
     &clock_rate::ClockRate,
     &packet_loss::PacketLoss,
+    &bias_walk::BiasWalk,
+    &stale_sample::StaleSample,
+    &sampling_jitter::SamplingJitter,
+    &coarse_quantisation::CoarseQuantisation,
+    &bit_fault::BitFault,
+    &stuck_channel::StuckChannel,
+    &packet_corruption::PacketCorruption,
+    &noise_level::NoiseLevel,
+    &vibration::Vibration,
+    &shock::Shock,
 ];
 
 /// The effect of that name.
@@ -151,8 +174,21 @@ pub trait Effect: Sync {
     fn page(&self) -> &'static Page;
 
     /// Changes the chain of one channel. `theta` is the block of parameters that holds for this channel, in the order of
-    /// the page; zero is no effect.
-    fn act<'a>(&self, theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>);
+    /// the page; zero is no effect. One that only changes the scatter leaves the chain alone.
+    fn act<'a>(&self, _theta: &'a [f64], _variant: f64, _site: &Site<'a>, _chain: &mut Chain<'a>) {}
+
+    /// ln probability of the logs of the channels of one block under this effect, for one that changes their scatter; the
+    /// nominal one for the others. Where the block is a channel the logarithms of several channels add up, so that the set of
+    /// channels concerned can be found one by one.
+    fn log_likelihood(&self, _theta: &[f64], _variant: f64, views: &[View]) -> f64 {
+        views.iter().map(View::nominal).sum()
+    }
+
+    /// What the channels of one block would have measured with this effect, before rounding, for one that changes their
+    /// scatter; what they measured for the others.
+    fn disturb(&self, _theta: &[f64], _variant: f64, views: &[View], _noise: Noise) -> Vec<Vec<f64>> {
+        views.iter().map(|view| view.measured.to_vec()).collect()
+    }
 
     /// The values to try of a parameter in which the effect is not smooth (an onset, a time constant, a choice), for a log
     /// whose cycles begin at these instants [s].

@@ -99,7 +99,7 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
     let calibration: Vec<Column> = channels.iter().flat_map(|&channel| twin.calibration(channel)).collect();
     let mut psi = DVector::zeros(calibration.len());
     let (mut before, mut after, mut sigma) = (0.0, 0.0, Vec::new());
-    for step in 0..6 {
+    for step in 0..3 {
         let own: Vec<Column> = (0..active.len()).flat_map(|of| twin.jacobian(&active, of)).collect();
         let columns: Vec<&Column> = calibration.iter().chain(&own).collect();
         let now: Vec<f64> = psi
