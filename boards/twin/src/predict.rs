@@ -40,6 +40,10 @@ pub struct Twin {
     /// Low-passes of the nominal channels, by kind and time constant.
     filters: Vec<(Kind, f64, Filter)>,
     known: Vec<Active>,
+    /// What the centre feels at the nominal instants of a slot [s]: many effects ask for it, and few move the instants.
+    felt: Vec<(f64, Vec<Feel>)>,
+    /// Inputs of the nominal channels after their low-pass: most effects leave them alone.
+    plain: Vec<Vec<f64>>,
     nominal: Vec<Vec<f64>>,
 }
 
@@ -70,8 +74,23 @@ impl Twin {
             starts_s,
             filters,
             known,
+            felt: Vec::new(),
+            plain: Vec::new(),
             nominal: Vec::new(),
         };
+        for index in 0..twin.unit.channels.len() {
+            let slot_s = twin.unit.channels[index].slot_s;
+            if !twin.felt.iter().any(|(slot, _)| *slot == slot_s) {
+                let instants_s = twin.instants_s(index).into_iter();
+                twin.felt.push((slot_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
+            }
+        }
+        twin.plain = (0..twin.unit.channels.len())
+            .map(|index| {
+                let channel = &twin.unit.channels[index];
+                twin.inputs(&Chain::of(channel), channel.tau_s(), &twin.instants_s(index))
+            })
+            .collect();
         twin.nominal = (0..twin.unit.channels.len())
             .map(|index| twin.computed(index, &[]))
             .collect();
@@ -139,11 +158,19 @@ impl Twin {
         for active in self.known.iter().chain(active) {
             active.act(&site, &mut chain);
         }
-        let mut readings = self.inputs(&chain, channel.tau_s(), &t_s);
-        for (reading, t_s) in readings.iter_mut().zip(&t_s) {
-            let added = match chain.is_additive() {
-                true => chain.added(&self.scene.feel(chain.instant(*t_s)), *reading),
-                false => 0.0,
+        let mut readings = match chain.looks_as(channel) {
+            true => self.plain[index].clone(),
+            false => self.inputs(&chain, channel.tau_s(), &t_s),
+        };
+        let felt = match chain.is_delayed() {
+            true => None,
+            false => self.felt.iter().find(|(slot_s, _)| *slot_s == channel.slot_s),
+        };
+        for (row, (reading, t_s)) in readings.iter_mut().zip(&t_s).enumerate() {
+            let added = match (chain.is_additive(), felt) {
+                (false, _) => 0.0,
+                (true, Some((_, felt))) => chain.added(&felt[row], *reading),
+                (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s)), *reading),
             };
             // A high-pass takes the bias with it.
             *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };

@@ -1,5 +1,5 @@
 use std::time::Instant;
-use gap::{attribute::attribute, case::Subject, joint::Joint, leftover, library::Library, problem::Problem};
+use gap::{attribute::attribute, case::Subject, library::Library, problem::Problem};
 fn main() {
     for case in std::env::args().skip(1) {
         let t = Instant::now();
@@ -9,7 +9,7 @@ fn main() {
         let mut library = Library::new(&problem, &[], &|_| {});
         let t2 = t.elapsed();
         let found = attribute(&problem, &mut library, &|_| {});
-        println!("== {case}: open {t1:?}, library {} columns {} hyps {t2:?}, attribute {:?}", library.columns.len(), library.hypotheses.len(), t.elapsed());
+        println!("== {case}: open {t1:?}, library {} columns {} hyps {t2:?}, attribute {:?}", library.products.len(), library.hypotheses.len(), t.elapsed());
         for c in &found.chosen {
             let h = &library.hypotheses[c.hypothesis];
             println!("  {:?} gain {:.1}", h.cause, c.gain);

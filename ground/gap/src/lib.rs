@@ -22,4 +22,6 @@ pub mod leftover;
 pub mod library;
 pub mod log;
 pub mod problem;
+pub mod products;
+pub mod refine;
 pub mod windows;

@@ -1,14 +1,18 @@
 //! Every hypothesis of the effect library on one case, and its columns.
 //!
-//! In: the [`Problem`]. Out: a [`Hypothesis`] for each smooth effect, place and variant, with the columns of its parameters
+//! In: the [`Problem`]. Out: a [`Hypothesis`] for each effect, place and variant, with the columns of its parameters
 //! at zero. Places share columns (one gyro's bias is the same column whether the gyro stands alone or among the four), so
 //! a column is made once. Prior odds: half for "nothing", half shared equally by the effects, and an effect's share equally
-//! by its places and variants; so looking in more places costs what it should.
+//! by its places and variants (half to the widest places); so looking in more places costs what it should.
 
 use nalgebra::DVector;
-use twin::effect::{Active, Cause, LIBRARY, Nature, Parameter};
+use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter};
 
-use crate::problem::{Component, Problem};
+use crate::{
+    evidence::Screen,
+    problem::{Component, Problem},
+    products::Products,
+};
 
 /// An effect at a place.
 #[derive(Clone, Debug)]
@@ -55,7 +59,7 @@ pub struct Library {
     /// In the order of the effect library.
     pub hypotheses: Vec<Hypothesis>,
     /// Columns, first those of the reference.
-    pub columns: Vec<Entries>,
+    pub products: Products,
     /// Prior sigma of each column's parameter.
     pub prior_sigmas: Vec<f64>,
     /// How many columns are the reference's.
@@ -67,25 +71,34 @@ impl Library {
     pub fn new(problem: &Problem, withheld: &[String], progress: &dyn Fn(f64)) -> Self {
         let unit = problem.twin.unit();
         let starts_s = problem.twin.starts_s();
-        let log_s = (starts_s.first().copied().unwrap_or(0.0), starts_s.last().copied().unwrap_or(0.0));
         let mut library = Library {
             hypotheses: Vec::new(),
-            columns: problem.reference_columns(),
+            products: Products::default(),
             prior_sigmas: problem.reference.iter().map(|column| column.sigma).collect(),
             reference: problem.reference.len(),
         };
+        for column in problem.reference_columns() {
+            library.products.push(problem, column);
+        }
         let is_offered = |name: &str| withheld.iter().all(|withheld| withheld != name);
-        let smooth: Vec<_> = LIBRARY
+        let offered: Vec<_> = LIBRARY
             .iter()
-            .filter(|effect| effect.page().nature == Nature::Smooth && is_offered(effect.page().name))
+            .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))
             .collect();
-        for (done, effect) in smooth.iter().enumerate() {
-            let (localities, variants) = (effect.localities(unit), effect.variants(log_s));
-            let rivals = smooth.len() * localities.len() * variants.len();
-            let log_prior = -(rivals.max(1) as f64).ln();
+        for (done, effect) in offered.iter().enumerate() {
+            let (localities, variants) = (effect.localities(unit), effect.variants(starts_s));
+            let widest = localities.iter().filter(|locality| is_wide(locality)).count();
             let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
             for locality in &localities {
                 for variant in &variants {
+                    let places = if widest == 0 || widest == localities.len() {
+                        localities.len()
+                    } else if is_wide(locality) {
+                        2 * widest
+                    } else {
+                        2 * (localities.len() - widest)
+                    };
+                    let log_prior = -((LIBRARY.len() * places * variants.len()).max(1) as f64).ln();
                     let cause = Cause {
                         effect: **effect,
                         locality: locality.clone(),
@@ -109,14 +122,14 @@ impl Library {
                         let columns = problem.twin.jacobian(&[zero], 0);
                         for (index, column) in columns.iter().enumerate() {
                             if find(index, &known).is_none() {
-                                known.push((cause.touched_by(index, unit), index % width, *variant, library.columns.len()));
-                                library.columns.push(problem.in_noise(column, None));
+                                let place = library.products.push(problem, problem.in_noise(column, None));
+                                known.push((cause.touched_by(index, unit), index % width, *variant, place));
                                 library.prior_sigmas.push(column.sigma);
                             }
                         }
                     }
                     let places: Vec<usize> = (0..parameters.len()).filter_map(|index| find(index, &known)).collect();
-                    if !places.is_empty() {
+                    if !places.is_empty() || effect.page().nature == Nature::Discrete {
                         library.hypotheses.push(Hypothesis {
                             cause,
                             parameters,
@@ -126,17 +139,23 @@ impl Library {
                     }
                 }
             }
-            progress((done + 1) as f64 / smooth.len() as f64);
+            progress((done + 1) as f64 / offered.len() as f64);
         }
         library
     }
 
-    /// The columns of one channel: their places and values.
-    pub fn of_channel(&self, channel: usize) -> (Vec<usize>, Vec<&DVector<f64>>) {
-        let all = self.columns.iter().enumerate();
-        let touching = all.filter_map(|(place, entries)| {
-            entries.iter().find(|(index, _)| *index == channel).map(|(_, values)| (place, values))
-        });
-        touching.unzip()
+    /// Normal equations of some columns, given the scores of all.
+    pub fn screen(&self, places: &[usize], scores: &[f64]) -> Screen {
+        self.products.screen(places, scores, &self.prior_sigmas)
     }
+
+    /// Whether a hypothesis has no parameters to fit.
+    pub fn is_discrete(&self, hypothesis: usize) -> bool {
+        self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
+    }
+}
+
+/// Whether a place is all there is: a cause behind a whole kind of sensor is as likely as one in any single place.
+fn is_wide(locality: &Locality) -> bool {
+    matches!(locality, Locality::Unit | Locality::Common | Locality::All)
 }

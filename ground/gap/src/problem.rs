@@ -49,6 +49,26 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// `L^-1 N'x`: what the calibration can imitate of a column.
+    pub fn open_part(&self, column: &DVector<f64>) -> DVector<f64> {
+        let mut open = self.nuisance.tr_mul(column);
+        match &self.factor {
+            Some(factor) => {
+                factor.l_dirty().solve_lower_triangular_mut(&mut open);
+                open
+            }
+            None => open.map(|_| 0.0),
+        }
+    }
+
+    /// Weighs its samples anew: the noise is `factor` times what it was taken for.
+    pub fn reweigh(&mut self, factor: f64) {
+        self.weight_sigma *= factor;
+        self.nuisance /= factor;
+        let open = self.nuisance.ncols();
+        self.factor = Cholesky::new(DMatrix::identity(open, open) + self.nuisance.tr_mul(&self.nuisance));
+    }
+
     /// Normal equations of some columns with the calibration marginalised.
     pub fn normal(&self, effects: &DMatrix<f64>, residual: &DVector<f64>) -> Normal {
         Normal::marginal(&self.nuisance, self.factor.as_ref(), effects, residual)
@@ -105,12 +125,26 @@ impl<'a> Problem<'a> {
             sigmas,
             reference: twin.field_columns(accuracy),
         };
-        for channel in 0..problem.frames.len() {
-            let residual = problem.residual(channel, &[]);
-            let frame = &mut problem.frames[channel];
+        problem.settle();
+        problem
+    }
+
+    /// Weighs channels anew by these factors of their noise.
+    pub fn reweigh(&mut self, factors: &[f64]) {
+        for (frame, factor) in self.frames.iter_mut().zip(factors) {
+            if *factor != 1.0 {
+                frame.reweigh(*factor);
+            }
+        }
+        self.settle();
+    }
+
+    fn settle(&mut self) {
+        for channel in 0..self.frames.len() {
+            let residual = self.residual(channel, &[]);
+            let frame = &mut self.frames[channel];
             frame.quiet_energy = frame.normal(&DMatrix::zeros(residual.len(), 0), &residual).energy;
         }
-        problem
     }
 
     /// Readings of one channel at every row of the log.

@@ -68,6 +68,16 @@ impl<'a> Chain<'a> {
         t_s + self.delays.iter().map(|delay| delay(t_s)).sum::<f64>()
     }
 
+    /// Whether it is read at other instants than the nominal ones.
+    pub(super) fn is_delayed(&self) -> bool {
+        !self.delays.is_empty()
+    }
+
+    /// Whether it looks at what the nominal channel looks at, when and through what that does.
+    pub(super) fn looks_as(&self, channel: &Channel) -> bool {
+        self.aim == Aim::of(channel) && self.lag_s == 0.0 && self.high_pass_s.is_none() && !self.is_delayed()
+    }
+
     pub(super) fn is_additive(&self) -> bool {
         !self.terms.is_empty()
     }
