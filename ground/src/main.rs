@@ -15,6 +15,7 @@ enum Command {
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
     Size(ground::size::Arguments),
+    Attitude(attitude::Arguments),
     Allan(bench::allan::Arguments),
     Calibrate(bench::calibrate::Arguments),
     Design(bench::design::command::Arguments),
@@ -37,6 +38,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
+        Command::Attitude(arguments) => attitude::run(&arguments)?,
         Command::Allan(arguments) => bench::allan::run(&arguments)?,
         Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
