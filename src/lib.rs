@@ -29,6 +29,7 @@ pub mod discrete;
 pub mod geometry;
 pub mod increments;
 pub mod mode;
+pub mod nand;
 pub mod packet;
 pub mod recorder;
 pub mod resume;
