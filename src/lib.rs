@@ -26,6 +26,7 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod flight_log;
 pub mod geometry;
 pub mod increments;
 pub mod mode;

@@ -71,7 +71,10 @@ impl fmt::Display for NandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             NandError::WrongId([maker, device]) => {
-                write!(f, "no K9F1208 answers: identity {maker:02X} {device:02X}, not EC 76 or 20 76")
+                write!(
+                    f,
+                    "no K9F1208 answers: identity {maker:02X} {device:02X}, not EC 76 or 20 76"
+                )
             }
             NandError::Timeout => f.write_str("the NAND stays busy"),
             NandError::Failed => f.write_str("the NAND reports a failed program or erase"),

@@ -125,7 +125,11 @@ mod tests {
             flipped[bit / 8] ^= 1 << (bit % 8);
             let mut half = good;
             // Bits 16 and 17 of the code are no parities.
-            assert_eq!(correct(&mut half, flipped), Ok(u32::from(bit / 2 != 8)), "code bit {bit}");
+            assert_eq!(
+                correct(&mut half, flipped),
+                Ok(u32::from(bit / 2 != 8)),
+                "code bit {bit}"
+            );
             assert_eq!(half, good, "code bit {bit}");
         }
     }
@@ -140,7 +144,11 @@ mod tests {
                     let mut half = good;
                     half[first / 8] ^= 1 << (first % 8);
                     half[second / 8] ^= 1 << (second % 8);
-                    assert_eq!(correct(&mut half, stored), Err(Uncorrectable), "bits {first} and {second}");
+                    assert_eq!(
+                        correct(&mut half, stored),
+                        Err(Uncorrectable),
+                        "bits {first} and {second}"
+                    );
                 }
             }
         }

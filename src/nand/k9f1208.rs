@@ -143,11 +143,13 @@ impl<B: NandBus, D: DelayNs> Nand for K9f1208<B, D> {
         if !KNOWN.contains(&id) {
             return Err(NandError::WrongId(id));
         }
-        self.done(PROGRAM_SLEEP_US, PROGRAM_LIMIT_US).await.or_else(|error| match error {
-            // What an operation before the reset came to is of no interest.
-            NandError::Failed => Ok(()),
-            error => Err(error),
-        })
+        self.done(PROGRAM_SLEEP_US, PROGRAM_LIMIT_US)
+            .await
+            .or_else(|error| match error {
+                // What an operation before the reset came to is of no interest.
+                NandError::Failed => Ok(()),
+                error => Err(error),
+            })
     }
 
     async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
@@ -192,4 +194,7 @@ impl<B: NandBus, D: DelayNs> Nand for K9f1208<B, D> {
     }
 }
 
-const _: () = assert!(MAIN_BYTES == 512, "the column of a page is one byte, its half chosen by the pointer command");
+const _: () = assert!(
+    MAIN_BYTES == 512,
+    "the column of a page is one byte, its half chosen by the pointer command"
+);
