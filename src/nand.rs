@@ -101,3 +101,30 @@ pub trait Nand {
     /// Erases a block.
     async fn erase(&mut self, block: u16) -> Result<(), NandError>;
 }
+
+/// A chip that lives elsewhere.
+impl<N: Nand> Nand for &mut N {
+    fn blocks(&self) -> u16 {
+        N::blocks(self)
+    }
+
+    async fn identify(&mut self) -> Result<(), NandError> {
+        N::identify(self).await
+    }
+
+    async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
+        N::read(self, at, bytes).await
+    }
+
+    async fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
+        N::read_spare(self, at, bytes).await
+    }
+
+    async fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Result<(), NandError> {
+        N::program(self, at, bytes).await
+    }
+
+    async fn erase(&mut self, block: u16) -> Result<(), NandError> {
+        N::erase(self, block).await
+    }
+}

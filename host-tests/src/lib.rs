@@ -1,5 +1,7 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
+pub mod recorder;
+
 use std::sync::Arc;
 
 use emems::{

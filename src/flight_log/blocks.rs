@@ -31,11 +31,7 @@ impl<N: Nand> FlightLog<N> {
             self.chip.read_spare(at, &mut spare).await?;
             marked = spare[BAD_MARK] != 0xFF;
         }
-        match stamp {
-            Stamp::Newer(version) if !marked => return Err(LogError::Newer(version)),
-            Stamp::Astray(..) => self.status.astray = true,
-            _ => {}
-        }
+        self.status.astray |= matches!(stamp, Stamp::Astray(tag, _) if tag.epoch == self.superblock.epoch);
         Ok((stamp, marked))
     }
 

@@ -19,6 +19,9 @@ use crate::nand::{Nand, PAGES_PER_BLOCK, PageAddress};
 /// used the same block again, so that the next one below is live unless it was retired.
 const LOOK_BACK: u16 = 8;
 
+/// Pages at the start of a boot that repeat records of the boots before, out of the order of their keys.
+const COPIES_OF_OLDER: u8 = 2;
+
 /// Blocks read between two chances for the rest of the unit.
 const STRIDE: u16 = 16;
 
@@ -107,9 +110,6 @@ impl<N: Nand> FlightLog<N> {
                 }
                 let ours = matches!(page::stamp(page::spare(&self.back), at),
                     Stamp::Ours(tag) if tag.kind == Kind::Superblock);
-                if let Stamp::Newer(version) = page::stamp(page::spare(&self.back), at) {
-                    return Err(LogError::Newer(version));
-                }
                 let whole = self.corrected();
                 let mut readable = false;
                 for half in 0..2 {
@@ -239,25 +239,44 @@ impl<N: Nand> FlightLog<N> {
         Ok(())
     }
 
-    /// The two newest records of the log, from its last block; what they say of the mode counts with the superblock.
+    /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
+    /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
+    /// may be torn too. What they say of the mode counts if there is no superblock.
     async fn find_newest(&mut self, head: u16) -> Result<(), LogError> {
         let mut newest = [record::Key::default(); 2];
+        for block in (head.saturating_sub(LOOK_BACK).max(LOG_START)..=head).rev() {
+            if !self.superblock.bad.contains(block) && self.find_newest_in(block, &mut newest).await? {
+                break;
+            }
+        }
+        if self.carried > 0 {
+            let (flight, time_us) = record::mode_and_time(&self.last);
+            self.status.last = Some((newest[0], time_us));
+            if self.superblock.number == 0 {
+                (self.superblock.flight, self.superblock.recording) = (flight, flight);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the search is over.
+    async fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
         for page in (0..PAGES_PER_BLOCK).rev() {
-            let at = PageAddress { block: head, page };
-            if self.carried == 0 && self.stamp(head, page).await?.0 == Stamp::Blank {
+            let at = PageAddress { block, page };
+            if self.stamp(block, page).await?.0 == Stamp::Blank {
                 continue;
             }
             self.chip.read(at, &mut self.back).await?;
-            let keys = self.whole_records();
-            for (half, key) in keys
-                .into_iter()
-                .enumerate()
-                .filter_map(|(half, key)| Some((half, key?)))
-            {
+            for (half, key) in self.whole_records().into_iter().enumerate() {
+                let Some(key) = key else { continue };
+                self.superblock.boot = self.superblock.boot.max(key.boot);
                 let bytes = page::record(&self.back, half);
+                if !record::is_packet(bytes) {
+                    continue;
+                }
                 if self.carried == 0 || key > newest[0] {
                     (self.second, self.last) = (self.last, *bytes);
-                    newest = [key, newest[0]];
+                    *newest = [key, newest[0]];
                     self.carried = (self.carried + 1).min(2);
                 } else if key < newest[0] && (self.carried == 1 || key > newest[1]) {
                     self.second = *bytes;
@@ -265,19 +284,10 @@ impl<N: Nand> FlightLog<N> {
                     self.carried = 2;
                 }
             }
-            // Pages 0 and 1 hold records of the boot before, not in the order of their keys.
-            if self.carried == 2 && page > 1 {
-                break;
+            if self.carried == 2 && page >= COPIES_OF_OLDER {
+                return Ok(true);
             }
         }
-        if self.carried > 0 {
-            let (flight, time_us) = record::mode_and_time(&self.last);
-            self.status.last = Some((newest[0], time_us));
-            self.superblock.boot = self.superblock.boot.max(newest[0].boot);
-            if self.home.1.is_none() && self.superblock.number == 0 {
-                (self.superblock.flight, self.superblock.recording) = (flight, flight);
-            }
-        }
-        Ok(())
+        Ok(false)
     }
 }

@@ -15,7 +15,8 @@
 //! | 527 | format version, times sixteen, plus kind (1 log, 2 superblock) |
 //!
 //! The tag names the page's own block and is checked against where it was read: a chip with a stuck address line answers
-//! with another block's pages. Its code corrects one wrong bit. Refuses a newer format by its number.
+//! with another block's pages. Its code corrects one wrong bit, so one torn tag in
+//! a thousand fits by chance: a newer format is refused on the superblock's word alone, whose CRC-32 does not.
 
 use crc::{CRC_16_IBM_3740, Crc};
 
@@ -25,7 +26,7 @@ use crate::nand::{
     ecc::{self, Uncorrectable},
 };
 
-/// The version this code writes and the newest it reads.
+/// The version this code writes and reads.
 pub const FORMAT: u8 = 1;
 
 /// Zero bits that an erased page may show: worn or disturbed cells, two for each half and the spare.
@@ -65,9 +66,7 @@ pub enum Stamp {
     Ours(Tag),
     /// A page of ours that belongs to this block: an address line or a program went astray.
     Astray(Tag, u16),
-    /// A page of a newer format.
-    Newer(u8),
-    /// Torn, damaged, or somebody else's.
+    /// Torn, damaged, of another format, or somebody else's.
     Garbage,
 }
 
@@ -91,7 +90,7 @@ pub fn address(page: &mut PageBytes, at: PageAddress, tag: Tag) {
     bytes[0..2].copy_from_slice(&tag.boot.to_le_bytes());
     bytes[2..4].copy_from_slice(&tag.epoch.to_le_bytes());
     bytes[4..6].copy_from_slice(&at.block.to_le_bytes());
-    bytes[8] = FORMAT << 4 | tag.kind as u8;
+    bytes[8] = version_and_kind(tag.kind);
     let crc = check(&bytes, at.page);
     bytes[6..8].copy_from_slice(&crc.to_le_bytes());
     for (column, byte) in TAG.into_iter().zip(bytes) {
@@ -112,14 +111,11 @@ pub fn stamp(spare: &SpareBytes, at: PageAddress) -> Stamp {
         };
         bytes = flipped(bytes, bit);
     }
-    let format = bytes[8] >> 4;
-    if format > FORMAT {
-        return Stamp::Newer(format);
-    }
-    let kind = match bytes[8] & 0xF {
-        1 => Kind::Log,
-        2 => Kind::Superblock,
-        _ => return Stamp::Garbage,
+    let kind = [Kind::Log, Kind::Superblock]
+        .into_iter()
+        .find(|kind| bytes[8] == version_and_kind(*kind));
+    let Some(kind) = kind else {
+        return Stamp::Garbage;
     };
     let tag = Tag {
         kind,
@@ -154,6 +150,10 @@ pub fn correct(page: &mut PageBytes) -> [Result<u32, Uncorrectable>; 2] {
 /// Half 0 or 1 of a page.
 pub fn record(page: &PageBytes, half: usize) -> &RecordBytes {
     &page.as_chunks().0[half]
+}
+
+fn version_and_kind(kind: Kind) -> u8 {
+    FORMAT << 4 | kind as u8
 }
 
 fn zeros(bytes: &[u8]) -> u32 {
@@ -239,15 +239,15 @@ mod tests {
     }
 
     #[test]
-    fn a_newer_format_is_named() {
+    fn a_page_of_another_format_is_not_ours() {
         let mut bytes = TAG.map(|column| spare(&page())[column]);
         bytes[8] = 0x21;
         let crc = check(&bytes, AT.page).to_le_bytes();
         bytes[6..8].copy_from_slice(&crc);
-        let mut newer = *spare(&page());
+        let mut other = *spare(&page());
         for (column, byte) in TAG.into_iter().zip(bytes) {
-            newer[column] = byte;
+            other[column] = byte;
         }
-        assert_eq!(stamp(&newer, AT), Stamp::Newer(2));
+        assert_eq!(stamp(&other, AT), Stamp::Garbage);
     }
 }

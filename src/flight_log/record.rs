@@ -44,6 +44,8 @@ pub type RecordBytes = [u8; RECORD_BYTES];
 pub const DESCRIPTION: &str = "e-MEMS log 1 LE: seq4@4 boot4@8 epoch2@12 flags2@14 us8@16 packet156@24 \
 slots16xu16@180(4us) q4xi16@212/32767 bias3xf32@220 sigma6xbf16@232 health@244 crc32@252";
 
+const PACKET: u8 = 1;
+const HEADER: u8 = 2;
 const MAGIC: [u8; 2] = [0xE7, 0x4D];
 const CHECKED: usize = RECORD_BYTES - 4;
 pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -184,7 +186,7 @@ const ESTIMATED: u16 = 1 << 1;
 /// The bytes of a packet record.
 pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
     let flags = u16::from(entry.flight) * FLIGHT | u16::from(entry.estimate.is_some()) * ESTIMATED;
-    let mut bytes = begin(key, 1, flags, entry.start_us);
+    let mut bytes = begin(key, PACKET, flags, entry.start_us);
     put(&mut bytes, at::PACKET, &entry.packet);
     for (slot, slot_us) in entry.slots_us.iter().enumerate() {
         let code = if *slot_us == NO_SLOT {
@@ -215,7 +217,7 @@ pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
 
 /// The bytes of a boot header.
 pub fn encode_header(key: Key, header: &BootHeader) -> RecordBytes {
-    let mut bytes = begin(key, 2, 0, header.opened_us);
+    let mut bytes = begin(key, HEADER, 0, header.opened_us);
     for (at, name) in [
         (at::FIRMWARE, &header.firmware),
         (at::UNIT, &header.unit),
@@ -247,6 +249,11 @@ pub fn key(bytes: &RecordBytes) -> Result<Key, RecordError> {
     })
 }
 
+/// Whether it is a packet record.
+pub fn is_packet(bytes: &RecordBytes) -> bool {
+    bytes[at::TYPE] == PACKET
+}
+
 /// Whether the record was made in FLIGHT, and when its cycle began [us].
 pub fn mode_and_time(bytes: &RecordBytes) -> (bool, u64) {
     (flags(bytes) & FLIGHT != 0, u64::from_le_bytes(take(bytes, at::TIME)))
@@ -257,7 +264,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
     let key = key(bytes)?;
     let (flight, start_us) = mode_and_time(bytes);
     let content = match bytes[at::TYPE] {
-        1 => Content::Packet(Entry {
+        PACKET => Content::Packet(Entry {
             start_us,
             packet: take(bytes, at::PACKET),
             slots_us: core::array::from_fn(|slot| match u16::from_le_bytes(take(bytes, at::SLOTS + 2 * slot)) {
@@ -276,7 +283,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
                 }),
             }),
         }),
-        2 => Content::Header(BootHeader {
+        HEADER => Content::Header(BootHeader {
             opened_us: start_us,
             firmware: name(bytes, at::FIRMWARE),
             unit: name(bytes, at::UNIT),
