@@ -23,6 +23,7 @@
 //! blocks than the chip's data sheet allows.
 
 mod blocks;
+pub mod dump;
 mod mount;
 pub mod page;
 pub mod record;
@@ -79,7 +80,7 @@ impl fmt::Display for LogError {
         match self {
             LogError::Nand(error) => error.fmt(f),
             LogError::NotMounted => f.write_str("not mounted"),
-            LogError::Newer(version) => write!(f, "log of newer format {version}: update the firmware, or G_MA"),
+            LogError::Newer(version) => write!(f, "log of newer format {version}: update the firmware"),
             LogError::Foreign => f.write_str("NAND holds something else: G_MA makes it a log"),
             LogError::Full => f.write_str("full"),
             LogError::Worn => f.write_str("too many bad blocks"),

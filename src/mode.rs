@@ -117,6 +117,14 @@ impl State {
         }
     }
 
+    /// Takes what the recorder says of the time before a power cut, unless something is known already.
+    pub fn recovered(&mut self, flight: bool, recording: bool) {
+        if flight && self.mode == Mode::Wait {
+            self.enter(Mode::Flight);
+            self.recording = recording;
+        }
+    }
+
     /// Takes a command that came at `now_us`.
     pub fn command(&mut self, command: Command, now_us: u64) -> Verdict {
         let pending = self.pending.take().filter(|(_, until_us)| now_us <= *until_us);

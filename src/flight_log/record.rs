@@ -254,6 +254,12 @@ pub fn is_packet(bytes: &RecordBytes) -> bool {
     bytes[at::TYPE] == PACKET
 }
 
+/// The packet of a packet record, as it stands there.
+pub fn packet(bytes: &RecordBytes) -> Option<&[u8; PACKET_BYTES]> {
+    let packet = bytes.get(at::PACKET..)?.first_chunk()?;
+    is_packet(bytes).then_some(packet)
+}
+
 /// Whether the record was made in FLIGHT, and when its cycle began [us].
 pub fn mode_and_time(bytes: &RecordBytes) -> (bool, u64) {
     (flags(bytes) & FLIGHT != 0, u64::from_le_bytes(take(bytes, at::TIME)))

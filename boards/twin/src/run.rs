@@ -43,6 +43,14 @@ pub enum Fault {
     BusStuck(bool),
     /// The gyro of this plate answers noise (`true`) or is itself again.
     GyroGarbage(usize, bool),
+    /// The recorder's memory is busy for ever (`true`) or answers again.
+    NandDead(bool),
+    /// There is no recorder's memory.
+    NandAbsent,
+    /// The supply falls below what a program needs (`true`) or is back.
+    SupplyFailing(bool),
+    /// The power goes and comes back: what the recorder's memory was doing tears, in the way of this number.
+    PowerCut(usize),
     /// The reset pin.
     Reset,
 }

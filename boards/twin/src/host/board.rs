@@ -2,22 +2,17 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use emems::{
-    board::{Board, Parts, ResetCause},
-    recorder::MemoryRecorder,
-};
+use emems::board::{Board, Parts, ResetCause};
 
 use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
+    nand::NandPins,
 };
 use crate::plant::Plant;
 
 /// The type that names the host board's parts.
 pub struct Host;
-
-/// As many as the flight computer's interim recorder.
-const RECORDS: usize = 64;
 
 impl Board for Host {
     type SensorBus = SensorBus;
@@ -28,7 +23,7 @@ impl Board for Host {
     type Discretes = Inputs;
     type Watchdog = Fed;
     type Retained = Kept;
-    type Recorder = MemoryRecorder<RECORDS>;
+    type Nand = NandPins;
 }
 
 /// The outside ends of the host board.
@@ -57,7 +52,7 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         discretes: Inputs(plant.clone()),
         watchdog: ends.fed.clone(),
         retained: ends.kept.clone(),
-        recorder: MemoryRecorder::new(),
+        nand: NandPins(plant.clone()),
         reset,
     }
 }

@@ -41,7 +41,17 @@ pub fn fly(
     duration: Nanos,
     bench: &mut dyn Bench,
 ) -> HostReport {
-    let plant = Rc::new(RefCell::new(plant));
+    fly_around(&Rc::new(RefCell::new(plant)), settings, faults, duration, bench)
+}
+
+/// The same around a plant that is looked at afterwards.
+pub fn fly_around(
+    plant: &Rc<RefCell<Plant>>,
+    settings: Settings,
+    faults: &[Scheduled],
+    duration: Nanos,
+    bench: &mut dyn Bench,
+) -> HostReport {
     let ends = Ends::default();
     let mut report = HostReport::default();
     let mut faults: Vec<Scheduled> = faults.to_vec();
@@ -51,7 +61,7 @@ pub fn fly(
     while now < duration {
         clock::start(now + BOOT);
         ends.fed.0.set(now + BOOT);
-        let mut unit = pin!(unit::run(parts(&plant, &ends, cause), settings));
+        let mut unit = pin!(unit::run(parts(plant, &ends, cause), settings));
         let reset = loop {
             let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
             let until = (now + STEP).min(fault).min(duration);
@@ -67,6 +77,11 @@ pub fn fly(
             while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(cut @ Fault::PowerCut(_)) => {
+                        plant.borrow_mut().apply(cut, now);
+                        ends.kept.0.set(None);
+                        struck = Some(ResetCause::PowerOn);
+                    }
                     Some(fault) => plant.borrow_mut().apply(fault, now),
                     None => {}
                 }

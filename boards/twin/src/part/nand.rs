@@ -12,6 +12,10 @@ mod chip;
 pub mod latch;
 mod tear;
 
+use emems::flight_log::{
+    page::{self, Kind, Tag},
+    superblock::{self, Superblock},
+};
 use emems::nand::{BAD_MARK, MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes};
 use rand_xoshiro::{
     Xoshiro256PlusPlus,
@@ -124,6 +128,27 @@ impl Cells {
             cells.page_mut(at)[MAIN_BYTES + BAD_MARK] = 0;
         }
         cells.befalls.marked = marked.to_vec();
+        cells
+    }
+
+    /// A chip with an empty log on it, as a unit leaves the bench.
+    pub fn formatted(blocks: u16, seed: u64) -> Self {
+        let mut cells = Cells::new(blocks, &[], seed);
+        let bytes = superblock::encode(&Superblock {
+            number: 1,
+            ..Superblock::default()
+        });
+        let tag = Tag {
+            kind: Kind::Superblock,
+            epoch: 0,
+            boot: 0,
+        };
+        for page in 0..2 {
+            let at = PageAddress { block: 0, page };
+            page::compose(cells.page_mut(at), &bytes, &bytes);
+            page::address(cells.page_mut(at), at, tag);
+        }
+        cells.blocks[0].programmed = 3;
         cells
     }
 
