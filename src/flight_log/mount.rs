@@ -85,7 +85,9 @@ impl<N: Nand> FlightLog<N> {
             },
             found => {
                 let head = self.scan(found == Found::Doubtful).await?;
-                self.superblock.boot = self.superblock.boot.saturating_add(UNSEEN_BOOTS);
+                if found == Found::Doubtful || head.is_some() {
+                    self.superblock.boot = self.superblock.boot.saturating_add(UNSEEN_BOOTS);
+                }
                 head
             }
         };

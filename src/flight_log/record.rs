@@ -123,7 +123,6 @@ pub type Name = heapless::String<16>;
 
 /// What every boot says of itself.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct BootHeader {
     /// [us] when the log was opened, since the unit's clock started.
     pub opened_us: u64,
