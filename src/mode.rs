@@ -44,9 +44,9 @@ pub enum Task {
     Idle,
     /// New packets go to the umbilical.
     SendPackets,
-    /// Records `next..end` go to the umbilical.
+    /// Pages `next..end` of the log go to the umbilical.
     Dump {
-        /// Number of the next record.
+        /// Number of the next page.
         next: u32,
         /// Number after the last.
         end: u32,

@@ -51,7 +51,10 @@ impl NandPort {
         });
         for pin in pins {
             let mut pin = Flex::new(pin);
-            pin.set_as_af_unchecked(FSMC, AfType::output_pull(OutputType::PushPull, Speed::VeryHigh, Pull::Up));
+            pin.set_as_af_unchecked(
+                FSMC,
+                AfType::output_pull(OutputType::PushPull, Speed::VeryHigh, Pull::Up),
+            );
             // A dropped pin would be disconnected.
             core::mem::forget(pin);
         }

@@ -15,6 +15,8 @@ enum Command {
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
     Size(ground::size::Arguments),
+    Dump(recorder::dump::Arguments),
+    Recover(recorder::recover::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -34,6 +36,8 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
+        Command::Dump(arguments) => recorder::dump::run(&arguments)?,
+        Command::Recover(arguments) => recorder::recover::run(&arguments)?,
     }
     Ok(())
 }

@@ -312,6 +312,50 @@ fn f18_an_empty_chip_is_a_new_log_and_a_dead_one_is_not() {
     assert_eq!(block_on(log(&mut dead).mount()), Err(LogError::Worn));
 }
 
+/// F18: arbitrary images: no panic, no endless loop, and a mount within its figure (of this chip's size).
+#[test]
+fn f18_arbitrary_images_are_mounted_read_and_appended_to_in_bounded_time() {
+    let mut valid = flown(1);
+    valid.boot(20, None);
+    let valid = valid.chip.image();
+    for seed in 0..1_500 {
+        let mut draw = host_tests::recorder::draws(7, seed);
+        let mut image = match seed % 3 {
+            // Random bytes; the mark's column is clear, or every block would be marked bad.
+            0 => (0..valid.len()).map(|_| draw(256) as u8).collect(),
+            1 => valid.clone(),
+            _ => vec![[0x00, 0xFF, 0x5A][draw(3) as usize]; valid.len()],
+        };
+        for _ in 0..draw(400) {
+            // Pages copied elsewhere, and bytes changed.
+            let (from, to) = (528 * draw(640) as usize, 528 * draw(640) as usize);
+            image.copy_within(from..from + 528, to);
+            let at = draw(valid.len() as u64) as usize;
+            image[at] = draw(256) as u8;
+        }
+        if draw(2) == 0 {
+            image.chunks_mut(528).for_each(|page| page[517] = 0xFF);
+        }
+        let mut chip = Cells::of_image(BLOCKS, &image, seed);
+        let mut log = log(&mut chip);
+        let mounted = block_on(log.mount());
+        for number in 0..700 {
+            let _ = block_on(log.read(number));
+        }
+        for id in 0..5 {
+            let _ = block_on(log.append(&entry(id)));
+        }
+        let _ = block_on(log.start_erase());
+        let _ = block_on(log.append(&entry(6)));
+        drop(log);
+        assert!(
+            chip.time < 700 * 60_000 + MOUNT_WORST,
+            "image {seed}: {mounted:?} {} ns",
+            chip.time
+        );
+    }
+}
+
 /// F21: a million reads of every block.
 #[test]
 fn f21_a_million_reads_cost_corrected_bits_and_no_record() {

@@ -75,14 +75,21 @@ pub fn run(arguments: &Arguments) -> Result<(), DumpError> {
         port: arguments.port.clone(),
         source,
     })?;
-    let mut file = OpenOptions::new().read(true).append(true).create(true).open(&arguments.file)?;
+    let mut file = OpenOptions::new()
+        .read(true)
+        .append(true)
+        .create(true)
+        .open(&arguments.file)?;
     let mut before = Vec::new();
     file.read_to_end(&mut before)?;
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos} of {len} pages, {eta} left") {
         bar.set_style(style);
     }
-    let range = arguments.first..arguments.count.map_or(u32::MAX, |count| arguments.first.saturating_add(count));
+    let range = arguments.first
+        ..arguments
+            .count
+            .map_or(u32::MAX, |count| arguments.first.saturating_add(count));
     let pulled = pull(&mut line, &before, &mut file, range, |at, of| {
         bar.set_length(of.into());
         bar.set_position(at.into());
@@ -193,7 +200,9 @@ impl<L: Read + Write> Session<'_, L> {
             while let Some(end) = self.window.iter().position(|byte| *byte == b'\n') {
                 let through: Vec<u8> = self.window.drain(..=end).collect();
                 if let Some((page, record)) = frames(&through).next() {
-                    let mut bytes = record::packet(&record).map(|packet| packet.to_vec()).unwrap_or_default();
+                    let mut bytes = record::packet(&record)
+                        .map(|packet| packet.to_vec())
+                        .unwrap_or_default();
                     bytes.extend(dump::encode(page, &record));
                     take(page, &bytes)?;
                 } else if let Some(start) = through.iter().position(|byte| *byte == b'>') {
@@ -215,7 +224,9 @@ impl<L: Read + Write> Session<'_, L> {
                     silent_s = 0;
                     self.window.extend_from_slice(&piece[..count]);
                 }
-                Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => silent_s += 1,
+                Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {
+                    silent_s += 1
+                }
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error.into()),
             }

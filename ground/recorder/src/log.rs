@@ -65,7 +65,9 @@ pub enum LogError {
 /// Whether the bytes are a raw image: a superblock or a page of the log stands in some page's place.
 pub fn is_image(bytes: &[u8]) -> bool {
     let pages = bytes.as_chunks::<PAGE_BYTES>().0.iter().enumerate();
-    pages.into_iter().any(|(number, bytes)| matches!(stamp_of(number, bytes), Stamp::Ours(_)))
+    pages
+        .into_iter()
+        .any(|(number, bytes)| matches!(stamp_of(number, bytes), Stamp::Ours(_)))
 }
 
 /// What these bytes hold: an image or a dump, whichever they are.
@@ -147,7 +149,9 @@ pub fn frames(bytes: &[u8]) -> impl Iterator<Item = (u32, RecordBytes)> {
     starts.filter_map(|(at, _)| {
         let rest = &bytes[at..(at + DUMP_BYTES).min(bytes.len())];
         let end = rest.iter().position(|byte| *byte == b'\n')?;
-        let packet = at.checked_sub(PACKET_BYTES).and_then(|from| bytes[from..at].first_chunk());
+        let packet = at
+            .checked_sub(PACKET_BYTES)
+            .and_then(|from| bytes[from..at].first_chunk());
         dump::decode(&rest[..=end], packet)
     })
 }
@@ -176,7 +180,8 @@ impl Log {
 
     /// The epoch that counts: the newest superblock's, or the newest record's.
     pub fn newest_epoch(&self) -> Option<u16> {
-        self.epoch.or_else(|| self.packets.last_key_value().map(|(key, _)| key.epoch))
+        self.epoch
+            .or_else(|| self.packets.last_key_value().map(|(key, _)| key.epoch))
     }
 
     /// Stretches of records that are missing within a boot: first and last that is, and when the record before began
@@ -223,7 +228,8 @@ pub struct Gap {
     pub after_us: Option<u64>,
 }
 
-const _: () = assert!(LIMIT / PAGE_BYTES as u64 / (PAGES_PER_BLOCK as u64) < u16::MAX as u64 && MAIN_BYTES < PAGE_BYTES);
+const _: () =
+    assert!(LIMIT / PAGE_BYTES as u64 / (PAGES_PER_BLOCK as u64) < u16::MAX as u64 && MAIN_BYTES < PAGE_BYTES);
 
 #[cfg(test)]
 mod tests;

@@ -22,7 +22,9 @@ const GAPS_LISTED: usize = 100;
 /// Reads every page (528 bytes each) of an image, or every frame of what `ground dump` or an umbilical's recording kept,
 /// corrects what can be corrected, and writes a row for each record. Boots, gaps and damage go to standard error.
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv")]
+#[command(
+    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv"
+)]
 pub struct Arguments {
     /// Raw image of the chip, or a dump
     pub file: PathBuf,
@@ -124,7 +126,9 @@ fn write(log: &Log, arguments: &Arguments, rows: &mut dyn Write, remarks: &mut d
     let gaps = log.gaps();
     for gap in gaps.iter().take(GAPS_LISTED) {
         let key = gap.first;
-        let after = gap.after_us.map_or(String::new(), |us| format!(", after {:.3} s", us as f64 * 1e-6));
+        let after = gap
+            .after_us
+            .map_or(String::new(), |us| format!(", after {:.3} s", us as f64 * 1e-6));
         writeln!(
             remarks,
             "epoch {} boot {}: records {} to {} are missing{after}",
@@ -142,7 +146,10 @@ fn write(log: &Log, arguments: &Arguments, rows: &mut dyn Write, remarks: &mut d
         )?;
     }
     for version in &log.damage.newer {
-        writeln!(remarks, "records of newer format {version} were left out: update this program")?;
+        writeln!(
+            remarks,
+            "records of newer format {version} were left out: update this program"
+        )?;
     }
     let damage = &log.damage;
     writeln!(remarks, "records    {written}, {older} of older epochs left out")?;
@@ -170,9 +177,14 @@ mod tests {
         let place = tempfile::tempdir().expect("temporary folder");
         let path = place.path().join("claims.bin");
         // Ten gigabytes that take no room.
-        File::create(&path).and_then(|file| file.set_len(10 << 30)).expect("sparse file");
+        File::create(&path)
+            .and_then(|file| file.set_len(10 << 30))
+            .expect("sparse file");
         let error = content(&path).expect_err("too large");
-        assert!(error.to_string().contains("10737418240 bytes are more than any chip"), "{error}");
+        assert!(
+            error.to_string().contains("10737418240 bytes are more than any chip"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -187,7 +199,10 @@ mod tests {
             .collect();
         let log = log::read(&image).expect("read");
         assert!(log.packets.is_empty());
-        assert!(begun.elapsed().as_secs() < 60, "ten seconds alone, and a margin for company");
+        assert!(
+            begun.elapsed().as_secs() < 60,
+            "ten seconds alone, and a margin for company"
+        );
     }
 
     #[test]
@@ -201,7 +216,10 @@ mod tests {
         };
         write(&Log::default(), &arguments, &mut rows, &mut remarks).expect("written");
         let remarks = String::from_utf8(remarks).expect("text");
-        assert!(remarks.contains("records    0, 0 of older epochs left out"), "{remarks}");
+        assert!(
+            remarks.contains("records    0, 0 of older epochs left out"),
+            "{remarks}"
+        );
         assert_eq!(String::from_utf8(rows).expect("text").lines().count(), 1);
     }
 }

@@ -14,7 +14,8 @@ use emems::{
 use packets::channel::{self, CHANNELS};
 
 /// Names of the estimator's columns: attitude, gyro bias [rad/s], deviations of attitude [rad] and bias [rad/s].
-const ESTIMATE: &str = "q0,q1,q2,q3,bias_x,bias_y,bias_z,sigma_x,sigma_y,sigma_z,sigma_bias_x,sigma_bias_y,sigma_bias_z";
+const ESTIMATE: &str =
+    "q0,q1,q2,q3,bias_x,bias_y,bias_z,sigma_x,sigma_y,sigma_z,sigma_bias_x,sigma_bias_y,sigma_bias_z";
 /// Commas of as many empty cells.
 const NO_ESTIMATE: &str = ",,,,,,,,,,,,";
 
@@ -105,7 +106,11 @@ mod tests {
 
     #[test]
     fn a_row_has_a_cell_for_every_name() {
-        let key = Key { epoch: 1, boot: 2, seq: 3 };
+        let key = Key {
+            epoch: 1,
+            boot: 2,
+            seq: 3,
+        };
         let with_estimate = Entry {
             estimate: Some(Estimate {
                 q_nb: [1.0, 0.0, 0.0, 0.0],
@@ -123,6 +128,10 @@ mod tests {
             counts.starts_with("1,2,3,1.400003,FLIGHT,0004FFFF,7,FFFF,0,0,-315,0,1,,"),
             "{counts}"
         );
-        assert!(row(key, &entry(), true).contains(",-9.26728,0.00000,0.02942,,"), "{}", row(key, &entry(), true));
+        assert!(
+            row(key, &entry(), true).contains(",-9.26728,0.00000,0.02942,,"),
+            "{}",
+            row(key, &entry(), true)
+        );
     }
 }

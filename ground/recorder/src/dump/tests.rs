@@ -53,7 +53,8 @@ fn record_of(page: u32) -> record::RecordBytes {
 impl Unit {
     fn answer(&mut self) {
         if self.heard == b"G_ST" {
-            self.says.extend(format!(">G_ST WAIT task none\r\n>G_ST recorder {USED} of 9 pages, 0 bad\r\n").bytes());
+            self.says
+                .extend(format!(">G_ST WAIT task none\r\n>G_ST recorder {USED} of 9 pages, 0 bad\r\n").bytes());
             self.heard.clear();
         } else if self.heard.len() == 16 {
             let number = |from: usize| {
@@ -133,7 +134,10 @@ fn wherever_it_is_unplugged_it_goes_on_and_ends_whole() {
     for unplugged_after in (50..15_000).step_by(487) {
         let mut file = Vec::new();
         let broken = pull(&mut unit(0, unplugged_after), &[], &mut file, 0..u32::MAX, |_, _| {});
-        assert!(matches!(broken, Err(DumpError::Line(_))) || broken.is_ok(), "{broken:?}");
+        assert!(
+            matches!(broken, Err(DumpError::Line(_))) || broken.is_ok(),
+            "{broken:?}"
+        );
         let before = file.clone();
         let pulled = pull(&mut unit(0, usize::MAX), &before, &mut file, 0..u32::MAX, |_, _| {}).expect("pulled");
         assert_eq!(pages(&file), all(), "unplugged after {unplugged_after}");

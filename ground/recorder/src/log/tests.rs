@@ -80,7 +80,11 @@ fn two_lost_pages_in_a_row_are_one_gap_and_are_named() {
     let log = read(&chip.image()).expect("an image");
     let gap = Gap {
         // Pages 5 and 6 hold records 4 and 5; page 7 repeats 5.
-        first: Key { epoch: 0, boot: 1, seq: 4 },
+        first: Key {
+            epoch: 0,
+            boot: 1,
+            seq: 4,
+        },
         last: 4,
         after_us: Some(400_000),
     };

@@ -181,8 +181,9 @@ impl K9f1208 {
     pub fn power_cut(&mut self, now: Nanos, draw: usize) {
         self.settle(now);
         self.tear(now, TEARS[draw % TEARS.len()]);
-        let cells = self.cells.clone();
-        *self = K9f1208::new(cells);
+        let protected = self.protected;
+        *self = K9f1208::new(self.cells.clone());
+        self.protected = protected;
     }
 
     fn busy(&self, now: Nanos) -> bool {
