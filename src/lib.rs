@@ -22,19 +22,26 @@ macro_rules! log_line {
     };
 }
 
+pub mod attitude;
 pub mod board;
 pub mod budget;
+pub mod calibration;
 pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod faults;
 pub mod flight_log;
 pub mod geometry;
 pub mod increments;
+pub mod kalman;
 pub mod mode;
 pub mod nand;
 pub mod packet;
+pub mod quest;
+pub mod redundancy;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
+pub mod triad;
 pub mod unit;

@@ -17,6 +17,9 @@ enum Command {
     Size(ground::size::Arguments),
     Dump(recorder::dump::Arguments),
     Recover(recorder::recover::Arguments),
+    Allan(bench::allan::Arguments),
+    Calibrate(bench::calibrate::Arguments),
+    Design(bench::design::command::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -38,6 +41,9 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Size(arguments) => ground::size::size(&arguments)?,
         Command::Dump(arguments) => recorder::dump::run(&arguments)?,
         Command::Recover(arguments) => recorder::recover::run(&arguments)?,
+        Command::Allan(arguments) => bench::allan::run(&arguments)?,
+        Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
+        Command::Design(arguments) => bench::design::command::run(&arguments)?,
     }
     Ok(())
 }

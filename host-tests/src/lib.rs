@@ -1,6 +1,9 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
+pub mod counts;
 pub mod recorder;
+pub mod reference;
+pub mod watched;
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 

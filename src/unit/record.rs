@@ -7,6 +7,7 @@
 use embassy_time::{Duration, Instant};
 
 use super::{
+    clock::now,
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -78,7 +79,7 @@ struct Recorder<'a, N> {
 
 impl<N: Nand> Recorder<'_, N> {
     async fn mount_if_due(&mut self) {
-        if self.retry.is_none_or(|due| Instant::now() < due) {
+        if self.retry.is_none_or(|due| now() < due) {
             return;
         }
         match self.log.mount().await {
@@ -87,7 +88,7 @@ impl<N: Nand> Recorder<'_, N> {
                 self.shared.recorder_error.set(None);
                 self.shared.recorder_refused.set(false);
                 // Retained memory, where there is some, knows better: it is written each cycle.
-                if self.shared.resume.is_none() {
+                if self.shared.start.resume.is_none() {
                     let mut state = self.shared.state.borrow_mut();
                     state.recovered(resumed.flight, resumed.recording);
                 }
@@ -103,7 +104,7 @@ impl<N: Nand> Recorder<'_, N> {
             self.shared.say(format_args!("recorder: {error}"));
         }
         if matches!(error, LogError::Nand(_) | LogError::NotMounted) {
-            self.retry = Some(Instant::now() + Duration::from_millis(RETRY_MS));
+            self.retry = Some(now() + Duration::from_millis(RETRY_MS));
         }
     }
 

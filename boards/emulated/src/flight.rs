@@ -270,6 +270,7 @@ impl Pilot {
                     }
                     session.reset_by_pin(stop.at, stop.instruction_count, host);
                 }
+                Fault::DmaHung => session.board_mut().mcu.hang_dma(),
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }
         }

@@ -41,6 +41,8 @@ pub enum Fault {
     SdaHeld,
     /// The bus is held for good (`true`) or released.
     BusStuck(bool),
+    /// The I2C part in this reading-order slot holds SCL low for so long [ns] whenever it is called; 0: no longer.
+    Stretching(usize, Nanos),
     /// The gyro of this plate answers noise (`true`) or is itself again.
     GyroGarbage(usize, bool),
     /// The recorder's memory is busy for ever (`true`) or answers again.
@@ -51,6 +53,9 @@ pub enum Fault {
     SupplyFailing(bool),
     /// The power goes and comes back: what the recorder's memory was doing tears, in the way of this number.
     PowerCut(usize),
+    /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
+    /// never comes round. A reset frees it.
+    DmaHung,
     /// The reset pin.
     Reset,
 }

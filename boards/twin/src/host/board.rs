@@ -1,8 +1,11 @@
 //! The host board's parts.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::{Cell, RefCell},
+    rc::Rc,
+};
 
-use emems::board::{Board, Parts, ResetCause};
+use emems::board::{Board, Oscillator, Parts, ResetCause, StackUse};
 
 use super::{
     bus::{Gyro, SensorBus},
@@ -39,12 +42,14 @@ pub struct Ends {
     pub fed: Fed,
     /// Memory that survives a reset.
     pub kept: Kept,
+    /// The sensor bus' DMA stands still.
+    pub dma_hung: Rc<Cell<bool>>,
 }
 
 /// The parts of a unit that starts because of `reset`.
 pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Parts<Host> {
     Parts {
-        sensor_bus: SensorBus::new(plant.clone()),
+        sensor_bus: SensorBus::new(plant.clone(), ends.dma_hung.clone()),
         gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate)),
         telemetry: Transmitter(ends.telemetry.clone()),
         umbilical_tx: Transmitter(ends.umbilical.clone()),
@@ -54,5 +59,7 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         retained: ends.kept.clone(),
         nand: NandPins(plant.clone()),
         reset,
+        oscillator: Oscillator::Crystal,
+        stack_use: StackUse::default,
     }
 }

@@ -61,6 +61,7 @@ pub fn fly_around(
     while now < duration {
         clock::start(now + BOOT);
         ends.fed.0.set(now + BOOT);
+        ends.dma_hung.set(false);
         let mut unit = pin!(unit::run(parts(plant, &ends, cause), settings));
         let reset = loop {
             let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
@@ -77,6 +78,7 @@ pub fn fly_around(
             while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(Fault::DmaHung) => ends.dma_hung.set(true),
                     Some(cut @ Fault::PowerCut(_)) => {
                         plant.borrow_mut().apply(cut, now);
                         ends.kept.0.set(None);
