@@ -114,10 +114,7 @@ impl<N: Nand> FlightLog<N> {
                     Stamp::Ours(tag) if tag.kind == Kind::Superblock);
                 let whole = self.corrected();
                 let mut readable = false;
-                for half in 0..2 {
-                    if !whole[half] {
-                        continue;
-                    }
+                for half in (0..2).filter(|half| whole[*half]) {
                     match superblock::decode(page::record(&self.back, half)) {
                         Ok(superblock) => {
                             readable = true;

@@ -138,6 +138,7 @@ pub struct BootHeader {
 
 /// What a record holds.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "nothing is allocated here, and one is decoded at a time")]
 pub enum Content {
     /// One cycle.
     Packet(Entry),
@@ -184,7 +185,7 @@ const ESTIMATED: u16 = 1 << 1;
 
 /// The bytes of a packet record.
 pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
-    let flags = u16::from(entry.flight) * FLIGHT | u16::from(entry.estimate.is_some()) * ESTIMATED;
+    let flags = (u16::from(entry.flight) * FLIGHT) | (u16::from(entry.estimate.is_some()) * ESTIMATED);
     let mut bytes = begin(key, PACKET, flags, entry.start_us);
     put(&mut bytes, at::PACKET, &entry.packet);
     for (slot, slot_us) in entry.slots_us.iter().enumerate() {
