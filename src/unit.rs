@@ -48,6 +48,10 @@ pub struct Settings {
     pub field: hmc5883l::Gain,
     /// Range of the gyros.
     pub rate: adis16265::Range,
+    /// Which unit this is, at most 16 letters: every boot in the log begins with it.
+    pub unit: &'static str,
+    /// Which set of calibration parameters belongs to it, at most 16 letters; empty for none.
+    pub calibration: &'static str,
 }
 
 impl Settings {
@@ -58,6 +62,11 @@ impl Settings {
         acceleration: lis331hh::FullScale::G6,
         field: hmc5883l::Gain::PerGauss1090,
         rate: adis16265::Range::DegPerS320,
+        unit: match option_env!("EMEMS_UNIT") {
+            Some(unit) => unit,
+            None => "EM",
+        },
+        calibration: "",
     };
 
     /// The accelerometers': as many samples a second as cycles, or 50.
@@ -116,7 +125,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
         acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.retained),
         gyros::run::<B>(&shared, &votes, &gyros),
         estimate::run(&shared, &votes),
-        record::run::<B>(&shared, &votes, parts.recorder),
+        record::run::<B>(&shared, &votes, parts.nand),
     );
     let care = join::join(
         self_test::run::<B>(&shared, &switch, &gyros),

@@ -102,6 +102,7 @@ pub fn image() -> &'static Image {
     IMAGE.get_or_init(|| image::build().unwrap_or_else(|error| panic!("{error}")))
 }
 
+#[allow(dead_code, reason = "not every test file flies this way")]
 /// Flies the image for `ms` milliseconds from power-on, at rest, with parts free of noise and bias.
 pub fn flown(options: &Options, faults: &[Scheduled], ms: u64, tape: &mut Tape) -> Report {
     let plant = Plant::ideal(world("still"));
