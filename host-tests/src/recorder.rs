@@ -126,7 +126,7 @@ impl Flown {
                 }
                 self.acknowledged.insert(key, id);
                 // Free time comes, but not always.
-                if id % 3 != 0 {
+                if !id.is_multiple_of(3) {
                     log.free_time().await?;
                 }
             }

@@ -138,7 +138,10 @@ pub struct BootHeader {
 
 /// What a record holds.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "nothing is allocated here, and one is decoded at a time")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "nothing is allocated here, and one is decoded at a time"
+)]
 pub enum Content {
     /// One cycle.
     Packet(Entry),

@@ -85,9 +85,14 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
     let observed = roots(&observed);
-    let moments: Vec<(f64, f64)> = (0..observed.len()).map(|at| moments(simulated.iter().map(|run| run[at]))).collect();
+    let moments: Vec<(f64, f64)> = (0..observed.len())
+        .map(|at| moments(simulated.iter().map(|run| run[at])))
+        .collect();
     let sizes = |run: &[f64]| -> Vec<f64> {
-        run.iter().zip(&moments).map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 }).collect()
+        run.iter()
+            .zip(&moments)
+            .map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 })
+            .collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
@@ -134,7 +139,11 @@ struct Shapes {
 
 impl Shapes {
     fn new(view: &View) -> Self {
-        let bin_of: Vec<usize> = view.phase.iter().map(|phase| ((phase * BINS as f64) as usize).min(BINS - 1)).collect();
+        let bin_of: Vec<usize> = view
+            .phase
+            .iter()
+            .map(|phase| ((phase * BINS as f64) as usize).min(BINS - 1))
+            .collect();
         let mut counts = vec![0.0; BINS];
         let mut motion = DMatrix::zeros(BINS, view.motion.ncols());
         for (row, bin) in bin_of.iter().enumerate() {
@@ -148,8 +157,13 @@ impl Shapes {
         let directions = DMatrix::from_fn(view.motion.ncols(), SHAPES, |_, _| 0.7 * normal());
         let angle = Uniform::new(0.0, std::f64::consts::TAU);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED + 1);
-        let offsets: Vec<f64> = (0..SHAPES).map(|_| angle.map_or(0.0, |angle| angle.sample(&mut random))).collect();
-        let weight: Vec<f64> = counts.iter().map(|count: &f64| if *count > 0.0 { 1.0 / count.sqrt() } else { 0.0 }).collect();
+        let offsets: Vec<f64> = (0..SHAPES)
+            .map(|_| angle.map_or(0.0, |angle| angle.sample(&mut random)))
+            .collect();
+        let weight: Vec<f64> = counts
+            .iter()
+            .map(|count: &f64| if *count > 0.0 { 1.0 / count.sqrt() } else { 0.0 })
+            .collect();
         let shapes = DMatrix::from_fn(BINS, 2 * SHAPES, |bin, shape| {
             let value = if shape < SHAPES {
                 (std::f64::consts::PI * (shape + 1) as f64 * (bin as f64 + 0.5) / BINS as f64).cos()
@@ -188,7 +202,13 @@ fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
     let mut labels = Vec::new();
     for (index, view) in views.iter().enumerate() {
         let name = &view.name;
-        for what in ["more energy than noise", "a shape in time or motion", "neighbouring samples alike", "outliers", "a calibration beyond its sigmas"] {
+        for what in [
+            "more energy than noise",
+            "a shape in time or motion",
+            "neighbouring samples alike",
+            "outliers",
+            "a calibration beyond its sigmas",
+        ] {
             labels.push((format!("{name}: {what}"), Some(index)));
         }
     }
@@ -218,7 +238,14 @@ fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted) -> Vec<f64> {
         sums.push(energy);
         sums.push(shapes.basis.tr_mul(&binned).norm_squared());
         let values = rest.as_slice();
-        let alike = (1..=LAGS).map(|lag| values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>().powi(2));
+        let alike = (1..=LAGS).map(|lag| {
+            values
+                .iter()
+                .zip(values.iter().skip(lag))
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                .powi(2)
+        });
         sums.push(alike.sum::<f64>() / energy.max(1.0));
         sums.push(values.iter().map(|value| value.powi(4)).sum());
         sums.push(open.norm_squared());

@@ -82,6 +82,7 @@ impl Tape {
     }
 
     /// The derived frames heard whole.
+    #[allow(dead_code, reason = "not every test file asks for them")]
     pub fn derived(&self) -> Vec<Derived> {
         let bytes: Vec<u8> = self.telemetry.iter().map(|(_, byte)| *byte).collect();
         let frames = bytes.split_inclusive(|byte| *byte == b'\n');

@@ -89,7 +89,7 @@ impl Befalls {
             }
             page[MAIN_BYTES + REST[random.next_u32() as usize % REST.len()]] ^= 1 << (random.next_u32() % 8);
         }
-        if self.disturbed_after.is_some_and(|limit| reads > limit) && at.row() % 2 == 0 {
+        if self.disturbed_after.is_some_and(|limit| reads > limit) && at.row().is_multiple_of(2) {
             // The same cell at each read: which one follows from the row.
             let cell = at.row().wrapping_mul(2_654_435_761);
             for half in 0..2 {
