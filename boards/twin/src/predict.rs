@@ -9,6 +9,7 @@
 
 mod calibration;
 mod chain;
+mod emems;
 mod grid;
 mod scene;
 mod unit;
@@ -17,6 +18,7 @@ use std::borrow::Cow;
 
 pub use calibration::{Accuracy, Column};
 pub use chain::Chain;
+pub use emems::{emems, thesis_slot_s};
 pub use grid::{Grid, LowPass};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};

@@ -73,6 +73,8 @@ mod stale_sample;
 mod stuck_channel;
 mod table_tilt;
 mod temperature_hysteresis;
+#[cfg(test)]
+mod tests;
 mod vibration;
 mod vibration_rectification;
 mod warm_up;
