@@ -1,25 +1,29 @@
+//! Diagnoses cases, a line each.
 use std::time::Instant;
-use gap::{attribute::attribute, case::Subject, library::Library, problem::Problem};
+
+use gap::{case::Subject, diagnose::diagnose};
+
 fn main() {
     for case in std::env::args().skip(1) {
         let t = Instant::now();
-        let subject = match Subject::open(std::path::Path::new(&case)) { Ok(s) => s, Err(e) => { println!("{case}: {e}"); continue } };
-        let t1 = t.elapsed();
-        let problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
-        let mut library = Library::new(&problem, &[], &|_| {});
-        let t2 = t.elapsed();
-        let found = attribute(&problem, &mut library, &|_| {});
-        println!("== {case}: open {t1:?}, library {} columns {} hyps {t2:?}, attribute {:?}", library.products.len(), library.hypotheses.len(), t.elapsed());
-        for c in &found.chosen {
-            let h = &library.hypotheses[c.hypothesis];
-            println!("  {:?} gain {:.1}", h.cause, c.gain);
-            for (p, (v, s)) in h.parameters.iter().zip(c.theta.iter().zip(c.covariance.diagonal().iter())).take(6) { println!("     {} = {:.4e} +- {:.1e} {}", p.name, v, s.sqrt(), p.unit); }
-            for (r, g) in c.rivals.iter().take(4) { println!("     rival {:?} {:.1}", library.hypotheses[*r].cause, g); }
+        let subject = match Subject::open(std::path::Path::new(&case)) {
+            Ok(subject) => subject,
+            Err(error) => {
+                println!("{case}: {error}");
+                continue;
+            }
+        };
+        let d = diagnose(&subject, &[], &|_, _| {});
+        println!(
+            "== {case} {:.1?} gap {:.3} gate p {:.3} ({:.1}) none {:.3} left p {:.3} ({:.1}) shrink {:.4}/{:.4}/{:.4} {:.1} % {:.0?} withdrawn {:?}",
+            t.elapsed(), d.gap, d.gate.p, d.gate.log_tail, d.none_of_these, d.leftover.p, d.leftover.log_tail, d.shrink.before, d.shrink.recalibrated, d.shrink.after, d.shrink.percent, d.shrink.interval_percent, d.withdrawn
+        );
+        for c in &d.causes {
+            println!("   {} at {} P {:.3} gain {:.0} share {:.2} {} {}", c.effect, c.locality, c.probability, c.gain, c.share, c.when, if c.is_suspicious { "SUSPICIOUS" } else { "" });
         }
-        if found.chosen.is_empty() {
-            let mut order: Vec<usize> = (0..found.alone.len()).collect();
-            order.sort_by(|a, b| found.alone[*b].total_cmp(&found.alone[*a]));
-            for i in order.iter().take(3) { println!("  alone {:?} {:.1}", library.hypotheses[*i].cause, found.alone[*i]); }
+        println!("   alternatives {:?} indistinguishable {:?}", d.alternatives.iter().take(4).collect::<Vec<_>>(), d.indistinguishable);
+        for a in d.leftover.aspects.iter().take(3) {
+            println!("   left: {} {:.1}", a.what, a.size);
         }
     }
 }

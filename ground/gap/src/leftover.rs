@@ -68,8 +68,46 @@ pub struct Aspect {
 pub struct Leftover {
     /// Probability of as large a leftover if the model is enough.
     pub p: f64,
+    /// Natural logarithm of that probability continued beyond the last simulated log by a Gumbel law, which is what the
+    /// largest of many follows.
+    pub log_tail: f64,
     /// Aspects above three, largest first.
     pub aspects: Vec<Aspect>,
+    /// Mean and spread of the largest aspect over the simulated logs.
+    pub scale: [f64; 2],
+}
+
+impl Leftover {
+    /// Takes the aspects of channels out whose scatter another effect explains.
+    pub fn explain(&mut self, channels: &[usize]) {
+        let was_largest = self.aspects.first().map_or(0.0, |aspect| aspect.size);
+        self.aspects.retain(|aspect| aspect.channel.is_none_or(|channel| !channels.contains(&channel)));
+        let largest = self.aspects.first().map_or(0.0, |aspect| aspect.size);
+        if largest < was_largest {
+            self.log_tail = log_tail(largest, self.scale);
+            self.p = self.p.max(self.log_tail.exp());
+        }
+    }
+
+    /// Probability that something else is needed, from its prior: a p-value speaks against "enough" by at most
+    /// `-1 / (e p ln p)` (Sellke, Bayarri and Berger 2001).
+    pub fn unknown(&self, prior: f64) -> f64 {
+        let log_p = self.log_tail.min(self.p.ln());
+        let bound = if log_p < -1.0 { (1.0 + log_p + (-log_p).ln()).exp() } else { 1.0 };
+        prior / (prior + (1.0 - prior) * bound)
+    }
+}
+
+/// `ln P(largest >= size)` for a Gumbel law of this mean and spread.
+fn log_tail(size: f64, [mean, spread]: [f64; 2]) -> f64 {
+    let beta = spread * 6f64.sqrt() / std::f64::consts::PI;
+    if beta <= 0.0 {
+        return 0.0;
+    }
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    let y = (size - (mean - EULER * beta)) / beta;
+    // ln(1 - exp(-exp(-y))): for large y simply -y.
+    if y > 30.0 { -y } else { (-(-(-y).exp()).exp_m1()).max(f64::MIN_POSITIVE).ln() }
 }
 
 /// Judges the residuals of a model.
@@ -85,12 +123,13 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
     let observed = roots(&observed);
-    let moments: Vec<(f64, f64)> = (0..observed.len()).map(|at| moments(simulated.iter().map(|run| run[at]))).collect();
+    let spreads: Vec<(f64, f64)> = (0..observed.len()).map(|at| moments(simulated.iter().map(|run| run[at]))).collect();
     let sizes = |run: &[f64]| -> Vec<f64> {
-        run.iter().zip(&moments).map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 }).collect()
+        run.iter().zip(&spreads).map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 }).collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
+    let scale = moments(simulated.iter().map(|run| largest(run)));
     let beyond = simulated.iter().filter(|run| largest(run) >= seen).count();
     let mut aspects: Vec<Aspect> = labels(views)
         .into_iter()
@@ -101,6 +140,8 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));
     Leftover {
         p: (1 + beyond) as f64 / (1 + count) as f64,
+        log_tail: log_tail(seen, [scale.0, scale.1]),
+        scale: [scale.0, scale.1],
         aspects,
     }
 }

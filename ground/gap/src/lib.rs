@@ -14,6 +14,8 @@
 
 pub mod attribute;
 pub mod case;
+pub mod confusion;
+pub mod diagnose;
 pub mod evidence;
 pub mod gram;
 pub mod held;
@@ -21,7 +23,11 @@ pub mod joint;
 pub mod leftover;
 pub mod library;
 pub mod log;
+pub mod model;
 pub mod problem;
 pub mod products;
 pub mod refine;
+pub mod regime;
+pub mod scatter;
+pub mod sight;
 pub mod windows;
