@@ -26,6 +26,23 @@ pub struct Scatter {
     pub gain: f64,
 }
 
+/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
+const ODD: f64 = 2.0;
+
+/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
+/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+fn is_odd(view: &View) -> bool {
+    let sigma = view.channel.sigma();
+    let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
+    let samples = standard.len().max(1) as f64;
+    let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
+    let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
+    let root = samples.sqrt();
+    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
+        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
+        || alike.abs() * root > ODD
+}
+
 /// Every effect on the scatter that gains anything, best first. `predicted` holds every row of the log.
 pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) -> Vec<Scatter> {
     let twin = problem.twin;
@@ -46,6 +63,7 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
         predicted: &predicted[*index],
         measured: &measured[*index],
     };
+    let odd: Vec<bool> = (0..unit.channels.len()).map(|index| is_odd(&view(&index))).collect();
     let mut found = Vec::new();
     for effect in LIBRARY {
         let page = effect.page();
@@ -67,7 +85,7 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
                 thetas: Vec::new(),
                 gain: -((LIBRARY.len() * variants.len()) as f64).ln(),
             };
-            for block in blocks.iter().filter(|block| !block.is_empty()) {
+            for block in blocks.iter().filter(|block| block.iter().any(|index| odd[*index])) {
                 let views: Vec<View> = block.iter().map(view).collect();
                 let samples: usize = block.iter().map(|index| problem.frames[*index].series.rows.len()).sum();
                 let (theta, gain) = most_likely(*effect, *variant, &views);
