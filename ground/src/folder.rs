@@ -10,18 +10,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use chart::{Block, ChartError};
 use packets::stream::sequence::Step;
 
-use crate::{
-    digest::Entry,
-    envelope::Envelope,
-    plot::{
-        self, PlotError,
-        page::{self, Heading},
-    },
-    summary::Summary,
-    table,
-};
+use crate::{digest::Entry, envelope::Envelope, plot, summary::Summary, table};
 
 /// Folders of one name that are tried before giving up.
 const MOST_OF_A_NAME: u32 = 10_000;
@@ -55,7 +47,7 @@ pub enum FolderError {
     },
     /// A figure cannot be drawn.
     #[error(transparent)]
-    Plot(#[from] PlotError),
+    Plot(#[from] ChartError),
 }
 
 /// A folder being written.
@@ -181,7 +173,15 @@ impl Folder {
         envelope: &Envelope,
     ) -> Result<PathBuf, FolderError> {
         let figures = plot::figures(envelope, self.cycle_s, summary)?;
-        let html = page::html(&Heading { title, about, rows }, &figures);
+        let named = rows
+            .iter()
+            .map(|(name, value)| (name.to_string(), value.clone()))
+            .collect();
+        let blocks: Vec<Block> = [Block::Rows(named)]
+            .into_iter()
+            .chain(figures.into_iter().map(Block::Figure))
+            .collect();
+        let html = chart::html(title, about, &blocks);
         for (name, content) in [("index.html", html), ("summary.txt", text_of(rows))] {
             let path = self.path.join(name);
             fs::write(&path, content).map_err(|source| FolderError::Write { path, source })?;

@@ -2,9 +2,8 @@
 //!
 //! In: [`Envelope`] and [`Summary`]. Out: [`Figure`]s, each an SVG without outside references. Values are nominal SI;
 //! plates share an axis, so that one that disagrees is seen. Where a bin holds several packets, its least and most are
-//! joined, so a peak is never drawn away. [`page`] puts the figures on one page.
+//! joined, so a peak is never drawn away.
 
-pub mod page;
 mod panel;
 
 use plotters::{
@@ -12,6 +11,7 @@ use plotters::{
     prelude::{BLACK, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, WHITE},
 };
 
+use chart::{ChartError, Figure};
 use packets::channel::{CHANNELS, Quantity};
 
 use crate::{
@@ -30,32 +30,11 @@ const FOUR_PANELS: (u32, u32) = (2600, 1240);
 /// [px] size of a figure of one panel.
 const ONE_PANEL: (u32, u32) = (2600, 640);
 
-/// A figure of the page.
-#[derive(Clone, Debug)]
-pub struct Figure {
-    /// Its title.
-    pub title: String,
-    /// Colours and what they mean.
-    pub legend: Vec<(String, &'static str)>,
-    /// The picture.
-    pub svg: String,
-}
-
-/// A figure could not be drawn.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("figure \"{figure}\" cannot be drawn: {why}")]
-pub struct PlotError {
-    /// Its title.
-    pub figure: String,
-    /// What the plotting library says.
-    pub why: String,
-}
-
 /// All figures of a flight; none for a flight without packets.
 ///
 /// # Errors
 /// When the plotting library refuses one.
-pub fn figures(envelope: &Envelope, cycle_s: f64, summary: &Summary) -> Result<Vec<Figure>, PlotError> {
+pub fn figures(envelope: &Envelope, cycle_s: f64, summary: &Summary) -> Result<Vec<Figure>, ChartError> {
     if envelope.bins().is_empty() {
         return Ok(Vec::new());
     }
@@ -81,7 +60,7 @@ pub fn figures(envelope: &Envelope, cycle_s: f64, summary: &Summary) -> Result<V
 }
 
 /// Four panels, one a plate.
-fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'static str]) -> Result<Figure, PlotError> {
+fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'static str]) -> Result<Figure, ChartError> {
     let unit = quantities.first().map_or("", |quantity| quantity.unit());
     let channels = |plate| {
         (0..CHANNELS.len()).filter(move |index| {
@@ -119,7 +98,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
     let mut legend: Vec<_> = XYZ
         .into_iter()
         .zip(names)
-        .map(|(colour, name)| (hex(colour), *name))
+        .map(|(colour, name)| (hex(colour), name.to_string()))
         .collect();
     legend.extend(times.legend(panels.iter().any(|panel| !panel.failed.is_empty())));
     let svg = draw(FOUR_PANELS, title, |root| {
@@ -137,7 +116,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
 }
 
 /// Deviation of the packet period from its mean.
-fn period(times: &Times, summary: &Summary) -> Result<Figure, PlotError> {
+fn period(times: &Times, summary: &Summary) -> Result<Figure, ChartError> {
     /// [us] span shown at least: a resolution of the line's instants, not of rounding errors.
     const LEAST_SPAN_US: f64 = 10.0;
     let mean_s = summary.period_s.mean;
@@ -154,7 +133,7 @@ fn period(times: &Times, summary: &Summary) -> Result<Figure, PlotError> {
         }],
         failed: Vec::new(),
     };
-    let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other")];
+    let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other".to_string())];
     legend.extend(times.legend(false));
     let svg = draw(ONE_PANEL, &title, |root| {
         let y = panel::shared_y(
@@ -168,7 +147,7 @@ fn period(times: &Times, summary: &Summary) -> Result<Figure, PlotError> {
 }
 
 /// When each sensor is sampled in its cycle.
-fn slots(summary: &Summary) -> Result<Figure, PlotError> {
+fn slots(summary: &Summary) -> Result<Figure, ChartError> {
     let title = "Slot times: when each sensor is sampled after the start of its cycle [ms]".to_string();
     let bars: Vec<Bar> = (SLOT_NAMES.iter().zip(&summary.slot_s))
         .map(|(name, spread)| Bar {
@@ -179,7 +158,7 @@ fn slots(summary: &Summary) -> Result<Figure, PlotError> {
     let svg = draw(ONE_PANEL, &title, |root| panel::draw_bars(root, &bars, XYZ[0]))?;
     Ok(Figure {
         title,
-        legend: vec![(hex(XYZ[0]), "least to most, dot at the mean")],
+        legend: vec![(hex(XYZ[0]), "least to most, dot at the mean".to_string())],
         svg,
     })
 }
@@ -196,7 +175,7 @@ type Drawn = Result<(), Box<dyn std::error::Error>>;
 /// Where panels are drawn.
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn draw(size: (u32, u32), title: &str, draw_on: impl FnOnce(&Area) -> Drawn) -> Result<String, PlotError> {
+fn draw(size: (u32, u32), title: &str, draw_on: impl FnOnce(&Area) -> Drawn) -> Result<String, ChartError> {
     let mut svg = String::new();
     let drawn = {
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -207,7 +186,7 @@ fn draw(size: (u32, u32), title: &str, draw_on: impl FnOnce(&Area) -> Drawn) -> 
     };
     match drawn {
         Ok(()) => Ok(svg),
-        Err(why) => Err(PlotError {
+        Err(why) => Err(ChartError {
             figure: title.into(),
             why: why.to_string(),
         }),

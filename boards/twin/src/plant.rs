@@ -16,6 +16,8 @@ use std::sync::Arc;
 
 use emems::sample::{Kind, SENSORS};
 
+use nalgebra::Vector3;
+
 pub use self::{gyro::Gyro, sensor_bus::SensorBus};
 use crate::{
     geometry::{self, PLATES},
@@ -103,11 +105,16 @@ impl Plant {
 
     /// The unit of this seed, better or worse than nominal.
     pub fn with(source: Arc<dyn TruthSource>, seed: u64, quality: Quality) -> Self {
+        Plant::seeing(&Views::of(&source), source, seed, quality)
+    }
+
+    /// The unit of this seed whose parts see this; `source` still drives the vehicle's two lines.
+    pub fn seeing(views: &Views, source: Arc<dyn TruthSource>, seed: u64, quality: Quality) -> Self {
         let seeds = Noise::new(seed);
-        let plates = (0..PLATES).map(|plate| i2c_parts(plate, &source, seeds.stream(plate as u64), quality));
+        let plates = (0..PLATES).map(|plate| views.i2c_parts(plate, seeds.stream(plate as u64), quality));
         Plant {
             i2c: SensorBus::new(Tca9548a::new(plates)),
-            gyro: core::array::from_fn(|plate| gyro(plate, &source, seeds.stream((PLATES + plate) as u64), quality)),
+            gyro: core::array::from_fn(|plate| views.gyro(plate, seeds.stream((PLATES + plate) as u64), quality)),
             source,
         }
     }
@@ -160,40 +167,87 @@ impl Plant {
     }
 }
 
+/// What the parts of each plate see of the truth, each from its own place: the seam between the world and the unit.
+///
+/// [`Views::of`] is the nominal unit in a nominal world. Whoever wants a part that is turned, late, warm or beside a
+/// magnet puts another function in place of one of these.
+#[derive(Clone)]
+pub struct Views {
+    /// [m/s2] specific force at each accelerometer, in its plate's frame.
+    pub force_p: [Input<Vector3<f64>>; PLATES],
+    /// [uT] field at each magnetometer, in its plate's frame.
+    pub field_p_ut: [Input<Vector3<f64>>; PLATES],
+    /// [rad/s] rate about each gyro's sense axis.
+    pub rate: [Input<f64>; PLATES],
+    /// [degC] of each plate's thermometer.
+    pub temperature_c: [Input<f64>; PLATES],
+    /// [degC] of each gyro.
+    pub gyro_temperature_c: [Input<f64>; PLATES],
+}
+
+impl Views {
+    /// Nominal places and axes.
+    pub fn of(source: &Arc<dyn TruthSource>) -> Self {
+        let force_p = |plate| {
+            let dcm_pb = geometry::dcm_bp(plate).transpose();
+            let place_b = geometry::accelerometer_place_b(plate);
+            seen(source, move |truth| {
+                let Truth {
+                    rate_b,
+                    rate_dot_b,
+                    force_b,
+                    ..
+                } = truth;
+                dcm_pb * (force_b + rate_dot_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b)))
+            })
+        };
+        let field_p_ut = |plate| {
+            let dcm_pb = geometry::dcm_bp(plate).transpose();
+            seen(source, move |truth| dcm_pb * truth.field_b_ut)
+        };
+        let rate = |plate| {
+            let axis_b = geometry::gyro_axis_b(plate);
+            seen(source, move |truth| axis_b.dot(&truth.rate_b))
+        };
+        Views {
+            force_p: core::array::from_fn(force_p),
+            field_p_ut: core::array::from_fn(field_p_ut),
+            rate: core::array::from_fn(rate),
+            temperature_c: core::array::from_fn(|_| seen(source, |truth| truth.temperature_c)),
+            gyro_temperature_c: core::array::from_fn(|_| seen(source, |truth| truth.temperature_c)),
+        }
+    }
+
+    fn i2c_parts(&self, plate: usize, seeds: Noise, quality: Quality) -> Vec<Box<dyn I2cPart>> {
+        vec![
+            Box::new(Lis331hh::new(
+                self.force_p[plate].clone(),
+                quality.draw(ACCELEROMETER, seeds.stream(0)),
+            )),
+            Box::new(Hmc5883l::new(
+                self.field_p_ut[plate].clone(),
+                quality.draw(MAGNETOMETER, seeds.stream(1)),
+            )),
+            Box::new(Tmp102::new(
+                self.temperature_c[plate].clone(),
+                quality.draw(THERMOMETER, seeds.stream(2)),
+            )),
+        ]
+    }
+
+    fn gyro(&self, plate: usize, seeds: Noise, quality: Quality) -> Gyro {
+        let measurand = Measurand {
+            rate: self.rate[plate].clone(),
+            temperature_c: self.gyro_temperature_c[plate].clone(),
+            rate_specimen: quality.draw(GYRO, seeds.stream(0)),
+            temperature_specimen: quality.draw(GYRO_THERMOMETER, seeds.stream(1)),
+        };
+        Gyro::new(Adis16265::new(measurand), seeds.stream(2))
+    }
+}
+
 /// What a part sees of the truth.
 fn seen<T>(source: &Arc<dyn TruthSource>, view: impl Fn(Truth) -> T + Send + Sync + 'static) -> Input<T> {
     let source = Arc::clone(source);
     Arc::new(move |t_s| view(source.at(t_s)))
-}
-
-fn i2c_parts(plate: usize, source: &Arc<dyn TruthSource>, seeds: Noise, quality: Quality) -> Vec<Box<dyn I2cPart>> {
-    let dcm_pb = geometry::dcm_bp(plate).transpose();
-    let place_b = geometry::accelerometer_place_b(plate);
-    let force_p = seen(source, move |truth| {
-        let Truth {
-            rate_b,
-            rate_dot_b,
-            force_b,
-            ..
-        } = truth;
-        dcm_pb * (force_b + rate_dot_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b)))
-    });
-    let field_p_ut = seen(source, move |truth| dcm_pb * truth.field_b_ut);
-    let temperature_c = seen(source, |truth| truth.temperature_c);
-    vec![
-        Box::new(Lis331hh::new(force_p, quality.draw(ACCELEROMETER, seeds.stream(0)))),
-        Box::new(Hmc5883l::new(field_p_ut, quality.draw(MAGNETOMETER, seeds.stream(1)))),
-        Box::new(Tmp102::new(temperature_c, quality.draw(THERMOMETER, seeds.stream(2)))),
-    ]
-}
-
-fn gyro(plate: usize, source: &Arc<dyn TruthSource>, seeds: Noise, quality: Quality) -> Gyro {
-    let axis_b = geometry::gyro_axis_b(plate);
-    let measurand = Measurand {
-        rate: seen(source, move |truth| axis_b.dot(&truth.rate_b)),
-        temperature_c: seen(source, |truth| truth.temperature_c),
-        rate_specimen: quality.draw(GYRO, seeds.stream(0)),
-        temperature_specimen: quality.draw(GYRO_THERMOMETER, seeds.stream(1)),
-    };
-    Gyro::new(Adis16265::new(measurand), seeds.stream(2))
 }

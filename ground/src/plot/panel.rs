@@ -150,8 +150,8 @@ impl<'a> Times<'a> {
     }
 
     /// What of failures, missed packets and events there is to explain.
-    pub fn legend(&self, failed: bool) -> Vec<(String, &'static str)> {
-        let entry = |shown: bool, colour, text| shown.then(|| (hex(colour), text));
+    pub fn legend(&self, failed: bool) -> Vec<(String, String)> {
+        let entry = |shown: bool, colour, text| shown.then(|| (hex(colour), str::to_string(text)));
         [
             entry(failed, FAILED, "sensor failed"),
             entry(!self.missed.is_empty(), MISSED, "packet missed"),

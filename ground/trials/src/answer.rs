@@ -1,0 +1,31 @@
+//! What a trial's answer says, as JSON.
+
+use serde::{Deserialize, Serialize};
+
+/// One thing that was wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Its name in verdicts, or of a novel disturbance.
+    pub effect: String,
+    /// Whether verdicts have a name for it.
+    pub in_library: bool,
+    /// The channels it touches.
+    pub channels: Vec<String>,
+    /// Strength it was dealt with.
+    pub strength: f64,
+}
+
+/// What was wrong with a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The case.
+    pub case: String,
+    /// R0 nothing wrong, R1 one cause, R3 a novel one, R4 two.
+    pub ring: String,
+    /// Seed of everything drawn.
+    pub seed: u64,
+    /// Causes; none for R0.
+    pub effects: Vec<Cause>,
+    /// Size of what is wrong, in sigmas over the fit window, beyond what calibration errors can imitate.
+    pub snr_marginal: f64,
+}

@@ -1,0 +1,352 @@
+//! The blind protocol: deal, commit, answer, reveal, score.
+//!
+//! In: a folder. Out: cases in it, and beside them what proves that nobody looked. `deal` writes cases under neutral
+//! names and keeps the answers, each with a salt, where the analyst does not look; `commit` publishes the SHA-256 of
+//! salt and answer; `answer` publishes those of the verdicts; `reveal` opens the answers next to the cases; `score` checks all
+//! hashes and only then scores. A hash that does not fit is an error that names the case.
+
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use indicatif::ProgressBar;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use sha2::{Digest, Sha256};
+
+use crate::{
+    answer::Answer,
+    deal::{self, DealError, Ring},
+    draw::Draw,
+    score::{self, Judged, Verdict},
+};
+
+/// Hashes of the answers.
+const MANIFEST: &str = "manifest.json";
+/// Hashes of the verdicts.
+const ANSWERED: &str = "answered.json";
+/// The verdict on a case, in its folder.
+pub const VERDICT: &str = "verdict.json";
+
+/// What goes wrong with a protocol.
+#[derive(Debug, thiserror::Error)]
+pub enum BlindError {
+    /// A file cannot be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{path}: {source}")]
+    Json {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// A case was not dealt.
+    #[error(transparent)]
+    Deal(#[from] DealError),
+    /// A file is not the one whose hash was published.
+    #[error("{path}: is not what {manifest} was published for; it was changed after that")]
+    Changed {
+        /// Which.
+        path: PathBuf,
+        /// The list of hashes.
+        manifest: &'static str,
+    },
+    /// A case was revealed that is not in the manifest, or the other way round.
+    #[error("{0} lists other cases than there are answers for: commit before revealing")]
+    Other(PathBuf),
+}
+
+/// How many cases of each ring.
+#[derive(Clone, Copy, Debug)]
+pub struct Hand {
+    /// Nothing wrong.
+    pub r0: usize,
+    /// One effect.
+    pub r1: usize,
+    /// A novel disturbance.
+    pub r3: usize,
+    /// Two effects.
+    pub r4: usize,
+}
+
+/// An answer with its salt, as kept.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Kept {
+    salt: String,
+    answer: Answer,
+}
+
+/// Deals a hand into `folder`, answers into `answers`; the order of the rings is drawn.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn deal(folder: &Path, answers: &Path, hand: Hand, seed: u64) -> Result<(), BlindError> {
+    let rings = [
+        (Ring::R0, hand.r0),
+        (Ring::R1, hand.r1),
+        (Ring::R3, hand.r3),
+        (Ring::R4, hand.r4),
+    ];
+    let mut deck: Vec<Ring> = rings.into_iter().flat_map(|(ring, count)| vec![ring; count]).collect();
+    let mut draw = Draw::new(seed);
+    for last in (1..deck.len()).rev() {
+        deck.swap(last, draw.below(last + 1));
+    }
+    make(answers)?;
+    let progress = ProgressBar::new(deck.len() as u64);
+    for (index, ring) in deck.into_iter().enumerate() {
+        let name = format!("T{:03}", index + 1);
+        let own = draw.uniform(0.0, 1e15) as u64;
+        let answer = deal::deal(folder, &name, ring, own)?;
+        let salt = (0..4)
+            .map(|_| format!("{:08x}", draw.uniform(0.0, 4_294_967_296.0) as u32))
+            .collect();
+        write(&answers.join(format!("{name}.json")), &Kept { salt, answer })?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(())
+}
+
+/// Publishes the hashes of the answers kept in `answers`.
+///
+/// # Errors
+/// When a file cannot be read or written.
+pub fn commit(folder: &Path, answers: &Path) -> Result<(), BlindError> {
+    let mut hashes = BTreeMap::new();
+    for path in files(answers)? {
+        hashes.insert(stem(&path), answer_hash(&path)?);
+    }
+    write(&folder.join(MANIFEST), &hashes)
+}
+
+/// Publishes the hashes of the verdicts that stand in the cases' folders.
+///
+/// # Errors
+/// When a file cannot be read or written.
+pub fn answer(folder: &Path) -> Result<usize, BlindError> {
+    let mut hashes = BTreeMap::new();
+    for case in cases(folder)? {
+        let verdict = case.join(VERDICT);
+        if verdict.exists() {
+            hashes.insert(stem(&case), hash(&read(&verdict)?));
+        }
+    }
+    write(&folder.join(ANSWERED), &hashes)?;
+    Ok(hashes.len())
+}
+
+/// Puts the answers beside the cases, after checking that they are those that were committed to.
+///
+/// # Errors
+/// When an answer is not the one that was committed to.
+pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
+    let manifest_path = folder.join(MANIFEST);
+    let manifest: BTreeMap<String, String> = parse(&manifest_path)?;
+    let kept = files(answers)?;
+    if kept.len() != manifest.len() || kept.iter().any(|path| !manifest.contains_key(&stem(path))) {
+        return Err(BlindError::Other(manifest_path));
+    }
+    for path in kept {
+        if manifest.get(&stem(&path)) != Some(&answer_hash(&path)?) {
+            return Err(BlindError::Changed {
+                path,
+                manifest: MANIFEST,
+            });
+        }
+        let bytes = read(&path)?;
+        let shown = folder.join(stem(&path)).join("answer.json");
+        fs::write(&shown, bytes).map_err(|source| BlindError::File { path: shown, source })?;
+    }
+    Ok(())
+}
+
+/// The table of revealed cases, all hashes checked.
+///
+/// # Errors
+/// When a verdict or an answer was changed after its hash was published.
+pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
+    let manifest: BTreeMap<String, String> = parse(&folder.join(MANIFEST))?;
+    let answered: BTreeMap<String, String> = parse(&folder.join(ANSWERED))?;
+    let mut judged = Vec::new();
+    for (name, published) in manifest {
+        let path = folder.join(&name).join("answer.json");
+        if answer_hash(&path)? != published {
+            return Err(BlindError::Changed {
+                path,
+                manifest: MANIFEST,
+            });
+        }
+        let kept: Kept = parse(&path)?;
+        let path = folder.join(&name).join(VERDICT);
+        let verdict = match answered.get(&name) {
+            None => None,
+            Some(published) if *published == hash(&read(&path)?) => Some(parse::<Verdict>(&path)?),
+            Some(_) => {
+                return Err(BlindError::Changed {
+                    path,
+                    manifest: ANSWERED,
+                });
+            }
+        };
+        judged.push(Judged {
+            answer: kept.answer,
+            verdict,
+        });
+    }
+    Ok((score::markdown(&score::table(&judged)), judged))
+}
+
+/// A case in one line: what it was, what was said.
+pub fn line(judged: &Judged) -> String {
+    let answer = &judged.answer;
+    let truth: Vec<&str> = answer.effects.iter().map(|cause| cause.effect.as_str()).collect();
+    let said = match &judged.verdict {
+        None => "no verdict".to_string(),
+        Some(verdict) => {
+            let causes: Vec<String> = verdict
+                .causes
+                .iter()
+                .map(|cause| format!("{} {:.2}", cause.effect, cause.probability))
+                .collect();
+            format!("{} (none of these {:.2})", causes.join(", "), verdict.none_of_these)
+        }
+    };
+    format!(
+        "{} {} SNR {:6.1}  {:30} -> {said}",
+        answer.case,
+        answer.ring,
+        answer.snr_marginal,
+        truth.join(", ")
+    )
+}
+
+/// Folders of cases, sorted.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn cases(folder: &Path) -> Result<Vec<PathBuf>, BlindError> {
+    Ok(entries(folder)?
+        .into_iter()
+        .filter(|path| path.join("case.toml").exists())
+        .collect())
+}
+
+fn answer_hash(path: &Path) -> Result<String, BlindError> {
+    let kept: Kept = parse(path)?;
+    let answer = serde_json::to_vec(&kept.answer).map_err(|source| BlindError::Json {
+        path: path.into(),
+        source,
+    })?;
+    Ok(hash(&[kept.salt.as_bytes(), &answer].concat()))
+}
+
+fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, BlindError> {
+    let failed = |source| BlindError::File {
+        path: folder.into(),
+        source,
+    };
+    let mut paths = fs::read_dir(folder)
+        .map_err(failed)?
+        .map(|entry| entry.map(|entry| entry.path()).map_err(failed))
+        .collect::<Result<Vec<_>, _>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn files(folder: &Path) -> Result<Vec<PathBuf>, BlindError> {
+    Ok(entries(folder)?
+        .into_iter()
+        .filter(|path| path.extension().is_some_and(|end| end == "json"))
+        .collect())
+}
+
+fn make(folder: &Path) -> Result<(), BlindError> {
+    fs::create_dir_all(folder).map_err(|source| BlindError::File {
+        path: folder.into(),
+        source,
+    })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
+    fs::read(path).map_err(|source| BlindError::File {
+        path: path.into(),
+        source,
+    })
+}
+
+fn parse<T: DeserializeOwned>(path: &Path) -> Result<T, BlindError> {
+    serde_json::from_slice(&read(path)?).map_err(|source| BlindError::Json {
+        path: path.into(),
+        source,
+    })
+}
+
+fn write(path: &Path, value: &impl Serialize) -> Result<(), BlindError> {
+    let mut bytes = serde_json::to_vec_pretty(value).map_err(|source| BlindError::Json {
+        path: path.into(),
+        source,
+    })?;
+    bytes.push(b'\n');
+    fs::write(path, bytes).map_err(|source| BlindError::File {
+        path: path.into(),
+        source,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_changed_after_its_hash_was_published_is_found() {
+        let place = tempfile::tempdir().expect("a folder");
+        let (folder, answers) = (place.path().join("cases"), place.path().join("answers"));
+        let hand = Hand {
+            r0: 1,
+            r1: 0,
+            r3: 0,
+            r4: 0,
+        };
+        make(&folder).expect("a folder");
+        deal(&folder, &answers, hand, 1).expect("dealt");
+        commit(&folder, &answers).expect("committed");
+        let verdict = folder.join("T001").join(VERDICT);
+        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.0}"#).expect("written");
+        assert_eq!(answer(&folder).expect("answered"), 1);
+        reveal(&folder, &answers).expect("revealed");
+        let (table, judged) = score(&folder).expect("scored");
+        assert!(table.contains("| false name, nothing wrong | 1 | 0.000 |"), "{table}");
+        assert_eq!(judged.len(), 1);
+
+        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.1}"#).expect("written");
+        assert!(matches!(
+            score(&folder),
+            Err(BlindError::Changed { manifest: ANSWERED, .. })
+        ));
+        let kept = answers.join("T001.json");
+        let other = fs::read_to_string(&kept).expect("kept").replace("\"R0\"", "\"R1\"");
+        fs::write(&kept, other).expect("written");
+        assert!(matches!(
+            reveal(&folder, &answers),
+            Err(BlindError::Changed { manifest: MANIFEST, .. })
+        ));
+    }
+}

@@ -1,0 +1,139 @@
+//! `ground gap blind`: the protocol on the command line.
+//!
+//! In: arguments, and the diagnosis as a function from a case's folder to its verdict.json. Out: folders, files, and for
+//! `score` the table on standard output.
+
+use std::{
+    error::Error,
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::blind::{self, BlindError, Hand, VERDICT};
+
+/// Runs a blind challenge on the diagnosis, or on any other that reads cases and writes verdicts
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    step: Step,
+}
+
+#[derive(Subcommand)]
+enum Step {
+    /// Deals cases whose cause is withheld, made by flying the unit with something wrong
+    Deal {
+        /// Where the cases go
+        folder: PathBuf,
+        /// Where the answers go: out of the analyst's sight
+        #[arg(long)]
+        answers: PathBuf,
+        /// Seed of everything drawn; the same seed deals the same cases
+        #[arg(long)]
+        seed: u64,
+        /// Cases with nothing wrong
+        #[arg(long, default_value_t = 20)]
+        r0: usize,
+        /// Cases with one effect
+        #[arg(long, default_value_t = 60)]
+        r1: usize,
+        /// Cases with a disturbance no library describes
+        #[arg(long, default_value_t = 20)]
+        r3: usize,
+        /// Cases with two effects
+        #[arg(long, default_value_t = 20)]
+        r4: usize,
+    },
+    /// Publishes the hashes of the answers (manifest.json), before anyone looks
+    Commit {
+        /// Folder of the cases
+        folder: PathBuf,
+        /// Folder of the answers
+        #[arg(long)]
+        answers: PathBuf,
+    },
+    /// Diagnoses every case that has no verdict yet and publishes the hashes of the verdicts (answered.json)
+    Answer {
+        /// Folder of the cases
+        folder: PathBuf,
+    },
+    /// Puts the answers beside the cases, if they are those that were committed to
+    Reveal {
+        /// Folder of the cases
+        folder: PathBuf,
+        /// Folder of the answers
+        #[arg(long)]
+        answers: PathBuf,
+    },
+    /// Scores verdicts against revealed answers, if neither was changed since its hash was published
+    Score {
+        /// Folder of the cases
+        folder: PathBuf,
+    },
+}
+
+/// Writes verdict.json into the folder of a case.
+pub type Diagnose = dyn Fn(&Path) -> Result<(), Box<dyn Error>>;
+
+/// Takes a step of the protocol; `diagnose` is asked for cases without a verdict.
+///
+/// # Errors
+/// When a file cannot be read or written, or was changed after its hash was published.
+pub fn run(arguments: &Arguments, diagnose: &Diagnose) -> Result<(), BlindError> {
+    match &arguments.step {
+        Step::Deal {
+            folder,
+            answers,
+            seed,
+            r0,
+            r1,
+            r3,
+            r4,
+        } => {
+            let hand = Hand {
+                r0: *r0,
+                r1: *r1,
+                r3: *r3,
+                r4: *r4,
+            };
+            blind::deal(folder, answers, hand, *seed)
+        }
+        Step::Commit { folder, answers } => blind::commit(folder, answers),
+        Step::Answer { folder } => answer(folder, diagnose),
+        Step::Reveal { folder, answers } => blind::reveal(folder, answers),
+        Step::Score { folder } => {
+            let (table, judged) = blind::score(folder)?;
+            for case in judged {
+                println!("{}", blind::line(&case));
+            }
+            println!("\n{table}");
+            Ok(())
+        }
+    }
+}
+
+fn answer(folder: &Path, diagnose: &Diagnose) -> Result<(), BlindError> {
+    let open: Vec<PathBuf> = blind::cases(folder)?
+        .into_iter()
+        .filter(|case| !case.join(VERDICT).exists())
+        .collect();
+    let style =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta}").unwrap_or(ProgressStyle::default_bar());
+    let progress = ProgressBar::new(open.len() as u64).with_style(style);
+    for case in open {
+        progress.set_message(case.display().to_string());
+        if let Err(error) = diagnose(&case) {
+            // The case stays without a verdict and is scored as that.
+            progress.suspend(|| eprintln!("{}: {error}", case.display()));
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let answered = blind::answer(folder)?;
+    println!(
+        "{answered} verdicts, their hashes in {}",
+        folder.join("answered.json").display()
+    );
+    Ok(())
+}

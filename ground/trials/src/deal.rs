@@ -1,0 +1,303 @@
+//! A case folder from a seed, and its answer.
+//!
+//! In: ring and seed. Out: `CASE/{case.toml, unit.toml, measured.txt.gz, motion.csv.gz}` after the case format, and
+//! the [`Answer`]. The unit is flown twice at the same noise, with and without what is wrong, to learn how strong that
+//! is; the strength is then set so that the marginal signal to noise ratio is what the draw asked for.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use emems::{packet, sample::Reading};
+use flate2::{Compression, write::GzEncoder};
+use nalgebra::Vector3;
+use packets::channel::CHANNELS;
+use twin::{
+    environment::Environment,
+    plant::{Plant, Quality},
+};
+
+use crate::{
+    answer::{Answer, Cause},
+    disturbance::{self, Disturbance, novel},
+    draw::Draw,
+    flight::{self, CYCLE_S, Instants},
+    motion::{Style, Wander},
+    scene::Scene,
+    sensitivity::{self, Told},
+    unit,
+};
+
+/// [s] of a case, and where its fit window ends and its hold window begins.
+const DURATION_S: f64 = 600.0;
+const FIT_S: f64 = 300.0;
+
+/// [s] between rows of the record: motions of the trials have no tone above 0.5 Hz.
+const RECORD_S: f64 = 0.02;
+
+/// Marginal signal to noise ratios dealt, least and most.
+const SNR: (f64, f64) = (8.0, 100.0);
+
+/// Where a disturbance's size is measured: far above the rounding of codes.
+const LARGE_SNR: f64 = 400.0;
+
+/// What is wrong with a case, by how much is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Ring {
+    /// Nothing but calibration errors.
+    R0,
+    /// One effect that has a name.
+    R1,
+    /// A disturbance that has none.
+    R3,
+    /// Two effects that have names.
+    R4,
+}
+
+/// A case was not dealt.
+#[derive(Debug, thiserror::Error)]
+pub enum DealError {
+    /// A file cannot be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The unit sent no derived frames.
+    #[error("the unit of seed {0} sent no derived frames: its sampling instants cannot be learnt")]
+    NoInstants(u64),
+}
+
+/// Deals the case `name` of a ring into `folder/name`.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn deal(folder: &Path, name: &str, ring: Ring, seed: u64) -> Result<Answer, DealError> {
+    let mut draw = Draw::new(seed).stream(ring as u64);
+    let chosen = choose(ring, &mut draw);
+    let style = [Style::Positions, Style::Table, Style::Hand][draw.below(3)];
+    let warm = chosen.iter().any(|disturbance| disturbance.warm) || draw.chance(0.3);
+    let site = Environment {
+        field_n_ut: Vector3::new(17.0, -6.9, -14.2) + 2.0 * draw.vector(),
+        ..Environment::laboratory()
+    };
+    let instants = flight::instants(seed).ok_or(DealError::NoInstants(seed))?;
+    let wander = Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1));
+    let fly = |struck: &[(usize, f64)]| {
+        let mut scene = Scene::new(wander.clone(), site, &mut draw.stream(2));
+        let touched: Vec<Vec<usize>> = struck
+            .iter()
+            .map(|(index, strength)| (chosen[*index].apply)(&mut scene, &mut draw.stream(3 + *index as u64), *strength))
+            .collect();
+        let plant = Plant::seeing(&scene.views, scene.source.clone(), seed, Quality::NOMINAL);
+        let mut readings = flight::fly(plant, DURATION_S + 1.0);
+        for transit in &scene.transit {
+            transit(&mut readings);
+        }
+        Flown {
+            readings,
+            scene,
+            touched,
+        }
+    };
+    let quiet = fly(&[]);
+    let snr = |flown: &Flown| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, FIT_S);
+    let mut sizes = draw.stream(9);
+    let mut strengths = Vec::new();
+    let mut energy = 0.0;
+    for (index, disturbance) in chosen.iter().enumerate() {
+        let wanted = sizes.log_uniform(SNR.0, SNR.1);
+        let (strength, reached) = match disturbance.graded {
+            false => (1.0, snr(&fly(&[(index, 1.0)]))),
+            true => {
+                // Near the size of a count, rounding adds to the difference of two flights: measured where it does not
+                // matter and scaled down.
+                let gross = (LARGE_SNR / snr(&fly(&[(index, 1.0)])).max(0.1)).clamp(0.1, 100.0);
+                (wanted * gross / snr(&fly(&[(index, gross)])).max(0.1), wanted)
+            }
+        };
+        energy += reached * reached;
+        strengths.push((index, strength));
+    }
+    let flown = fly(&strengths);
+    write(&folder.join(name), name, style, &flown, &instants)?;
+    let effects = (chosen.iter().zip(&flown.touched).zip(&strengths))
+        .map(|((disturbance, touched), (_, strength))| Cause {
+            effect: disturbance.name.into(),
+            in_library: ring != Ring::R3,
+            channels: touched.iter().map(|index| CHANNELS[*index].name.into()).collect(),
+            strength: *strength,
+        })
+        .collect();
+    Ok(Answer {
+        case: name.into(),
+        ring: format!("{ring:?}"),
+        seed,
+        effects,
+        snr_marginal: energy.sqrt(),
+    })
+}
+
+/// A flight of a scene.
+struct Flown {
+    readings: Vec<Reading>,
+    scene: Scene,
+    touched: Vec<Vec<usize>>,
+}
+
+impl Flown {
+    fn told(&self) -> Told<'_> {
+        Told {
+            readings: &self.readings,
+            record: &self.scene.record,
+            claimed: &self.scene.claimed,
+        }
+    }
+}
+
+fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
+    let mut one_of = |all: &[Disturbance]| all[draw.below(all.len())];
+    let named = disturbance::named();
+    match ring {
+        Ring::R0 => Vec::new(),
+        Ring::R1 => vec![one_of(&named)],
+        Ring::R3 => vec![one_of(novel::ALL)],
+        Ring::R4 => {
+            let graded: Vec<Disturbance> = named.into_iter().filter(|disturbance| disturbance.graded).collect();
+            let first = one_of(&graded);
+            let others: Vec<Disturbance> = graded.into_iter().filter(|other| other.name != first.name).collect();
+            vec![first, one_of(&others)]
+        }
+    }
+}
+
+fn write(folder: &Path, name: &str, style: Style, flown: &Flown, instants: &Instants) -> Result<(), DealError> {
+    let put = |file: &str, bytes: &[u8]| {
+        let path = folder.join(file);
+        let written = match file.ends_with(".gz") {
+            false => fs::write(&path, bytes),
+            true => fs::File::create(&path).and_then(|file| {
+                let mut packed = GzEncoder::new(file, Compression::fast());
+                packed.write_all(bytes)?;
+                packed.finish().map(drop)
+            }),
+        };
+        written.map_err(|source| DealError::Write { path, source })
+    };
+    fs::create_dir_all(folder).map_err(|source| DealError::Write {
+        path: folder.into(),
+        source,
+    })?;
+    let last = (DURATION_S / CYCLE_S) as u16;
+    let frames = flown.readings.iter().filter(|reading| reading.counter < last);
+    let mut stream = Vec::new();
+    for reading in frames {
+        stream.extend(packet::encode(reading));
+        stream.push(b'\n');
+    }
+    put("measured.txt.gz", &stream)?;
+    put("motion.csv.gz", motion_csv(&flown.scene, instants).as_bytes())?;
+    put("unit.toml", unit::toml(instants).as_bytes())?;
+    put("case.toml", case_toml(name, style, &flown.scene.claimed).as_bytes())
+}
+
+fn motion_csv(scene: &Scene, instants: &Instants) -> String {
+    let mut text = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m,temperature_c\n");
+    for row in 0..=((DURATION_S + 1.0) / RECORD_S) as u32 {
+        let case_s = RECORD_S * f64::from(row);
+        let t_s = instants.zero_s + case_s;
+        let (q, place) = (scene.record)(t_s);
+        let temperature_c = scene.source.at(t_s).temperature_c;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{case_s:.2},{:.9},{:.9},{:.9},{:.9},{:.7},{:.7},{:.7},{temperature_c:.4}",
+            q.w, q.i, q.j, q.k, place.x, place.y, place.z
+        );
+    }
+    text
+}
+
+fn case_toml(name: &str, style: Style, claimed: &Environment) -> String {
+    let about = match style {
+        Style::Positions => "Turned slowly from attitude to attitude.",
+        Style::Table => "On a three-axis table.",
+        Style::Hand => "Carried about by hand.",
+    };
+    let field = claimed.field_n_ut;
+    format!(
+        "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"packets\"\nabout = \"{about}\"\nunit = \"unit.toml\"\n\
+         measured = \"measured.txt.gz\"\nmotion = \"motion.csv.gz\"\n\n[environment]\ngravity_m_s2 = {}\n\
+         latitude_deg = {:.6}\nfield_n_ut = [{:.6}, {:.6}, {:.6}]\ntemperature_c = 25.0\n\n[windows]\n\
+         fit = [[0.0, {FIT_S:.1}]]\nhold = [[{FIT_S:.1}, {DURATION_S:.1}]]\n",
+        claimed.gravity,
+        claimed.latitude.to_degrees(),
+        field.x,
+        field.y,
+        field.z
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_is_a_case() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [one, same] = ["A", "B"].map(|name| deal(folder.path(), name, Ring::R1, 5).expect("dealt"));
+        assert_eq!((one.effects, one.snr_marginal), (same.effects, same.snr_marginal));
+        let read = |case: &str, file: &str| fs::read(folder.path().join(case).join(file)).expect(file);
+        for file in ["measured.txt.gz", "motion.csv.gz", "unit.toml"] {
+            assert_eq!(read("A", file), read("B", file), "{file}");
+        }
+    }
+
+    #[test]
+    fn every_disturbance_disturbs_what_it_says_it_touches() {
+        /// [s] long enough for what happens once to have happened.
+        const LONG_S: f64 = 250.0;
+        let site = Environment::laboratory();
+        let instants = flight::instants(3).expect("derived frames");
+        let fly = |struck: Option<Disturbance>| {
+            let wander = Wander::draw(Style::Hand, true, LONG_S + 2.0, &mut Draw::new(11));
+            let mut scene = Scene::new(wander, site, &mut Draw::new(12));
+            let touched = struck.map(|disturbance| (disturbance.apply)(&mut scene, &mut Draw::new(13), 10.0));
+            let plant = Plant::seeing(&scene.views, scene.source.clone(), 3, Quality::NOMINAL);
+            let mut readings = flight::fly(plant, LONG_S + 1.0);
+            scene.transit.iter().for_each(|transit| transit(&mut readings));
+            Flown {
+                readings,
+                scene,
+                touched: touched.into_iter().collect(),
+            }
+        };
+        let quiet = fly(None);
+        let snr = |flown: &Flown| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, LONG_S);
+        assert!(snr(&quiet) < 1e-6);
+        for disturbance in [disturbance::named(), novel::ALL.to_vec()].concat() {
+            let flown = fly(Some(disturbance));
+            assert!(snr(&flown) > 5.0, "{}: {}", disturbance.name, snr(&flown));
+            let touched = &flown.touched[0];
+            for (index, channel) in CHANNELS
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| !touched.contains(index))
+            {
+                let same = (flown.readings.iter().zip(&quiet.readings))
+                    .all(|(one, other)| packets::channel::counts(one)[index] == packets::channel::counts(other)[index]);
+                assert!(
+                    same || disturbance.name == "packet-loss",
+                    "{} touches {}",
+                    disturbance.name,
+                    channel.name
+                );
+            }
+        }
+    }
+}

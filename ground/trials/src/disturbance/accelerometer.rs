@@ -1,0 +1,145 @@
+//! What is wrong with accelerometers.
+
+use nalgebra::{Matrix3, Vector3};
+use packets::channel::Quantity::SpecificForce;
+use twin::geometry;
+
+use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
+use crate::{
+    draw::Draw,
+    scene::{Scene, changed, lagged, shifted},
+};
+
+/// [m/s2] of one milli-g.
+const MG: f64 = 9.80665e-3;
+
+/// All of this file.
+pub const ALL: &[Disturbance] = &[
+    graded("accel-bias", bias),
+    warm("accel-bias-temperature", bias_temperature),
+    graded("accel-scale", scale),
+    warm("accel-scale-temperature", scale_temperature),
+    graded("accel-misalignment", misalignment),
+    graded("accel-nonlinearity", nonlinearity),
+    graded("lever-arm", lever_arm),
+    graded("accel-latency", latency),
+    gross("accel-high-pass", high_pass),
+    gross("accel-range", range),
+];
+
+fn bias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let b = strength * 10.0 * MG * draw.vector();
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + b);
+    }
+    channels(SpecificForce, &plates)
+}
+
+fn bias_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let (k, bend) = (strength * 0.4 * MG * draw.vector(), draw.uniform(-0.015, 0.015));
+        let source = scene.source.clone();
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
+            let warmth = source.at(t).temperature_c - 25.0;
+            force + k * warmth * (1.0 + bend * warmth)
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+fn scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let s = strength * 0.008 * draw.vector();
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
+            force + s.component_mul(&force)
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let (k, bend) = (strength * 2e-4 * draw.vector(), draw.uniform(-0.015, 0.015));
+        let source = scene.source.clone();
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
+            let warmth = source.at(t).temperature_c - 25.0;
+            force + k.component_mul(&force) * (warmth * (1.0 + bend * warmth))
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// Three axes that are not square to each other.
+fn misalignment(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let skew = Matrix3::from_fn(|row, column| {
+            if row == column {
+                0.0
+            } else {
+                strength * 0.008 * draw.normal()
+            }
+        });
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + skew * force);
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// Second order, each axis its own.
+fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let a = strength * 6e-4 * draw.vector();
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
+            force + a.component_mul(&force.component_mul(&force))
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// The unit turns about another point than its drawing says: all plates are off by one vector.
+fn lever_arm(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let offset_b = strength * 0.01 * draw.direction();
+    for plate in ALL_PLATES {
+        let (source, dcm_pb) = (scene.source.clone(), geometry::dcm_bp(plate).transpose());
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
+            let truth = source.at(t);
+            let tangential = truth.rate_dot_b.cross(&offset_b);
+            force + dcm_pb * (tangential + truth.rate_b.cross(&truth.rate_b.cross(&offset_b)))
+        });
+    }
+    channels(SpecificForce, &ALL_PLATES)
+}
+
+fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    for view in &mut scene.views.force_p {
+        *view = shifted(view, move |t| t - delay_s);
+    }
+    channels(SpecificForce, &ALL_PLATES)
+}
+
+fn high_pass(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
+    let (plates, tau_s) = (plates(draw), draw.log_uniform(0.5, 3.0));
+    for &plate in &plates {
+        let slow = lagged(&scene.views.force_p[plate], tau_s);
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| force - slow(t));
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// A full scale other than the register map says: codes worth twice or four times as much.
+fn range(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    let factor = if draw.chance(0.5) { 0.5 } else { 0.25 };
+    for &plate in &plates {
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force: Vector3<f64>| {
+            force * factor
+        });
+    }
+    channels(SpecificForce, &plates)
+}

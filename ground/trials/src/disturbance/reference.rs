@@ -1,0 +1,135 @@
+//! What is wrong with the reference: the truth instrument's record, the environment as stated, a plate's place.
+
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use packets::channel::Quantity::{Field, Rate, SpecificForce};
+use twin::geometry;
+
+use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving};
+use crate::{
+    draw::Draw,
+    scene::{Scene, changed, shifted},
+};
+
+/// All of this file.
+pub const ALL: &[Disturbance] = &[
+    graded("plate-rotation", plate_rotation),
+    graded("gravity-value", gravity_value),
+    graded("table-tilt", table_tilt),
+    graded("mounting", mounting),
+    graded("reference-lag", reference_lag),
+    graded("field-model", field_model),
+    graded("latency", latency),
+    graded("read-skew", read_skew),
+    graded("clock-rate", clock_rate),
+    gross("reference-sign", reference_sign),
+];
+
+/// A plate screwed on askew turns its three sensors together.
+fn plate_rotation(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plate = draw.below(4);
+    let turn_b = nalgebra::Rotation3::new(strength * 0.01 * draw.direction());
+    let dcm_bp = geometry::dcm_bp(plate);
+    let turn_p = dcm_bp.transpose() * turn_b.matrix() * dcm_bp;
+    scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| turn_p * force);
+    scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |_, field| turn_p * field);
+    let (axis_b, source) = (geometry::gyro_axis_b(plate), scene.source.clone());
+    // Turning the plate by R turns what it measures by R' in b.
+    let change_b = turn_b.inverse() * axis_b - axis_b;
+    scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
+        rate + change_b.dot(&source.at(t).rate_b)
+    });
+    [SpecificForce, Field, Rate]
+        .into_iter()
+        .flat_map(|quantity| channels(quantity, &[plate]))
+        .collect()
+}
+
+fn gravity_value(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    scene.claimed.gravity += strength * draw.sign() * 0.02;
+    channels(SpecificForce, &ALL_PLATES)
+}
+
+/// The table stands askew: everything the record says is turned by a rotation fixed in n about a level axis.
+fn table_tilt(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let way = draw.uniform(0.0, std::f64::consts::TAU);
+    let tilt = UnitQuaternion::from_scaled_axis(strength * 0.005 * Vector3::new(way.cos(), way.sin(), 0.0));
+    let record = scene.record.clone();
+    scene.record = Arc::new(move |t| {
+        let (q_nb, place_n) = record(t);
+        (tilt * q_nb, tilt * place_n)
+    });
+    moving()
+}
+
+/// The unit sits askew on what is measured: the record is turned by a rotation fixed in b.
+fn mounting(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let askew = UnitQuaternion::from_scaled_axis(strength * 0.01 * draw.direction());
+    let record = scene.record.clone();
+    scene.record = Arc::new(move |t| {
+        let (q_nb, place_n) = record(t);
+        (q_nb * askew, place_n)
+    });
+    moving()
+}
+
+/// The record is late.
+fn reference_lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    let record = scene.record.clone();
+    scene.record = Arc::new(move |t| record(t - delay_s));
+    moving()
+}
+
+fn field_model(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    scene.claimed.field_n_ut += strength * 0.4 * draw.vector();
+    channels(Field, &ALL_PLATES)
+}
+
+/// Everything the unit says is late, with a little jitter.
+fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    every_view_at(scene, move |t| t - delay_s);
+    moving()
+}
+
+/// Sensors are read one after the other, later than the description says, each by the same step more.
+fn read_skew(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let step_s = strength * draw.uniform(0.5, 1.5) * 0.002;
+    for plate in ALL_PLATES {
+        let late = |slot: usize| move |t: f64| t + step_s * slot as f64;
+        scene.views.force_p[plate] = shifted(&scene.views.force_p[plate], late(plate));
+        scene.views.field_p_ut[plate] = shifted(&scene.views.field_p_ut[plate], late(4 + plate));
+        scene.views.rate[plate] = shifted(&scene.views.rate[plate], late(8 + plate));
+    }
+    moving()
+}
+
+fn clock_rate(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let rate = 1.0 + strength * draw.sign() * draw.uniform(0.5, 1.5) * 1e-4;
+    every_view_at(scene, move |t| t * rate);
+    moving()
+}
+
+/// The record turns one way about one axis where the unit turned the other.
+fn reference_sign(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
+    let axis = draw.below(3);
+    let record = scene.record.clone();
+    scene.record = Arc::new(move |t| {
+        let (q_nb, place_n) = record(t);
+        let mut vector = q_nb.into_inner();
+        // The sign of one angle of a turn vector.
+        vector.coords[axis] = -vector.coords[axis];
+        (UnitQuaternion::from_quaternion(vector), place_n)
+    });
+    moving()
+}
+
+fn every_view_at(scene: &mut Scene, time: impl Fn(f64) -> f64 + Copy + Send + Sync + 'static) {
+    for plate in ALL_PLATES {
+        scene.views.force_p[plate] = shifted(&scene.views.force_p[plate], time);
+        scene.views.field_p_ut[plate] = shifted(&scene.views.field_p_ut[plate], time);
+        scene.views.rate[plate] = shifted(&scene.views.rate[plate], time);
+    }
+}

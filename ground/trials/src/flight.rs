@@ -1,0 +1,149 @@
+//! The unit flown on the host board: packets out, and the instants at which its sensors sampled.
+//!
+//! In: a plant. Out: readings by packet, or for [`instants`] the time of each channel's sample after its packet's time
+//! zero. Those are found by listening at the parts: a view that writes down when it is asked hears every conversion.
+
+use std::sync::{Arc, Mutex};
+
+use emems::{
+    derived::{self, DERIVED_BYTES, Derived},
+    packet,
+    sample::Reading,
+    unit::Settings,
+};
+use packets::channel::{CHANNEL_COUNT, CHANNELS, Quantity};
+use twin::{
+    host::{self, timing::BOOT},
+    motion,
+    part::{Input, Nanos},
+    plant::{Plant, Quality, Views},
+    run::{Bench, Flow},
+};
+
+/// [s] read cycle of the unit's nominal settings.
+pub const CYCLE_S: f64 = 0.2;
+
+/// [s] flown to learn the instants.
+const LISTEN_S: f64 = 6.0;
+
+/// When the unit's samples are made.
+#[derive(Clone, Debug)]
+pub struct Instants {
+    /// [s] after power-on at which packet 0 has its time zero.
+    pub zero_s: f64,
+    /// [s] each channel's sampling instant after its packet's time zero; at least zero.
+    pub slots_s: [f64; CHANNEL_COUNT],
+}
+
+/// What the lines said.
+#[derive(Default)]
+struct Heard {
+    readings: Vec<Reading>,
+    derived: Vec<Derived>,
+    words: Vec<u8>,
+}
+
+impl Bench for Heard {
+    fn telemetry(&mut self, _at: Nanos, bytes: &[u8]) {
+        if let Ok(reading) = packet::decode(bytes) {
+            self.readings.push(reading);
+        } else if bytes.len() == DERIVED_BYTES {
+            self.derived.extend(derived::decode(bytes));
+        }
+    }
+
+    fn umbilical(&mut self, _at: Nanos, _bytes: &[u8]) {}
+
+    fn log(&mut self, _at: Nanos, _line: &str) {}
+
+    fn commands(&mut self, _now: Nanos) -> Vec<u8> {
+        std::mem::take(&mut self.words)
+    }
+
+    fn advanced(&mut self, _now: Nanos) -> Flow {
+        Flow::Continue
+    }
+}
+
+/// Flies a plant for `duration_s` after power-on.
+pub fn fly(plant: Plant, duration_s: f64) -> Vec<Reading> {
+    let mut heard = Heard::default();
+    host::fly(plant, Settings::NOMINAL, &[], nanos(duration_s), &mut heard);
+    heard.readings
+}
+
+/// Sampling instants of the unit of this seed: its parts' clocks have their own phases.
+pub fn instants(seed: u64) -> Option<Instants> {
+    let source: Arc<dyn twin::truth::TruthSource> = motion::by_name("still")?.into();
+    let views = Views::of(&source);
+    // One list of times a sensor, in reading order; gyros' temperature is sampled with their rate.
+    let asked: Vec<Arc<Mutex<Vec<f64>>>> = (0..16).map(|_| Arc::default()).collect();
+    let views = Views {
+        force_p: std::array::from_fn(|plate| listened(&views.force_p[plate], &asked[plate])),
+        field_p_ut: std::array::from_fn(|plate| listened(&views.field_p_ut[plate], &asked[4 + plate])),
+        rate: std::array::from_fn(|plate| listened(&views.rate[plate], &asked[8 + plate])),
+        ..views
+    };
+    let mut heard = Heard {
+        words: b"G_DL".to_vec(),
+        ..Heard::default()
+    };
+    let plant = Plant::seeing(&views, source, seed, Quality::NOMINAL);
+    host::fly(plant, Settings::NOMINAL, &[], nanos(LISTEN_S), &mut heard);
+    let derived = heard.derived.last()?;
+    let start_s = 1e-6 * derived.start_us as f64 + 1e-9 * BOOT as f64;
+    let packet_zero_s = start_s - CYCLE_S * f64::from(derived.counter);
+    let mut slots_s = [0.0; CHANNEL_COUNT];
+    for (slot_s, channel) in slots_s.iter_mut().zip(CHANNELS) {
+        let read_s = 1e-6 * f64::from(*derived.slots_us.get(channel.slot())?);
+        *slot_s = match channel.quantity {
+            // Thermometers convert rarely and what they measure is slow.
+            Quantity::Temperature | Quantity::GyroTemperature => read_s,
+            _ => {
+                let times = asked.get(channel.slot())?.lock().ok()?;
+                // The newest conversion that was complete when the sensor was read; half a bit of bus time to spare.
+                let newest = times.iter().copied().filter(|time| *time <= start_s + read_s + 1e-6);
+                newest.fold(f64::MIN, f64::max) - start_s
+            }
+        };
+    }
+    let earliest = slots_s.iter().copied().fold(f64::MAX, f64::min);
+    Some(Instants {
+        zero_s: packet_zero_s + earliest,
+        slots_s: slots_s.map(|slot_s| slot_s - earliest),
+    })
+}
+
+fn listened<T: 'static>(view: &Input<T>, asked: &Arc<Mutex<Vec<f64>>>) -> Input<T> {
+    let (view, asked) = (view.clone(), asked.clone());
+    Arc::new(move |t_s| {
+        if let Ok(mut asked) = asked.lock() {
+            asked.push(t_s);
+        }
+        view(t_s)
+    })
+}
+
+fn nanos(seconds: f64) -> Nanos {
+    (seconds * 1e9) as Nanos
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// [s] a set of a magnetometer at 75 Hz or an accelerometer at 50 Hz is at most this old, and reading all takes 5 ms.
+    const OLDEST: f64 = 0.026;
+
+    #[test]
+    fn samples_are_a_little_older_than_their_reading_and_differ_between_units() {
+        let [one, other] = [1, 2].map(|seed| instants(seed).expect("derived frames"));
+        assert!(
+            one.slots_s.iter().all(|slot| (0.0..OLDEST).contains(slot)),
+            "{:?}",
+            one.slots_s
+        );
+        assert_eq!(one.slots_s[0], one.slots_s[1]);
+        assert_ne!(one.slots_s, other.slots_s);
+    }
+}

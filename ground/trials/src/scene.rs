@@ -1,0 +1,138 @@
+//! A trial before it is flown: the world, what the parts see of it, what becomes of the stream, what the record says.
+//!
+//! A [`Scene`] starts as a unit that is off its description only as far as its calibration sigmas allow; disturbances
+//! then change one thing or another. All views are functions of time since power-on.
+
+use std::sync::Arc;
+
+use emems::sample::Reading;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use packets::channel::Quantity;
+use twin::{
+    environment::{Environment, World},
+    geometry,
+    motion::Motion,
+    part::Input,
+    plant::Views,
+    truth::TruthSource,
+};
+
+use crate::{draw::Draw, motion::Wander, unit::kind};
+
+/// What the truth instrument writes for an instant: attitude q_nb and position in n.
+pub type Record = Arc<dyn Fn(f64) -> (UnitQuaternion<f64>, Vector3<f64>) + Send + Sync>;
+
+/// Something that happens to the packets between the unit and the file.
+pub type Transit = Box<dyn Fn(&mut Vec<Reading>) + Send + Sync>;
+
+/// A trial before it is flown.
+pub struct Scene {
+    /// How the unit really moves.
+    pub motion: Arc<Wander>,
+    /// Where.
+    pub site: Environment,
+    /// Truth at the centre.
+    pub source: Arc<dyn TruthSource>,
+    /// What the parts see.
+    pub views: Views,
+    /// What happens to the packets, in order.
+    pub transit: Vec<Transit>,
+    /// What the truth instrument writes.
+    pub record: Record,
+    /// The environment as the case states it.
+    pub claimed: Environment,
+}
+
+impl Scene {
+    /// The undisturbed unit of a draw: scales and axes off by their sigmas.
+    pub fn new(motion: Wander, site: Environment, draw: &mut Draw) -> Self {
+        let motion = Arc::new(motion);
+        let source: Arc<dyn TruthSource> = Arc::new(World {
+            motion: (*motion).clone(),
+            environment: site,
+        });
+        let mut views = Views::of(&source);
+        for plate in 0..geometry::PLATES {
+            let force = imperfect(Quantity::SpecificForce, draw);
+            views.force_p[plate] = changed(&views.force_p[plate], move |_, force_p| force * force_p);
+            let field = imperfect(Quantity::Field, draw);
+            views.field_p_ut[plate] = changed(&views.field_p_ut[plate], move |_, field_p| field * field_p);
+            let facts = kind(Quantity::Rate);
+            let (scale, tilt) = (1.0 + facts.scale * draw.normal(), facts.axis_rad * draw.vector());
+            let (source, axis_b) = (source.clone(), geometry::gyro_axis_b(plate));
+            let tilt = tilt - axis_b * axis_b.dot(&tilt);
+            views.rate[plate] = Arc::new(move |t_s| scale * (axis_b + tilt).dot(&source.at(t_s).rate_b));
+        }
+        let record: Record = {
+            let motion = motion.clone();
+            Arc::new(move |t_s| (motion.at(t_s).attitude.q_nb, motion.position_n(t_s)))
+        };
+        Scene {
+            motion,
+            site,
+            source,
+            views,
+            transit: Vec::new(),
+            record,
+            claimed: site,
+        }
+    }
+}
+
+/// Scale and axis errors of a part of three axes.
+fn imperfect(quantity: Quantity, draw: &mut Draw) -> Matrix3<f64> {
+    let facts = kind(quantity);
+    Matrix3::from_fn(|row, column| match row == column {
+        true => 1.0 + facts.scale * draw.normal(),
+        false => facts.axis_rad * draw.normal(),
+    })
+}
+
+/// A view with something done to what it shows; the change sees the time.
+pub fn changed<T: 'static>(view: &Input<T>, change: impl Fn(f64, T) -> T + Send + Sync + 'static) -> Input<T> {
+    let view = view.clone();
+    Arc::new(move |t_s| change(t_s, view(t_s)))
+}
+
+/// A view at another time than the present.
+pub fn shifted<T: 'static>(view: &Input<T>, time: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Input<T> {
+    let view = view.clone();
+    Arc::new(move |t_s| view(time(t_s)))
+}
+
+/// A view through a first-order lag: the mean of the past under exp(-s/tau)/tau, by Gauss and Laguerre with five nodes
+/// (Abramowitz and Stegun, table 25.9), exact for a view that is a polynomial of the ninth degree over some lags.
+pub fn lagged<T>(view: &Input<T>, tau_s: f64) -> Input<T>
+where
+    T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T> + 'static,
+{
+    const NODES: [(f64, f64); 4] = [
+        (1.413_403_059_107, 0.398_666_811_083),
+        (3.596_425_771_041, 0.075_942_449_681_7),
+        (7.085_810_005_859, 0.003_611_758_679_92),
+        (12.640_800_844_276, 2.336_997_238_58e-5),
+    ];
+    const FIRST: (f64, f64) = (0.263_560_319_718, 0.521_755_610_583);
+    let view = view.clone();
+    Arc::new(move |t_s| {
+        let at = |(node, weight): (f64, f64)| view(t_s - node * tau_s) * weight;
+        NODES.into_iter().fold(at(FIRST), |sum, node| sum + at(node))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_of_a_sine_is_the_filters() {
+        let (tau, w) = (0.05, 4.0_f64);
+        let sine: Input<f64> = Arc::new(move |t: f64| (w * t).sin());
+        let lagged = lagged(&sine, tau);
+        for step in 0..50 {
+            let t = 0.1 * f64::from(step);
+            let exact = ((w * t).sin() - w * tau * (w * t).cos()) / (1.0 + (w * tau).powi(2));
+            assert!((lagged(t) - exact).abs() < 1e-6, "{} {exact}", lagged(t));
+        }
+    }
+}
