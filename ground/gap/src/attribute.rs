@@ -20,7 +20,7 @@ use crate::{
 const MARGIN: f64 = 3.0;
 
 /// Candidates of a screen that are fitted exactly.
-const CANDIDATES: usize = 6;
+const CANDIDATES: usize = 4;
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
@@ -134,6 +134,11 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         let mut with = model.clone();
         with.push(hypothesis.component(&DVector::zeros(0)));
         let touched = hypothesis.cause.channels(unit);
+        // No effect takes off more than there is above the noise.
+        let excess: f64 = touched.iter().map(|channel| before[*channel] - problem.frames[*channel].series.rows.len() as f64).sum();
+        if 0.5 * excess + hypothesis.log_prior < 0.0 {
+            continue;
+        }
         let fall: f64 = touched.iter().map(|channel| before[*channel] - energy(*channel, &with)).sum();
         gains[index] = 0.5 * fall + hypothesis.log_prior;
     }

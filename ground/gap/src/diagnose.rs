@@ -12,7 +12,7 @@ use crate::{
     confusion,
     evidence::probabilities,
     held::{Finished, Shrink},
-    leftover::{self, Leftover},
+    leftover::{self, Leftover, STRETCHES, View},
     library::Library,
     model::Model,
     problem::Problem,
@@ -32,6 +32,12 @@ const SUSPICIOUS: f64 = 5.0;
 
 /// Prior probability that a unit has something the library does not.
 const UNKNOWN_PRIOR: f64 = 0.05;
+
+/// Channels whose residuals are shown.
+const TRACES: usize = 6;
+
+/// Points of a trace: more are not told apart on a page.
+const POINTS: usize = 1500;
 
 /// Share of an effect's energy below which a channel is not named.
 const NAMED_SHARE: f64 = 0.02;
@@ -74,6 +80,17 @@ pub struct Cause {
     pub is_suspicious: bool,
 }
 
+/// One channel's residual on the fit windows.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Its channel.
+    pub name: String,
+    /// ([s], [sigma]) by the nominal twin.
+    pub before: Vec<(f64, f64)>,
+    /// ([s], [sigma]) with effect and calibration in.
+    pub after: Vec<(f64, f64)>,
+}
+
 /// What a case says.
 pub struct Diagnosis {
     /// Root mean square residual on the fit windows, in sigma.
@@ -100,6 +117,10 @@ pub struct Diagnosis {
     pub limits: Vec<confusion::Limit>,
     /// The effects as the unit's description would list them.
     pub known: Vec<twin::predict::KnownEffect>,
+    /// Residuals of the channels that stand out most.
+    pub traces: Vec<Trace>,
+    /// Per channel, the gap in each of [`STRETCHES`] stretches of the fit windows.
+    pub cells: Vec<(String, Vec<f64>)>,
     /// The pair most worth telling apart, for planning.
     pub rivals: Option<confusion::Pair>,
 }
@@ -167,6 +188,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         limits: confusion::limits(&library),
         known: model.components.iter().filter(|_| withdrawn.is_empty()).map(|component| component.active.to_known()).collect(),
         rivals: confusion::pair(&library, &found),
+        traces: traces(&problem, &model),
+        cells: cells(&problem, &views),
         causes,
         withdrawn,
     }
@@ -340,4 +363,38 @@ fn alone(library: &Library, found: &Attribution) -> Vec<(String, f64)> {
     }
     best.sort_by(|one, other| other.1.total_cmp(&one.1));
     best
+}
+
+/// Residuals of the channels whose gap is largest.
+fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
+    let twin = problem.twin;
+    let mut order: Vec<(usize, f64)> = (0..problem.frames.len())
+        .map(|channel| (channel, problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64))
+        .collect();
+    order.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let trace = |(channel, _): &(usize, f64)| {
+        let series = &problem.frames[*channel].series;
+        let nominal = problem.predict(*channel, &[]);
+        let step = series.rows.len().div_ceil(POINTS).max(1);
+        let points = |predicted: &[f64]| {
+            let pairs = series.rows.iter().zip(&series.values).step_by(step);
+            pairs.map(|(row, value)| (twin.starts_s()[*row as usize], (value - predicted[*row as usize]) / problem.sigmas[*channel])).collect()
+        };
+        Trace { name: twin.unit().channels[*channel].name.clone(), before: points(&nominal), after: points(&model.predicted[*channel]) }
+    };
+    order.iter().take(TRACES).map(trace).collect()
+}
+
+/// The gap of each channel in each stretch of the fit windows.
+fn cells(problem: &Problem, views: &[View]) -> Vec<(String, Vec<f64>)> {
+    let cell = |(channel, view): (usize, &View)| {
+        let mut sums = vec![(0.0, 0.0); STRETCHES];
+        let scale = problem.frames[channel].weight_sigma / problem.sigmas[channel];
+        for (phase, value) in view.phase.iter().zip(problem.residual(channel, &[]).iter()) {
+            let sum = &mut sums[((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)];
+            *sum = (sum.0 + (value * scale).powi(2), sum.1 + 1.0);
+        }
+        (view.name.clone(), sums.into_iter().map(|(energy, samples)| f64::sqrt(energy / samples)).collect())
+    };
+    views.iter().enumerate().map(cell).collect()
 }

@@ -14,6 +14,7 @@
 
 pub mod attribute;
 pub mod case;
+pub mod command;
 pub mod confusion;
 pub mod diagnose;
 pub mod evidence;
@@ -24,10 +25,16 @@ pub mod leftover;
 pub mod library;
 pub mod log;
 pub mod model;
+pub mod next;
+pub mod page;
 pub mod problem;
 pub mod products;
 pub mod refine;
 pub mod regime;
 pub mod scatter;
 pub mod sight;
+pub mod terminal;
+pub mod verdict;
 pub mod windows;
+
+pub use command::{Arguments, GapError, run};

@@ -63,7 +63,7 @@ pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
         return format!("{} and {} are apart already ({:.1e} errors). To be sure: {}", names.0, names.1, before, confirm.unwrap_or_default());
     }
     let tried = CATALOGUE.iter().filter_map(|experiment| {
-        let (nats, minutes) = separation(subject, pair, &(experiment.motion)())?;
+        let (nats, minutes) = separation(subject, pair, (experiment.motion)().as_ref())?;
         Some((nats / minutes, nats, minutes, experiment.name))
     });
     let best = tried.max_by(|one, other| one.0.total_cmp(&other.0));

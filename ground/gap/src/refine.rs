@@ -16,7 +16,10 @@ use crate::{
 const STEPS: usize = 8;
 
 /// [nats] that are not worth another step.
-const CONVERGED: f64 = 0.02;
+const CONVERGED: f64 = 0.05;
+
+/// [nats] above which the slopes are worth renewing.
+const CURVED: f64 = 1.0;
 
 /// A set of hypotheses fitted exactly.
 #[derive(Clone, Debug)]
@@ -71,7 +74,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         if is_done {
             break;
         }
-        if step > 0 {
+        if step > 0 && point.to_gain > CURVED {
             slopes.truncate(library.reference);
             let model = model_of(library, set, &thetas);
             slopes.extend((0..set.len()).flat_map(|index| problem.slopes(&model, index)));
