@@ -57,7 +57,10 @@ pub struct Attribution {
 impl Attribution {
     /// The chosen effects as a model.
     pub fn model(&self, library: &Library) -> Vec<Component> {
-        self.chosen.iter().map(|chosen| library.hypotheses[chosen.hypothesis].component(&chosen.theta)).collect()
+        self.chosen
+            .iter()
+            .map(|chosen| library.hypotheses[chosen.hypothesis].component(&chosen.theta))
+            .collect()
     }
 }
 
@@ -103,16 +106,31 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     // A rival that does better in the place of a chosen one takes it; the comparison is then made anew.
     for _ in 0..MOST_EFFECTS {
         let swap = chosen.iter().enumerate().find(|(at, chosen)| {
-            chosen.rivals.first().is_some_and(|(rival, gain)| *rival != set[*at] && *gain > chosen.gain)
+            chosen
+                .rivals
+                .first()
+                .is_some_and(|(rival, gain)| *rival != set[*at] && *gain > chosen.gain)
         });
-        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0].0)) else { break };
+        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0].0)) else {
+            break;
+        };
         set[at] = winner;
-        let start: Vec<DVector<f64>> = set.iter().enumerate().map(|(i, h)| {
-            if i == at { DVector::zeros(library.hypotheses[*h].parameters.len()) } else { best.thetas[i].clone() }
-        }).collect();
+        let start: Vec<DVector<f64>> = set
+            .iter()
+            .enumerate()
+            .map(|(i, h)| {
+                if i == at {
+                    DVector::zeros(library.hypotheses[*h].parameters.len())
+                } else {
+                    best.thetas[i].clone()
+                }
+            })
+            .collect();
         best = refine(problem, library, &set, &start);
         scores = renewed_scores(problem, library, &set, &best);
-        chosen = (0..set.len()).map(|at| compare(problem, library, &scores, &set, &best, at)).collect();
+        chosen = (0..set.len())
+            .map(|at| compare(problem, library, &scores, &set, &best, at))
+            .collect();
     }
     chosen.sort_by(|one, other| other.gain.total_cmp(&one.gain));
     Attribution { chosen, scores, alone }
@@ -124,9 +142,13 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
     let unit = problem.twin.unit();
     let energy = |channel: usize, model: &[Component]| {
         let residual = problem.residual(channel, model);
-        problem.frames[channel].normal(&DMatrix::zeros(residual.len(), 0), &residual).energy
+        problem.frames[channel]
+            .normal(&DMatrix::zeros(residual.len(), 0), &residual)
+            .energy
     };
-    let before: Vec<f64> = (0..unit.channels.len()).map(|channel| energy(channel, &model)).collect();
+    let before: Vec<f64> = (0..unit.channels.len())
+        .map(|channel| energy(channel, &model))
+        .collect();
     for (index, hypothesis) in library.hypotheses.iter().enumerate() {
         if !library.is_discrete(index) || set.contains(&index) {
             continue;
@@ -135,11 +157,17 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         with.push(hypothesis.component(&DVector::zeros(0)));
         let touched = hypothesis.cause.channels(unit);
         // No effect takes off more than there is above the noise.
-        let excess: f64 = touched.iter().map(|channel| before[*channel] - problem.frames[*channel].series.rows.len() as f64).sum();
+        let excess: f64 = touched
+            .iter()
+            .map(|channel| before[*channel] - problem.frames[*channel].series.rows.len() as f64)
+            .sum();
         if 0.5 * excess + hypothesis.log_prior < 0.0 {
             continue;
         }
-        let fall: f64 = touched.iter().map(|channel| before[*channel] - energy(*channel, &with)).sum();
+        let fall: f64 = touched
+            .iter()
+            .map(|channel| before[*channel] - energy(*channel, &with))
+            .sum();
         gains[index] = 0.5 * fall + hypothesis.log_prior;
     }
 }
@@ -189,23 +217,31 @@ fn gains(library: &Library, scores: &[f64], set: &[usize], base: f64) -> Vec<f64
 fn is_physical(library: &Library, set: &[usize], refined: &Refined) -> bool {
     let mut at = library.reference;
     set.iter().zip(&refined.thetas).all(|(hypothesis, theta)| {
-        library.hypotheses[*hypothesis].parameters.iter().zip(theta.iter()).all(|(parameter, value)| {
-            let sigma = refined.estimate.covariance[(at, at)].sqrt();
-            at += 1;
-            parameter.signed || *value > -2.0 * sigma
-        })
+        library.hypotheses[*hypothesis]
+            .parameters
+            .iter()
+            .zip(theta.iter())
+            .all(|(parameter, value)| {
+                let sigma = refined.estimate.covariance[(at, at)].sqrt();
+                at += 1;
+                parameter.signed || *value > -2.0 * sigma
+            })
     })
 }
 
 /// Scores of every column about a refined set, whose own columns are renewed in place; its parameters count from zero.
 fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refined: &Refined) -> Vec<f64> {
     let model = model_of(library, set, &refined.thetas);
-    let mut residuals: Vec<DVector<f64>> = (0..problem.frames.len()).map(|channel| problem.residual(channel, &model)).collect();
+    let mut residuals: Vec<DVector<f64>> = (0..problem.frames.len())
+        .map(|channel| problem.residual(channel, &model))
+        .collect();
     let mut slopes = refined.slopes.iter().skip(library.reference);
     for (hypothesis, theta) in set.iter().zip(&refined.thetas) {
         for (place, value) in library.hypotheses[*hypothesis].places.iter().zip(theta.iter()) {
             let Some(slope) = slopes.next() else { continue };
-            slope.iter().for_each(|(channel, values)| residuals[*channel].axpy(*value, values, 1.0));
+            slope
+                .iter()
+                .for_each(|(channel, values)| residuals[*channel].axpy(*value, values, 1.0));
             library.products.renew(problem, *place, slope.clone());
         }
     }
@@ -238,7 +274,10 @@ fn compare(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], 
     thetas.remove(at);
     let without = refine(problem, library, &others, &thetas);
     let base = estimate_of(library, scores, &others);
-    let mut rivals = vec![(own, best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior)];
+    let mut rivals = vec![(
+        own,
+        best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior,
+    )];
     let mut linear = gains(library, scores, &others, base);
     linear[own] = f64::NEG_INFINITY;
     for rival in leading(&linear, CANDIDATES) {
@@ -246,11 +285,18 @@ fn compare(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], 
         tried.push(rival);
         let refined = refine(problem, library, &tried, &thetas);
         if is_physical(library, &tried, &refined) {
-            rivals.push((rival, refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior));
+            rivals.push((
+                rival,
+                refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior,
+            ));
         }
     }
     rivals.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let from = library.reference + set[..at].iter().map(|h| library.hypotheses[*h].parameters.len()).sum::<usize>();
+    let from = library.reference
+        + set[..at]
+            .iter()
+            .map(|h| library.hypotheses[*h].parameters.len())
+            .sum::<usize>();
     let width = best.thetas[at].len();
     Chosen {
         hypothesis: own,

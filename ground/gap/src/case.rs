@@ -174,18 +174,29 @@ impl Opened {
     /// # Errors
     /// When it cannot be read or a key is wrong.
     pub fn open(path: &Path) -> Result<Self, CaseError> {
-        let file = if path.is_dir() { path.join("case.toml") } else { path.to_path_buf() };
+        let file = if path.is_dir() {
+            path.join("case.toml")
+        } else {
+            path.to_path_buf()
+        };
         let bytes = read_bytes(&file)?;
         let text = String::from_utf8(bytes).map_err(|_| CaseError::key(&file, "encoding", "is not UTF-8"))?;
         let text: CaseFile = toml::from_str(&text).map_err(|error| text::toml_problem(&file, &error))?;
         if text.format != "gap-case/1" {
-            return Err(CaseError::key(&file, "format", format!("is {:?}, known is \"gap-case/1\"", text.format)));
+            return Err(CaseError::key(
+                &file,
+                "format",
+                format!("is {:?}, known is \"gap-case/1\"", text.format),
+            ));
         }
         if text.kind != Kind::Table && text.motion.is_none() {
             return Err(CaseError::key(&file, "motion", "is absent; only a table needs none"));
         }
-        let windows = Windows::new(spans(&file, "windows.fit", &text.windows.fit)?, spans(&file, "windows.hold", &text.windows.hold)?)
-            .map_err(|problem| CaseError::key(&file, "windows", problem.to_string()))?;
+        let windows = Windows::new(
+            spans(&file, "windows.fit", &text.windows.fit)?,
+            spans(&file, "windows.hold", &text.windows.hold)?,
+        )
+        .map_err(|problem| CaseError::key(&file, "windows", problem.to_string()))?;
         Ok(Opened { file, text, windows })
     }
 
@@ -209,7 +220,10 @@ fn spans(file: &Path, key: &str, edges: &[Edge]) -> Result<Vec<Span>, CaseError>
     }
     let span = |edge: &Edge| match *edge {
         Edge::Pair([from, to]) => Span { from, to },
-        Edge::Row(row) => Span { from: row - 0.5, to: row + 0.5 },
+        Edge::Row(row) => Span {
+            from: row - 0.5,
+            to: row + 0.5,
+        },
     };
     Ok(edges.iter().map(span).collect())
 }

@@ -23,7 +23,9 @@ use crate::{
 /// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
 /// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ground gap cases/flight-7\n  ground gap limits cases/flight-7\n  ground gap cases/flight-7 --out verdicts/flight-7")]
+#[command(
+    after_help = "Examples:\n  ground gap cases/flight-7\n  ground gap limits cases/flight-7\n  ground gap cases/flight-7 --out verdicts/flight-7"
+)]
 pub struct Arguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
     #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
@@ -80,11 +82,18 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     if !["all", "where", "why", "shrink", "next", "limits"].contains(&word) {
         return Err(GapError::Word(word.to_owned()));
     }
-    if let Some(stranger) = arguments.withhold.iter().find(|name| twin::effect::by_name(name).is_none()) {
+    if let Some(stranger) = arguments
+        .withhold
+        .iter()
+        .find(|name| twin::effect::by_name(name).is_none())
+    {
         return Err(GapError::Effect(stranger.clone()));
     }
     let subject = Subject::open(Path::new(case))?;
-    let bar = ProgressBar::new(100).with_style(ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = ProgressBar::new(100).with_style(
+        ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
     bar.enable_steady_tick(Duration::from_millis(100));
     let diagnosis = diagnose(&subject, &arguments.withhold, &|what, share| {
         bar.set_message(what);
@@ -109,12 +118,21 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     Ok(())
 }
 
-fn write_folder(folder: &Path, subject: &Subject, diagnosis: &Diagnosis, advice: &str, verdict: &str) -> Result<(), GapError> {
+fn write_folder(
+    folder: &Path,
+    subject: &Subject,
+    diagnosis: &Diagnosis,
+    advice: &str,
+    verdict: &str,
+) -> Result<(), GapError> {
     let put = |name: &str, text: &str| {
         let file = folder.join(name);
         std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
     };
-    std::fs::create_dir_all(folder).map_err(|source| GapError::Write { file: folder.to_path_buf(), source })?;
+    std::fs::create_dir_all(folder).map_err(|source| GapError::Write {
+        file: folder.to_path_buf(),
+        source,
+    })?;
     put("verdict.json", verdict)?;
     put("index.html", &page::html(subject, diagnosis, advice)?)?;
     let mut unit = subject.twin.unit().clone();

@@ -70,12 +70,22 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
 pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
     let other = |chosen: &crate::attribute::Chosen| {
         let own = library.hypotheses[chosen.hypothesis].effect();
-        chosen.rivals.iter().find(|(rival, _)| library.hypotheses[*rival].effect() != own).map(|(rival, gain)| (*rival, chosen.gain - gain))
+        chosen
+            .rivals
+            .iter()
+            .find(|(rival, _)| library.hypotheses[*rival].effect() != own)
+            .map(|(rival, gain)| (*rival, chosen.gain - gain))
     };
-    let pairs = found.chosen.iter().filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
+    let pairs = found
+        .chosen
+        .iter()
+        .filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
     let (chosen, rival, _) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
     Some(Pair {
-        own: (library.hypotheses[chosen.hypothesis].cause.clone(), chosen.theta.iter().copied().collect()),
+        own: (
+            library.hypotheses[chosen.hypothesis].cause.clone(),
+            chosen.theta.iter().copied().collect(),
+        ),
         rival: library.hypotheses[rival].cause.clone(),
         nats: nats_apart(library, chosen, rival)?,
     })
@@ -101,7 +111,11 @@ pub fn limits(library: &Library) -> Vec<Limit> {
     let mut limits: Vec<Limit> = Vec::new();
     let seen = |place: usize| {
         let snr_per_unit = library.products.product(place, place).max(0.0).sqrt();
-        if snr_per_unit > 0.0 { SEEN_SNR / snr_per_unit } else { f64::INFINITY }
+        if snr_per_unit > 0.0 {
+            SEEN_SNR / snr_per_unit
+        } else {
+            f64::INFINITY
+        }
     };
     for hypothesis in &library.hypotheses {
         let name = hypothesis.effect();

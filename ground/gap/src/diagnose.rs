@@ -133,7 +133,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut found = attribute(&problem, &mut library, &|share| progress("search", share));
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
-    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted);
+    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
     let mut model = Model::around(&problem, &library, found.model(&library));
     let mut scatter = best_scatter(&problem, &model, withheld);
     let mut sigmas_after = problem.sigmas.clone();
@@ -141,25 +141,50 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         // The noise as found, then everything else anew, then the noise once more.
         let factors = factors(&problem, &model, first);
         problem.reweigh(&factors);
-        library.products.reweigh(&problem, &factors.iter().map(|factor| 1.0 / factor).collect::<Vec<f64>>());
+        library.products.reweigh(
+            &problem,
+            &factors.iter().map(|factor| 1.0 / factor).collect::<Vec<f64>>(),
+        );
         found = attribute(&problem, &mut library, &|share| progress("search", share));
         model = Model::around(&problem, &library, found.model(&library));
         scatter = best_scatter(&problem, &model, withheld);
-        sigmas_after.iter_mut().zip(&factors).for_each(|(sigma, factor)| *sigma *= factor);
+        sigmas_after
+            .iter_mut()
+            .zip(&factors)
+            .for_each(|(sigma, factor)| *sigma *= factor);
     }
     progress("leftover", 0.0);
-    let mut left = leftover::judge(&views, &model.joint, &model.fitted);
-    if let Some(scatter) = &scatter {
-        left.explain(&scatter.channels);
+    let scattered: Vec<usize> = scatter.iter().flat_map(|scatter| scatter.channels.clone()).collect();
+    let mut left = leftover::judge(&views, &model.joint, &model.fitted, &scattered);
+    let before: Vec<Vec<f64>> = (0..problem.frames.len())
+        .map(|channel| problem.predict(channel, &[]))
+        .collect();
+    let judge = |after: &[Vec<f64>], sigmas_after: &[f64]| {
+        subject.held.judge(Finished {
+            start_s: subject.twin.starts_s(),
+            sigmas: &problem.sigmas,
+            before: &before,
+            recalibrated: &quiet.predicted,
+            after,
+            sigmas_after,
+        })
+    };
+    let mut shrink = judge(&model.predicted, &sigmas_after);
+    let mut withdrawn = Vec::new();
+    let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
+    let has_effect = !found.chosen.is_empty() || scatter.is_some();
+    if has_effect && !is_smaller {
+        withdrawn.extend(
+            found
+                .chosen
+                .iter()
+                .map(|chosen| library.hypotheses[chosen.hypothesis].effect()),
+        );
+        withdrawn.extend(scatter.iter().map(|scatter| scatter.effect.page().name));
+        // Without the effects what is left is all there was.
+        left = gate.clone();
+        shrink = judge(&quiet.predicted, &problem.sigmas);
     }
-    let shrink = subject.held.judge(Finished {
-        start_s: subject.twin.starts_s(),
-        sigmas: &problem.sigmas,
-        before: &(0..problem.frames.len()).map(|channel| problem.predict(channel, &[])).collect::<Vec<_>>(),
-        recalibrated: &quiet.predicted,
-        after: &model.predicted,
-        sigmas_after: &sigmas_after,
-    });
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
     let explained = explained_share(&quiet, &model, &problem);
@@ -169,11 +194,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     causes.iter_mut().for_each(|cause| cause.probability *= trust);
     share_out(&mut causes);
     let mut alternatives = alternatives(&library, &found);
-    alternatives.iter_mut().for_each(|(_, probability)| *probability *= trust);
-    let mut withdrawn = Vec::new();
-    let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
-    if !causes.is_empty() && !is_smaller {
-        withdrawn = causes.iter().map(|cause| cause.effect).collect();
+    alternatives
+        .iter_mut()
+        .for_each(|(_, probability)| *probability *= trust);
+    if !withdrawn.is_empty() {
         causes.clear();
     }
     Diagnosis {
@@ -186,7 +210,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         shrink,
         alone: alone(&library, &found),
         limits: confusion::limits(&library),
-        known: model.components.iter().filter(|_| withdrawn.is_empty()).map(|component| component.active.to_known()).collect(),
+        known: model
+            .components
+            .iter()
+            .filter(|_| withdrawn.is_empty())
+            .map(|component| component.active.to_known())
+            .collect(),
         rivals: confusion::pair(&library, &found),
         traces: traces(&problem, &model),
         cells: cells(&problem, &views),
@@ -216,7 +245,11 @@ fn factors(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
     let factor = |channel: usize| {
         let samples = problem.frames[channel].series.rows.len().max(1) as f64;
         let is_in = scatter.channels.contains(&channel);
-        if is_in { (energies[channel] / samples).sqrt().clamp(0.1, 1000.0) } else { 1.0 }
+        if is_in {
+            (energies[channel] / samples).sqrt().clamp(0.1, 1000.0)
+        } else {
+            1.0
+        }
     };
     (0..problem.frames.len()).map(factor).collect()
 }
@@ -229,8 +262,15 @@ fn explained_share(quiet: &Model, model: &Model, problem: &Problem) -> f64 {
         let samples: usize = problem.frames.iter().map(|frame| frame.series.rows.len()).sum();
         (energies.iter().sum::<f64>() + open - samples as f64).max(0.0)
     };
-    let (before, after) = (excess(&before, &quiet.fitted.nuisance), excess(&after, &model.fitted.nuisance));
-    if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 1.0 }
+    let (before, after) = (
+        excess(&before, &quiet.fitted.nuisance),
+        excess(&after, &model.fitted.nuisance),
+    );
+    if before > 0.0 {
+        (1.0 - after / before).clamp(0.0, 1.0)
+    } else {
+        1.0
+    }
 }
 
 fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<Cause> {
@@ -245,7 +285,9 @@ fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<C
         let mut by_channel = Vec::new();
         for channel in hypothesis.cause.channels(unit) {
             let (with, without) = (problem.predict(channel, &model), problem.predict(channel, &others));
-            let of_row = |row: &u32| ((with[*row as usize] - without[*row as usize]) / problem.frames[channel].weight_sigma).powi(2);
+            let of_row = |row: &u32| {
+                ((with[*row as usize] - without[*row as usize]) / problem.frames[channel].weight_sigma).powi(2)
+            };
             let rows = &problem.frames[channel].series.rows;
             rows.iter().for_each(|row| energy[*row as usize] += of_row(row));
             by_channel.push((channel, rows.iter().map(of_row).sum::<f64>()));
@@ -262,10 +304,20 @@ fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<C
         Cause {
             effect: own,
             locality: hypothesis.cause.locality.to_string(),
-            channels: by_channel.iter().filter(|(_, energy)| *energy >= NAMED_SHARE * total).map(|(channel, _)| *channel).collect(),
-            probability: by_effect(library, &chosen.rivals).into_iter().filter(|(name, _)| *name == own).map(|(_, p)| p).sum(),
+            channels: by_channel
+                .iter()
+                .filter(|(_, energy)| *energy >= NAMED_SHARE * total)
+                .map(|(channel, _)| *channel)
+                .collect(),
+            probability: by_effect(library, &chosen.rivals)
+                .into_iter()
+                .filter(|(name, _)| *name == own)
+                .map(|(_, p)| p)
+                .sum(),
             gain: chosen.gain,
-            is_suspicious: parameters.iter().any(|sized| sized.value.abs() > SUSPICIOUS * sized.parameter.prior_sigma),
+            is_suspicious: parameters
+                .iter()
+                .any(|sized| sized.value.abs() > SUSPICIOUS * sized.parameter.prior_sigma),
             parameters,
             share: total,
             when: regime::when(&feels, &energy),
@@ -290,7 +342,11 @@ fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
             };
             // A scale of scatter fitted to n samples is known to one part in the root of 2n.
             let samples = subject.fit.channels[*channel].rows.len().max(1) as f64;
-            parameters.push(Sized { parameter, value: *value, sigma: value.abs() / (2.0 * samples).sqrt() });
+            parameters.push(Sized {
+                parameter,
+                value: *value,
+                sigma: value.abs() / (2.0 * samples).sqrt(),
+            });
         }
     }
     let gain = scatter.gain / TEMPERATURE;
@@ -312,7 +368,9 @@ fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
 /// Energies to shares, most first.
 fn share_out(causes: &mut [Cause]) {
     let total: f64 = causes.iter().map(|cause| cause.share).sum();
-    causes.iter_mut().for_each(|cause| cause.share = if total > 0.0 { cause.share / total } else { 0.0 });
+    causes
+        .iter_mut()
+        .for_each(|cause| cause.share = if total > 0.0 { cause.share / total } else { 0.0 });
     causes.sort_by(|one, other| other.share.total_cmp(&one.share));
 }
 
@@ -334,9 +392,17 @@ pub fn by_effect(library: &Library, rivals: &[(usize, f64)]) -> Vec<(&'static st
 
 /// Effects that are not causes, with the probability that one of the causes is really they.
 fn alternatives(library: &Library, found: &Attribution) -> Vec<(&'static str, f64)> {
-    let chosen: Vec<&str> = found.chosen.iter().map(|chosen| library.hypotheses[chosen.hypothesis].effect()).collect();
+    let chosen: Vec<&str> = found
+        .chosen
+        .iter()
+        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
+        .collect();
     let mut sums: Vec<(&'static str, f64)> = Vec::new();
-    for (name, share) in found.chosen.iter().flat_map(|chosen| by_effect(library, &chosen.rivals)) {
+    for (name, share) in found
+        .chosen
+        .iter()
+        .flat_map(|chosen| by_effect(library, &chosen.rivals))
+    {
         if chosen.contains(&name) || share < 0.005 {
             continue;
         }
@@ -369,7 +435,12 @@ fn alone(library: &Library, found: &Attribution) -> Vec<(String, f64)> {
 fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
     let twin = problem.twin;
     let mut order: Vec<(usize, f64)> = (0..problem.frames.len())
-        .map(|channel| (channel, problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64))
+        .map(|channel| {
+            (
+                channel,
+                problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64,
+            )
+        })
         .collect();
     order.sort_by(|one, other| other.1.total_cmp(&one.1));
     let trace = |(channel, _): &(usize, f64)| {
@@ -378,9 +449,20 @@ fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
         let step = series.rows.len().div_ceil(POINTS).max(1);
         let points = |predicted: &[f64]| {
             let pairs = series.rows.iter().zip(&series.values).step_by(step);
-            pairs.map(|(row, value)| (twin.starts_s()[*row as usize], (value - predicted[*row as usize]) / problem.sigmas[*channel])).collect()
+            pairs
+                .map(|(row, value)| {
+                    (
+                        twin.starts_s()[*row as usize],
+                        (value - predicted[*row as usize]) / problem.sigmas[*channel],
+                    )
+                })
+                .collect()
         };
-        Trace { name: twin.unit().channels[*channel].name.clone(), before: points(&nominal), after: points(&model.predicted[*channel]) }
+        Trace {
+            name: twin.unit().channels[*channel].name.clone(),
+            before: points(&nominal),
+            after: points(&model.predicted[*channel]),
+        }
     };
     order.iter().take(TRACES).map(trace).collect()
 }
@@ -394,7 +476,12 @@ fn cells(problem: &Problem, views: &[View]) -> Vec<(String, Vec<f64>)> {
             let sum = &mut sums[((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)];
             *sum = (sum.0 + (value * scale).powi(2), sum.1 + 1.0);
         }
-        (view.name.clone(), sums.into_iter().map(|(energy, samples)| f64::sqrt(energy / samples)).collect())
+        (
+            view.name.clone(),
+            sums.into_iter()
+                .map(|(energy, samples)| f64::sqrt(energy / samples))
+                .collect(),
+        )
     };
     views.iter().enumerate().map(cell).collect()
 }

@@ -75,7 +75,9 @@ impl Screen {
         let covariance = factor.inverse();
         let estimate = Estimate {
             parameters: DVector::from_fn(width, |row, _| sigma(row) * solved[row]),
-            covariance: DMatrix::from_fn(width, width, |row, column| sigma(row) * covariance[(row, column)] * sigma(column)),
+            covariance: DMatrix::from_fn(width, width, |row, column| {
+                sigma(row) * covariance[(row, column)] * sigma(column)
+            }),
             log_evidence,
             energy_explained: fall,
         };
@@ -85,7 +87,9 @@ impl Screen {
     /// Of the energy that parameters `theta` of some columns put into the data, the share that other columns can imitate,
     /// and the energy itself (the squared marginal signal-to-noise ratio).
     pub fn imitation(&self, columns: &[usize], theta: &DVector<f64>, others: &[usize]) -> Option<(f64, f64)> {
-        let pick = |from: &[usize], to: &[usize]| DMatrix::from_fn(from.len(), to.len(), |r, c| self.information[(from[r], to[c])]);
+        let pick = |from: &[usize], to: &[usize]| {
+            DMatrix::from_fn(from.len(), to.len(), |r, c| self.information[(from[r], to[c])])
+        };
         let energy = theta.dot(&(pick(columns, columns) * theta));
         let score = pick(others, columns) * theta;
         let mut own = pick(others, others);
@@ -100,7 +104,11 @@ impl Screen {
 
 /// Probabilities of rivals from their evidence and prior, tempered.
 pub fn probabilities(log_evidences: &[f64], log_priors: &[f64], temperature: f64) -> Vec<f64> {
-    let scores: Vec<f64> = log_evidences.iter().zip(log_priors).map(|(z, prior)| z / temperature + prior).collect();
+    let scores: Vec<f64> = log_evidences
+        .iter()
+        .zip(log_priors)
+        .map(|(z, prior)| z / temperature + prior)
+        .collect();
     let best = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = scores.iter().map(|score| (score - best).exp()).collect();
     let sum: f64 = weights.iter().sum();
@@ -125,7 +133,9 @@ mod tests {
     #[test]
     fn evidence_of_one_parameter_is_the_textbook_integral() {
         // r = x theta + e with x'x = 100, x'r = 30, theta ~ N(0, 0.5^2): ln Z1/Z0 in closed form.
-        let estimate = screen([[100.0, 0.0], [0.0, 1.0]], [30.0, 0.0], [0.5, 1.0]).estimate(&[0]).expect("finite");
+        let estimate = screen([[100.0, 0.0], [0.0, 1.0]], [30.0, 0.0], [0.5, 1.0])
+            .estimate(&[0])
+            .expect("finite");
         let precision: f64 = 100.0 + 4.0;
         let expected = 0.5 * 900.0 / precision - 0.5 * (precision / 4.0).ln();
         assert!((estimate.log_evidence - expected).abs() < ROUNDING);
@@ -143,7 +153,9 @@ mod tests {
     #[test]
     fn columns_along_each_other_imitate_each_other_fully() {
         let along = screen([[50.0, 25.0], [25.0, 12.5]], [0.0, 0.0], [1.0, 1.0]);
-        let (share, energy) = along.imitation(&[0], &DVector::from_element(1, 1.0), &[1]).expect("finite");
+        let (share, energy) = along
+            .imitation(&[0], &DVector::from_element(1, 1.0), &[1])
+            .expect("finite");
         assert!((share - 1.0).abs() < 1e-4, "{share}");
         assert!((energy - 50.0).abs() < ROUNDING);
     }

@@ -48,7 +48,11 @@ impl Normal {
             score -= open_effects.tr_mul(&open_residual);
             energy -= open_residual.norm_squared();
         }
-        Normal { information, score, energy }
+        Normal {
+            information,
+            score,
+            energy,
+        }
     }
 }
 
@@ -60,7 +64,9 @@ mod tests {
     const ROUNDING: f64 = 1e-9;
 
     fn columns() -> DMatrix<f64> {
-        DMatrix::from_fn(40, 5, |row, column| ((row * (column + 2)) as f64 * 0.37).sin() + f64::from(u8::from(column == 0)))
+        DMatrix::from_fn(40, 5, |row, column| {
+            ((row * (column + 2)) as f64 * 0.37).sin() + f64::from(u8::from(column == 0))
+        })
     }
 
     fn residual() -> DVector<f64> {

@@ -105,13 +105,21 @@ impl Sums {
     }
 
     fn gap(self, energy: f64) -> f64 {
-        if self.samples > 0.0 { (energy / self.samples).sqrt() } else { 0.0 }
+        if self.samples > 0.0 {
+            (energy / self.samples).sqrt()
+        } else {
+            0.0
+        }
     }
 
     fn percent(self) -> f64 {
         let (before, after) = (self.gap(self.before), self.gap(self.after));
         // Below a hundredth of a sigma of excess the quotient is noise over noise.
-        if before - 1.0 > 0.01 { 100.0 * (before - after) / (before - 1.0) } else { 0.0 }
+        if before - 1.0 > 0.01 {
+            100.0 * (before - after) / (before - 1.0)
+        } else {
+            0.0
+        }
     }
 }
 

@@ -52,7 +52,9 @@ impl Joint {
             let open = columns.nuisance.ncols();
             let factor = Cholesky::new(DMatrix::identity(open, open) + columns.nuisance.tr_mul(&columns.nuisance));
             let cross = columns.nuisance.tr_mul(&columns.effects);
-            let slope = factor.as_ref().map_or_else(|| DMatrix::zeros(open, width), |factor| factor.solve(&cross));
+            let slope = factor
+                .as_ref()
+                .map_or_else(|| DMatrix::zeros(open, width), |factor| factor.solve(&cross));
             precision += columns.effects.tr_mul(&columns.effects) - cross.tr_mul(&slope);
             channels.push(Channel { columns, factor, slope });
         }
@@ -64,15 +66,26 @@ impl Joint {
 
     /// Fits one residual a channel.
     pub fn fit(&self, residuals: &[DVector<f64>]) -> Fitted {
-        let width = self.channels.first().map_or(0, |channel| channel.columns.effects.ncols());
+        let width = self
+            .channels
+            .first()
+            .map_or(0, |channel| channel.columns.effects.ncols());
         let mut score = DVector::zeros(width);
         let mut alone = Vec::new();
         for (channel, residual) in self.channels.iter().zip(residuals) {
             let pull = channel.columns.nuisance.tr_mul(residual);
             score += channel.columns.effects.tr_mul(residual) - channel.slope.tr_mul(&pull);
-            alone.push(channel.factor.as_ref().map_or_else(|| pull.map(|_| 0.0), |factor| factor.solve(&pull)));
+            alone.push(
+                channel
+                    .factor
+                    .as_ref()
+                    .map_or_else(|| pull.map(|_| 0.0), |factor| factor.solve(&pull)),
+            );
         }
-        let parameters = self.precision.as_ref().map_or_else(|| score.map(|_| 0.0), |factor| factor.solve(&score));
+        let parameters = self
+            .precision
+            .as_ref()
+            .map_or_else(|| score.map(|_| 0.0), |factor| factor.solve(&score));
         let mut fitted = Fitted {
             parameters,
             nuisance: Vec::new(),
@@ -112,14 +125,19 @@ mod tests {
 
     #[test]
     fn it_finds_what_the_marginal_normal_equations_find() {
-        let residuals: Vec<_> = [0.3, 0.9].map(|k| DVector::from_fn(50, |row, _| (row as f64 * k).sin())).into();
+        let residuals: Vec<_> = [0.3, 0.9]
+            .map(|k| DVector::from_fn(50, |row, _| (row as f64 * k).sin()))
+            .into();
         let sigmas = [0.5, 2.0];
         let joint = Joint::new(vec![columns(0.1), columns(0.7)], &sigmas).fit(&residuals);
         let mut screen = Screen::zeros(sigmas.to_vec());
         for (phase, residual) in [0.1, 0.7].into_iter().zip(&residuals) {
             let Columns { nuisance, effects } = columns(phase);
             let factor = Cholesky::new(DMatrix::identity(2, 2) + nuisance.tr_mul(&nuisance));
-            screen.add(&[0, 1], &Normal::marginal(&nuisance, factor.as_ref(), &effects, residual));
+            screen.add(
+                &[0, 1],
+                &Normal::marginal(&nuisance, factor.as_ref(), &effects, residual),
+            );
         }
         let estimate = screen.estimate(&[0, 1]).expect("finite");
         assert!((joint.parameters - estimate.parameters).norm() < ROUNDING);

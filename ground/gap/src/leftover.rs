@@ -81,22 +81,15 @@ pub struct Leftover {
 }
 
 impl Leftover {
-    /// Takes the aspects of channels out whose scatter another effect explains.
-    pub fn explain(&mut self, channels: &[usize]) {
-        let was_largest = self.aspects.first().map_or(0.0, |aspect| aspect.size);
-        self.aspects.retain(|aspect| aspect.channel.is_none_or(|channel| !channels.contains(&channel)));
-        let largest = self.aspects.first().map_or(0.0, |aspect| aspect.size);
-        if largest < was_largest {
-            self.log_tail = log_tail(largest, self.scale);
-            self.p = self.p.max(self.log_tail.exp());
-        }
-    }
-
     /// Probability that something else is needed, from its prior: a p-value speaks against "enough" by at most
     /// `-1 / (e p ln p)` (Sellke, Bayarri and Berger 2001).
     pub fn unknown(&self, prior: f64) -> f64 {
         let log_p = self.log_tail.min(self.p.ln());
-        let bound = if log_p < -1.0 { (1.0 + log_p + (-log_p).ln()).exp() } else { 1.0 };
+        let bound = if log_p < -1.0 {
+            (1.0 + log_p + (-log_p).ln()).exp()
+        } else {
+            1.0
+        };
         prior / (prior + (1.0 - prior) * bound)
     }
 }
@@ -110,25 +103,34 @@ fn log_tail(size: f64, [mean, spread]: [f64; 2]) -> f64 {
     const EULER: f64 = 0.577_215_664_901_532_9;
     let y = (size - (mean - EULER * beta)) / beta;
     // ln(1 - exp(-exp(-y))): for large y simply -y.
-    if y > 30.0 { -y } else { (-(-(-y).exp()).exp_m1()).max(f64::MIN_POSITIVE).ln() }
+    if y > 30.0 {
+        -y
+    } else {
+        (-(-(-y).exp()).exp_m1()).max(f64::MIN_POSITIVE).ln()
+    }
 }
 
-/// Judges the residuals of a model.
-pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
+/// Judges the residuals of a model. Channels in `explained` are not looked at: another effect says how they scatter.
+pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]) -> Leftover {
     let dictionary: Vec<Shapes> = views.iter().map(Shapes::new).collect();
-    let observed = sums(views, &dictionary, fitted);
+    let observed = sums(views, &dictionary, fitted, explained);
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sums(views, &dictionary, &joint.fit(&simulate(joint, &mut random))))
+        .map(|_| sums(views, &dictionary, &joint.fit(&simulate(joint, &mut random)), explained))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
     let observed = roots(&observed);
-    let spreads: Vec<(f64, f64)> = (0..observed.len()).map(|at| moments(simulated.iter().map(|run| run[at]))).collect();
+    let spreads: Vec<(f64, f64)> = (0..observed.len())
+        .map(|at| moments(simulated.iter().map(|run| run[at])))
+        .collect();
     let sizes = |run: &[f64]| -> Vec<f64> {
-        run.iter().zip(&spreads).map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 }).collect()
+        run.iter()
+            .zip(&spreads)
+            .map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 })
+            .collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
@@ -166,7 +168,9 @@ fn simulate(joint: &Joint, random: &mut Xoshiro256PlusPlus) -> Vec<DVector<f64>>
             let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
             let mut residual = DVector::from_fn(columns.nuisance.nrows(), |_, _| {
                 let normal: f64 = StandardNormal.sample(&mut *random);
-                spread.as_ref().map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
+                spread
+                    .as_ref()
+                    .map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
             });
             residual.gemv(1.0, &columns.nuisance, &open, 1.0);
             residual
@@ -183,7 +187,11 @@ struct Shapes {
 
 impl Shapes {
     fn new(view: &View) -> Self {
-        let bin_of: Vec<usize> = view.phase.iter().map(|phase| ((phase * BINS as f64) as usize).min(BINS - 1)).collect();
+        let bin_of: Vec<usize> = view
+            .phase
+            .iter()
+            .map(|phase| ((phase * BINS as f64) as usize).min(BINS - 1))
+            .collect();
         let mut counts = vec![0.0; BINS];
         let mut motion = DMatrix::zeros(BINS, view.motion.ncols());
         for (row, bin) in bin_of.iter().enumerate() {
@@ -197,8 +205,13 @@ impl Shapes {
         let directions = DMatrix::from_fn(view.motion.ncols(), SHAPES, |_, _| 0.7 * normal());
         let angle = Uniform::new(0.0, std::f64::consts::TAU);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED + 1);
-        let offsets: Vec<f64> = (0..SHAPES).map(|_| angle.map_or(0.0, |angle| angle.sample(&mut random))).collect();
-        let weight: Vec<f64> = counts.iter().map(|count: &f64| if *count > 0.0 { 1.0 / count.sqrt() } else { 0.0 }).collect();
+        let offsets: Vec<f64> = (0..SHAPES)
+            .map(|_| angle.map_or(0.0, |angle| angle.sample(&mut random)))
+            .collect();
+        let weight: Vec<f64> = counts
+            .iter()
+            .map(|count: &f64| if *count > 0.0 { 1.0 / count.sqrt() } else { 0.0 })
+            .collect();
         let shapes = DMatrix::from_fn(BINS, 2 * SHAPES, |bin, shape| {
             let value = if shape < SHAPES {
                 (std::f64::consts::PI * (shape + 1) as f64 * (bin as f64 + 0.5) / BINS as f64).cos()
@@ -232,12 +245,21 @@ fn kinds(views: &[View]) -> usize {
 
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
 
+/// What is looked at in each channel, in the order of [`sums`].
+const ASPECTS_OF_CHANNEL: [&str; 5] = [
+    "more energy than noise",
+    "a shape in time or motion",
+    "neighbouring samples alike",
+    "outliers",
+    "a calibration beyond its sigmas",
+];
+
 /// What each entry of [`sums`] is.
 fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
     let mut labels = Vec::new();
     for (index, view) in views.iter().enumerate() {
         let name = &view.name;
-        for what in ["more energy than noise", "a shape in time or motion", "neighbouring samples alike", "outliers", "a calibration beyond its sigmas"] {
+        for what in ASPECTS_OF_CHANNEL {
             labels.push((format!("{name}: {what}"), Some(index)));
         }
     }
@@ -255,19 +277,30 @@ fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
 }
 
 /// The sums of squares, in the order of [`labels`].
-fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted) -> Vec<f64> {
+fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted, explained: &[usize]) -> Vec<f64> {
     let mut sums = Vec::new();
     let mut nuisance = vec![0.0; kinds(views)];
     let mut common = vec![DMatrix::zeros(BINS, 3); kinds(views)];
     let mut stretches = vec![[0.0; STRETCHES]; kinds(views)];
     for (index, (view, shapes)) in views.iter().zip(shapes).enumerate() {
+        if explained.contains(&index) {
+            sums.extend([0.0; ASPECTS_OF_CHANNEL.len()]);
+            continue;
+        }
         let (rest, open) = (&fitted.rest[index], &fitted.nuisance[index]);
         let binned = shapes.binned(rest);
         let energy = rest.norm_squared();
         sums.push(energy);
         sums.push(shapes.basis.tr_mul(&binned).norm_squared());
         let values = rest.as_slice();
-        let alike = (1..=LAGS).map(|lag| values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>().powi(2));
+        let alike = (1..=LAGS).map(|lag| {
+            values
+                .iter()
+                .zip(values.iter().skip(lag))
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                .powi(2)
+        });
         sums.push(alike.sum::<f64>() / energy.max(1.0));
         sums.push(values.iter().map(|value| value.powi(4)).sum());
         sums.push(open.norm_squared());

@@ -54,7 +54,11 @@ pub struct Series {
 impl Series {
     /// The part of it whose rows are wanted.
     pub fn only(&self, wanted: impl Fn(usize) -> bool) -> Series {
-        let kept = self.rows.iter().zip(&self.values).filter(|(row, _)| wanted(**row as usize));
+        let kept = self
+            .rows
+            .iter()
+            .zip(&self.values)
+            .filter(|(row, _)| wanted(**row as usize));
         let (rows, values) = kept.map(|(row, value)| (*row, *value)).unzip();
         Series { rows, values }
     }
@@ -104,7 +108,9 @@ impl Log {
 
     /// Puts a value, or its absence, into the row begun last.
     pub fn put(&mut self, channel: usize, column: &Column, value: Option<f64>) {
-        let Some(row) = self.start_s.len().checked_sub(1) else { return };
+        let Some(row) = self.start_s.len().checked_sub(1) else {
+            return;
+        };
         let (Some(series), Some(masked)) = (self.channels.get_mut(channel), self.masked.get_mut(channel)) else {
             return;
         };

@@ -23,7 +23,9 @@ pub struct Model {
 impl Model {
     /// Refits calibration and reference around effects whose parameters `theta` are the best already.
     pub fn around(problem: &Problem, library: &Library, components: Vec<Component>) -> Self {
-        let mut slopes: Vec<Entries> = (0..library.reference).map(|place| library.products.column(place).clone()).collect();
+        let mut slopes: Vec<Entries> = (0..library.reference)
+            .map(|place| library.products.column(place).clone())
+            .collect();
         let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
         let mut values = vec![0.0; library.reference];
         for (index, component) in components.iter().enumerate() {
@@ -44,8 +46,15 @@ impl Model {
             .collect();
         let joint = Joint::new(columns, &sigmas);
         let fitted = joint.fit(&about_zero);
-        let predicted = (0..problem.frames.len()).map(|channel| readings(problem, &components, &fitted, channel)).collect();
-        Model { components, joint, fitted, predicted }
+        let predicted = (0..problem.frames.len())
+            .map(|channel| readings(problem, &components, &fitted, channel))
+            .collect();
+        Model {
+            components,
+            joint,
+            fitted,
+            predicted,
+        }
     }
 
     /// The energy of what is left, per channel.
@@ -58,11 +67,21 @@ impl Model {
 fn readings(problem: &Problem, components: &[Component], fitted: &Fitted, channel: usize) -> Vec<f64> {
     let mut readings = problem.predict(channel, components);
     let columns = problem.twin.calibration(channel);
-    let calibration = columns.iter().zip(fitted.nuisance[channel].iter()).map(|(column, value)| (column, value * column.sigma));
-    let reference = problem.reference.iter().zip(fitted.parameters.iter()).map(|(column, value)| (column, *value));
+    let calibration = columns
+        .iter()
+        .zip(fitted.nuisance[channel].iter())
+        .map(|(column, value)| (column, value * column.sigma));
+    let reference = problem
+        .reference
+        .iter()
+        .zip(fitted.parameters.iter())
+        .map(|(column, value)| (column, *value));
     for (column, value) in calibration.chain(reference) {
         if let Some((_, values)) = column.entries.iter().find(|(index, _)| *index == channel) {
-            readings.iter_mut().zip(values).for_each(|(reading, slope)| *reading += slope * value);
+            readings
+                .iter_mut()
+                .zip(values)
+                .for_each(|(reading, slope)| *reading += slope * value);
         }
     }
     readings

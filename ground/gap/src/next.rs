@@ -13,12 +13,7 @@ use twin::{
 };
 
 use crate::{
-    case::Subject,
-    confusion::Pair,
-    diagnose::Diagnosis,
-    log::Series,
-    problem::Problem,
-    products::Products,
+    case::Subject, confusion::Pair, diagnose::Diagnosis, log::Series, problem::Problem, products::Products,
     windows::Fit,
 };
 
@@ -38,11 +33,26 @@ struct Experiment {
 }
 
 const CATALOGUE: [Experiment; 5] = [
-    Experiment { name: "rest in one attitude (the twin's motion \"still\")", motion: || Box::new(Still::level()) },
-    Experiment { name: "steady rates of both signs about many axes (\"rate-table\")", motion: || Box::new(RateTable::calibration()) },
-    Experiment { name: "turning about all axes at once (\"tumble\")", motion: || Box::new(Tumble::new()) },
-    Experiment { name: "steps about one axis at a time (\"rotation-1\")", motion: || Box::new(RotationTest::first()) },
-    Experiment { name: "combined attitude steps (\"rotation-2\")", motion: || Box::new(RotationTest::second()) },
+    Experiment {
+        name: "rest in one attitude (the twin's motion \"still\")",
+        motion: || Box::new(Still::level()),
+    },
+    Experiment {
+        name: "steady rates of both signs about many axes (\"rate-table\")",
+        motion: || Box::new(RateTable::calibration()),
+    },
+    Experiment {
+        name: "turning about all axes at once (\"tumble\")",
+        motion: || Box::new(Tumble::new()),
+    },
+    Experiment {
+        name: "steps about one axis at a time (\"rotation-1\")",
+        motion: || Box::new(RotationTest::first()),
+    },
+    Experiment {
+        name: "combined attitude steps (\"rotation-2\")",
+        motion: || Box::new(RotationTest::second()),
+    },
 ];
 
 /// Advice in words.
@@ -60,7 +70,13 @@ pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let names = (pair.own.0.effect.page().name, pair.rival.effect.page().name);
     let before = error(pair.nats);
     if pair.nats > ENOUGH {
-        return format!("{} and {} are apart already ({:.1e} errors). To be sure: {}", names.0, names.1, before, confirm.unwrap_or_default());
+        return format!(
+            "{} and {} are apart already ({:.1e} errors). To be sure: {}",
+            names.0,
+            names.1,
+            before,
+            confirm.unwrap_or_default()
+        );
     }
     let tried = CATALOGUE.iter().filter_map(|experiment| {
         let (nats, minutes) = separation(subject, pair, (experiment.motion)().as_ref())?;
@@ -70,11 +86,21 @@ pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
     match best {
         Some((_, nats, minutes, name)) if nats > pair.nats.max(1.0) => format!(
             "To tell {} from {}: {name}, {minutes:.0} min; a decision between them errs with {:.1} % instead of {:.1} %.",
-            names.0, names.1, 100.0 * error(nats), 100.0 * before
+            names.0,
+            names.1,
+            100.0 * error(nats),
+            100.0 * before
         ),
         _ => {
-            let other = by_name(names.1).map(|effect| effect.page().confirm_by).unwrap_or_default();
-            format!("No motion tells {} from {}. Change something else: {} Or: {other}", names.0, names.1, confirm.unwrap_or_default())
+            let other = by_name(names.1)
+                .map(|effect| effect.page().confirm_by)
+                .unwrap_or_default();
+            format!(
+                "No motion tells {} from {}. Change something else: {} Or: {other}",
+                names.0,
+                names.1,
+                confirm.unwrap_or_default()
+            )
         }
     }
 }
@@ -89,7 +115,16 @@ fn error(nats: f64) -> f64 {
 fn erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.5 * x);
     const TERMS: [f64; 10] = [
-        -1.265_512_23, 1.000_023_68, 0.374_091_96, 0.096_784_18, -0.186_288_06, 0.278_868_07, -1.135_203_98, 1.488_515_87, -0.822_152_23, 0.170_872_77,
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
     ];
     let sum = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
     t * (-x * x + sum).exp()
@@ -106,14 +141,22 @@ fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f6
     let scene = Scene::new(motion, &environment, 0.0, to_s, STEP_S);
     let channels = unit.channels.len();
     let twin = Twin::new(unit, environment, scene, starts_s).ok()?;
-    let all = Series { rows: (0..rows as u32).collect(), values: vec![0.0; rows] };
-    let fit = Fit { channels: vec![all; channels] };
+    let all = Series {
+        rows: (0..rows as u32).collect(),
+        values: vec![0.0; rows],
+    };
+    let fit = Fit {
+        channels: vec![all; channels],
+    };
     let problem = Problem::new(&twin, &fit, &Accuracy::default());
     let mut products = Products::default();
     let mut sigmas = Vec::new();
     let mut add = |cause: &Cause| -> Vec<usize> {
         let width = cause.parameters(twin.unit()).len();
-        let zero = Active { cause: cause.clone(), theta: vec![0.0; width] };
+        let zero = Active {
+            cause: cause.clone(),
+            theta: vec![0.0; width],
+        };
         let columns = twin.jacobian(&[zero], 0);
         columns
             .iter()

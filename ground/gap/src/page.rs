@@ -24,7 +24,11 @@ pub fn html(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Result<St
         Block::Terminal(terminal::shrink(subject, diagnosis)),
         Block::Terminal(terminal::limits(diagnosis)),
     ];
-    Ok(chart::html(&format!("Gap: {}", subject.opened.text.name), &subject.opened.text.about, &blocks))
+    Ok(chart::html(
+        &format!("Gap: {}", subject.opened.text.name),
+        &subject.opened.text.about,
+        &blocks,
+    ))
 }
 
 /// Residuals of the channels that stand out most, before and after.
@@ -48,15 +52,33 @@ fn map(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
         "Root mean square residual by channel and time, before: 0 for noise alone, 1 for three sigma and more",
         &Map {
             rows: diagnosis.cells.iter().map(|(name, _)| name.clone()).collect(),
-            columns: (1..=diagnosis.cells.first().map_or(0, |(_, cells)| cells.len())).map(|stretch| stretch.to_string()).collect(),
-            values: diagnosis.cells.iter().map(|(_, cells)| cells.iter().map(|gap| ((gap - 1.0) / 2.0).clamp(0.0, 1.0)).collect()).collect(),
+            columns: (1..=diagnosis.cells.first().map_or(0, |(_, cells)| cells.len()))
+                .map(|stretch| stretch.to_string())
+                .collect(),
+            values: diagnosis
+                .cells
+                .iter()
+                .map(|(_, cells)| cells.iter().map(|gap| ((gap - 1.0) / 2.0).clamp(0.0, 1.0)).collect())
+                .collect(),
         },
     )
 }
 
 fn evidence(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
-    let bars: Vec<(f64, f64)> = diagnosis.alone.iter().take(SHOWN).enumerate().map(|(place, (_, gain))| (place as f64 + 1.0, *gain)).collect();
-    let names: Vec<String> = diagnosis.alone.iter().take(SHOWN).enumerate().map(|(place, (name, _))| format!("{} {name}", place + 1)).collect();
+    let bars: Vec<(f64, f64)> = diagnosis
+        .alone
+        .iter()
+        .take(SHOWN)
+        .enumerate()
+        .map(|(place, (_, gain))| (place as f64 + 1.0, *gain))
+        .collect();
+    let names: Vec<String> = diagnosis
+        .alone
+        .iter()
+        .take(SHOWN)
+        .enumerate()
+        .map(|(place, (name, _))| format!("{} {name}", place + 1))
+        .collect();
     let panel = Panel {
         title: names.join(", "),
         x: Axis::linear("effect"),

@@ -99,7 +99,9 @@ impl<'a> Problem<'a> {
         for (index, (channel, series)) in twin.unit().channels.iter().zip(&fit.channels).enumerate() {
             let reference = match channel.sensor {
                 Kind::Accelerometer => twin.environment().gravity * accuracy.attitude_sigma_rad,
-                Kind::Magnetometer => accuracy.field_sigma_ut.hypot(twin.environment().field_n_ut.norm() * accuracy.attitude_sigma_rad),
+                Kind::Magnetometer => accuracy
+                    .field_sigma_ut
+                    .hypot(twin.environment().field_n_ut.norm() * accuracy.attitude_sigma_rad),
                 Kind::Gyro | Kind::Thermometer => 0.0,
             };
             sigmas.push(channel.sigma().hypot(reference));
@@ -149,7 +151,8 @@ impl<'a> Problem<'a> {
 
     /// Readings of one channel at every row of the log.
     pub fn predict(&self, channel: usize, model: &[Component]) -> Vec<f64> {
-        let (always, passing): (Vec<&Component>, Vec<&Component>) = model.iter().partition(|component| component.span.is_none());
+        let (always, passing): (Vec<&Component>, Vec<&Component>) =
+            model.iter().partition(|component| component.span.is_none());
         let always: Vec<Active> = always.into_iter().map(|component| component.active.clone()).collect();
         let base = self.twin.channel(channel, &always).into_owned();
         let mut readings = base.clone();
@@ -218,6 +221,9 @@ impl<'a> Problem<'a> {
 
     /// The reference's columns, in units of noise.
     pub fn reference_columns(&self) -> Vec<Vec<(usize, DVector<f64>)>> {
-        self.reference.iter().map(|column| self.in_noise(column, None)).collect()
+        self.reference
+            .iter()
+            .map(|column| self.in_noise(column, None))
+            .collect()
     }
 }

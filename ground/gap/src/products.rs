@@ -30,13 +30,17 @@ impl Products {
     pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
         self.open[place] = open_part(problem, &column);
         self.columns[place] = column;
-        self.known.borrow_mut().retain(|(one, other), _| *one != place && *other != place);
+        self.known
+            .borrow_mut()
+            .retain(|(one, other), _| *one != place && *other != place);
     }
 
     /// After the weights of the problem's channels changed by these factors.
     pub fn reweigh(&mut self, problem: &Problem, factors: &[f64]) {
         for (place, column) in self.columns.iter_mut().enumerate() {
-            column.iter_mut().for_each(|(channel, values)| *values *= factors[*channel]);
+            column
+                .iter_mut()
+                .for_each(|(channel, values)| *values *= factors[*channel]);
             self.open[place] = open_part(problem, column);
         }
         self.known.borrow_mut().clear();
@@ -90,10 +94,15 @@ impl Products {
 }
 
 fn open_part(problem: &Problem, column: &Entries) -> Entries {
-    column.iter().map(|(channel, values)| (*channel, problem.frames[*channel].open_part(values))).collect()
+    column
+        .iter()
+        .map(|(channel, values)| (*channel, problem.frames[*channel].open_part(values)))
+        .collect()
 }
 
 fn inner(one: &Entries, other: &Entries) -> f64 {
     let on = |channel: usize| other.iter().find(|(index, _)| *index == channel);
-    one.iter().filter_map(|(channel, values)| on(*channel).map(|(_, others)| values.dot(others))).sum()
+    one.iter()
+        .filter_map(|(channel, values)| on(*channel).map(|(_, others)| values.dot(others)))
+        .sum()
 }

@@ -42,15 +42,27 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
     let width_of = |hypothesis: &usize| library.hypotheses[*hypothesis].parameters.len();
     let begin = |(index, hypothesis): (usize, &usize)| {
         let width = width_of(hypothesis);
-        start.get(index).filter(|theta| theta.len() == width).cloned().unwrap_or_else(|| DVector::zeros(width))
+        start
+            .get(index)
+            .filter(|theta| theta.len() == width)
+            .cloned()
+            .unwrap_or_else(|| DVector::zeros(width))
     };
     let mut thetas: Vec<DVector<f64>> = set.iter().enumerate().map(begin).collect();
-    let own = set.iter().flat_map(|hypothesis| library.hypotheses[*hypothesis].places.iter().copied());
-    let mut slopes: Vec<Entries> = (0..library.reference).chain(own).map(|place| library.products.column(place).clone()).collect();
+    let own = set
+        .iter()
+        .flat_map(|hypothesis| library.hypotheses[*hypothesis].places.iter().copied());
+    let mut slopes: Vec<Entries> = (0..library.reference)
+        .chain(own)
+        .map(|place| library.products.column(place).clone())
+        .collect();
     let mut best: Option<Refined> = None;
     for step in 0..STEPS {
         let point = Point::at(problem, library, set, &thetas, &slopes);
-        if best.as_ref().is_some_and(|best| point.log_evidence < best.log_evidence - CONVERGED && step > 2) {
+        if best
+            .as_ref()
+            .is_some_and(|best| point.log_evidence < best.log_evidence - CONVERGED && step > 2)
+        {
             // Too long a step: half way back.
             let old = best.as_ref().map(|best| best.thetas.clone()).unwrap_or_default();
             thetas = thetas.iter().zip(&old).map(|(new, old)| (new + old) * 0.5).collect();
@@ -98,7 +110,10 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
 
 /// A set with its parameters, as a model.
 pub fn model_of(library: &Library, set: &[usize], thetas: &[DVector<f64>]) -> Vec<Component> {
-    set.iter().zip(thetas).map(|(hypothesis, theta)| library.hypotheses[*hypothesis].component(theta)).collect()
+    set.iter()
+        .zip(thetas)
+        .map(|(hypothesis, theta)| library.hypotheses[*hypothesis].component(theta))
+        .collect()
 }
 
 /// The problem made linear at some parameters.
@@ -117,16 +132,28 @@ impl Point {
         let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
         for (hypothesis, theta) in set.iter().zip(thetas) {
             values.extend(theta.iter());
-            sigmas.extend(library.hypotheses[*hypothesis].parameters.iter().map(|parameter| parameter.prior_sigma));
+            sigmas.extend(
+                library.hypotheses[*hypothesis]
+                    .parameters
+                    .iter()
+                    .map(|parameter| parameter.prior_sigma),
+            );
         }
         let mut screen = Screen::zeros(sigmas.clone());
         let mut energy = 0.0;
         for (channel, frame) in problem.frames.iter().enumerate() {
             let entries = slopes.iter().enumerate().filter_map(|(place, entries)| {
-                entries.iter().find(|(index, _)| *index == channel).map(|(_, values)| (place, values))
+                entries
+                    .iter()
+                    .find(|(index, _)| *index == channel)
+                    .map(|(_, values)| (place, values))
             });
             let (places, columns): (Vec<usize>, Vec<&DVector<f64>>) = entries.unzip();
-            if model.iter().all(|component| !component.active.touches(channel, problem.twin.unit())) && places.is_empty() {
+            if model
+                .iter()
+                .all(|component| !component.active.touches(channel, problem.twin.unit()))
+                && places.is_empty()
+            {
                 energy += frame.quiet_energy;
                 continue;
             }
@@ -142,12 +169,24 @@ impl Point {
         }
         let all: Vec<usize> = (0..values.len()).collect();
         let Some(estimate) = screen.estimate(&all) else {
-            return Point { estimate: nothing(values.len()), log_evidence: f64::NEG_INFINITY, to_gain: 0.0 };
+            return Point {
+                estimate: nothing(values.len()),
+                log_evidence: f64::NEG_INFINITY,
+                to_gain: 0.0,
+            };
         };
         let away = DVector::from_fn(values.len(), |index, _| {
-            if index < library.reference { 0.0 } else { estimate.parameters[index] - values[index] }
+            if index < library.reference {
+                0.0
+            } else {
+                estimate.parameters[index] - values[index]
+            }
         });
-        let prior: f64 = away.iter().zip(&sigmas).map(|(away, sigma)| (away / sigma).powi(2)).sum();
+        let prior: f64 = away
+            .iter()
+            .zip(&sigmas)
+            .map(|(away, sigma)| (away / sigma).powi(2))
+            .sum();
         let to_gain = 0.5 * (away.dot(&(&screen.information * &away)) + prior);
         Point {
             log_evidence: estimate.log_evidence - 0.5 * energy - to_gain,
@@ -165,4 +204,3 @@ fn nothing(width: usize) -> Estimate {
         energy_explained: 0.0,
     }
 }
-

@@ -19,7 +19,9 @@ const QUANTITIES: [Quantity; 9] = [
     ("|rate about y|", "deg/s", |feel| feel.rate_b.y.abs().to_degrees()),
     ("|rate about z|", "deg/s", |feel| feel.rate_b.z.abs().to_degrees()),
     ("rate", "deg/s", |feel| feel.rate_b.norm().to_degrees()),
-    ("angular acceleration", "deg/s2", |feel| feel.rate_dot_b.norm().to_degrees()),
+    ("angular acceleration", "deg/s2", |feel| {
+        feel.rate_dot_b.norm().to_degrees()
+    }),
     ("specific force", "m/s2", |feel| feel.force_b.norm()),
     ("temperature", "degC", |feel| feel.temperature_c),
     ("temperature rate", "degC/s", |feel| feel.temperature_rate.abs()),
@@ -46,7 +48,12 @@ pub fn when(feels: &[Feel], energy: &[f64]) -> String {
             let share = rows.iter().map(|row| energy[*row]).sum::<f64>() / total;
             let edge = if side == "above" { rows[rows.len() - 1] } else { rows[0] };
             if share > best.0 {
-                let words = format!("{name} {side} {:.3} {unit}: {:.0} % of the energy in {:.0} % of the time", values[edge], 100.0 * share, 100.0 * TIME_SHARE);
+                let words = format!(
+                    "{name} {side} {:.3} {unit}: {:.0} % of the energy in {:.0} % of the time",
+                    values[edge],
+                    100.0 * share,
+                    100.0 * TIME_SHARE
+                );
                 best = (share, words);
             }
         }

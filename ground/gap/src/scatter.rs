@@ -53,7 +53,12 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
         .iter()
         .map(|frame| {
             let mut rows = vec![f64::NAN; twin.starts_s().len()];
-            frame.series.rows.iter().zip(&frame.series.values).for_each(|(row, value)| rows[*row as usize] = *value);
+            frame
+                .series
+                .rows
+                .iter()
+                .zip(&frame.series.values)
+                .for_each(|(row, value)| rows[*row as usize] = *value);
             rows
         })
         .collect();
@@ -70,10 +75,22 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
         if page.nature != Nature::Spread || withheld.iter().any(|name| name == page.name) {
             continue;
         }
-        let concerned: Vec<usize> = (0..unit.channels.len()).filter(|index| page.sensors.contains(&unit.channels[*index].sensor)).collect();
+        let concerned: Vec<usize> = (0..unit.channels.len())
+            .filter(|index| page.sensors.contains(&unit.channels[*index].sensor))
+            .collect();
         let blocks: Vec<Vec<usize>> = match page.scope {
             Scope::Channel => concerned.iter().map(|index| vec![*index]).collect(),
-            Scope::Plate => unit.groups().iter().map(|group| concerned.iter().copied().filter(|index| unit.channels[*index].group == *group).collect()).collect(),
+            Scope::Plate => unit
+                .groups()
+                .iter()
+                .map(|group| {
+                    concerned
+                        .iter()
+                        .copied()
+                        .filter(|index| unit.channels[*index].group == *group)
+                        .collect()
+                })
+                .collect(),
             Scope::Unit => vec![concerned],
         };
         let variants = effect.variants(twin.starts_s());

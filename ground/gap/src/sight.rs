@@ -13,8 +13,14 @@ pub fn views(problem: &Problem) -> Vec<View> {
     let twin = problem.twin;
     let states = standardised(&twin.feels(0));
     let starts_s = twin.starts_s();
-    let fitted = problem.frames.iter().flat_map(|frame| &frame.series.rows).map(|row| starts_s[*row as usize]);
-    let (from_s, to_s) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t| (from.min(t), to.max(t)));
+    let fitted = problem
+        .frames
+        .iter()
+        .flat_map(|frame| &frame.series.rows)
+        .map(|row| starts_s[*row as usize]);
+    let (from_s, to_s) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t| {
+        (from.min(t), to.max(t))
+    });
     let view = |(channel, frame): (&twin::predict::Channel, &crate::problem::Frame)| View {
         name: channel.name.clone(),
         kind: match channel.sensor {
@@ -24,8 +30,15 @@ pub fn views(problem: &Problem) -> Vec<View> {
             Kind::Thermometer => 3,
         },
         axis_b: channel.axis_b,
-        phase: frame.series.rows.iter().map(|row| (starts_s[*row as usize] - from_s) / (to_s - from_s).max(f64::EPSILON)).collect(),
-        motion: DMatrix::from_fn(frame.series.rows.len(), QUANTITIES, |row, column| states[(frame.series.rows[row] as usize, column)]),
+        phase: frame
+            .series
+            .rows
+            .iter()
+            .map(|row| (starts_s[*row as usize] - from_s) / (to_s - from_s).max(f64::EPSILON))
+            .collect(),
+        motion: DMatrix::from_fn(frame.series.rows.len(), QUANTITIES, |row, column| {
+            states[(frame.series.rows[row] as usize, column)]
+        }),
     };
     twin.unit().channels.iter().zip(&problem.frames).map(view).collect()
 }
@@ -44,7 +57,9 @@ fn standardised(feels: &[Feel]) -> DMatrix<f64> {
     for mut column in states.column_iter_mut() {
         let mean = column.mean();
         let spread = column.variance().sqrt();
-        column.iter_mut().for_each(|value| *value = if spread > 1e-9 { (*value - mean) / spread } else { 0.0 });
+        column
+            .iter_mut()
+            .for_each(|value| *value = if spread > 1e-9 { (*value - mean) / spread } else { 0.0 });
     }
     states
 }

@@ -85,7 +85,12 @@ impl Windows {
             };
             log.channels.iter().map(|series| series.only(wanted)).collect()
         };
-        (Fit { channels: within(&self.fit) }, Held::new(within(&self.hold)))
+        (
+            Fit {
+                channels: within(&self.fit),
+            },
+            Held::new(within(&self.hold)),
+        )
     }
 }
 
@@ -132,7 +137,10 @@ mod tests {
     #[test]
     fn a_window_without_length_is_refused() {
         for (from, to) in [(3.0, 3.0), (4.0, 3.0), (0.0, f64::INFINITY)] {
-            assert_eq!(Windows::new(vec![span(from, to)], vec![]), Err(WindowsError::Empty(from, to)));
+            assert_eq!(
+                Windows::new(vec![span(from, to)], vec![]),
+                Err(WindowsError::Empty(from, to))
+            );
         }
     }
 }

@@ -21,7 +21,11 @@ pub fn read_measured(file: &Path, kind: Kind, columns: &[Column], cycle_s: Optio
     let bytes = read_bytes(file)?;
     match (kind, cycle_s) {
         (Kind::Packets, Some(cycle_s)) => from_packets(file, &bytes, columns, cycle_s),
-        (Kind::Packets, None) => Err(CaseError::key(file, "cycle_s", "is absent from the unit; packets are numbered, not timed")),
+        (Kind::Packets, None) => Err(CaseError::key(
+            file,
+            "cycle_s",
+            "is absent from the unit; packets are numbered, not timed",
+        )),
         (Kind::Csv | Kind::Table, _) => from_csv(file, &bytes, columns),
     }
 }
@@ -82,9 +86,16 @@ fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseEr
     let place_of = |name: &str| header.iter().position(|cell| cell == name);
     let places = columns
         .iter()
-        .map(|column| place_of(&column.name).ok_or_else(|| CaseError::key(file, &column.name, "is a channel of the unit without a column")))
+        .map(|column| {
+            place_of(&column.name)
+                .ok_or_else(|| CaseError::key(file, &column.name, "is a channel of the unit without a column"))
+        })
         .collect::<Result<Vec<usize>, CaseError>>()?;
-    if let Some(stranger) = header.iter().skip(1).find(|name| columns.iter().all(|column| column.name != **name)) {
+    if let Some(stranger) = header
+        .iter()
+        .skip(1)
+        .find(|name| columns.iter().all(|column| column.name != **name))
+    {
         return Err(CaseError::key(file, stranger, "is a column the unit does not describe"));
     }
     let mut log = Log::empty(columns.len());
@@ -99,11 +110,17 @@ fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseEr
             }
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
             let name = header.get(place).unwrap_or_default();
-            value.map(Some).ok_or_else(|| CaseError::key(file, line(), format!("{name} is {cell:?}, not a finite number")))
+            value
+                .map(Some)
+                .ok_or_else(|| CaseError::key(file, line(), format!("{name} is {cell:?}, not a finite number")))
         };
         let start_s = number(0)?.ok_or_else(|| CaseError::key(file, line(), "t_s is empty"))?;
         if start_s <= last_s {
-            return Err(CaseError::key(file, line(), format!("t_s {start_s} does not come after {last_s}")));
+            return Err(CaseError::key(
+                file,
+                line(),
+                format!("t_s {start_s} does not come after {last_s}"),
+            ));
         }
         last_s = start_s;
         log.begin_row(start_s);

@@ -65,7 +65,10 @@ impl Subject {
         log = within_windows(log, &opened);
         let overlap_s = seen_share(&log, (from_s, to_s));
         if overlap_s < LEAST_SEEN {
-            let problem = format!("runs from {from_s} to {to_s} s and covers {:.0} % of the windows; cut them to what both have", 100.0 * overlap_s);
+            let problem = format!(
+                "runs from {from_s} to {to_s} s and covers {:.0} % of the windows; cut them to what both have",
+                100.0 * overlap_s
+            );
             return Err(CaseError::key(&file, "t_s", problem));
         }
         let mut lost_s = vec![(f64::NEG_INFINITY, from_s)];
@@ -74,10 +77,18 @@ impl Subject {
         let unseen = drop_unseen(&mut log, &lost_s, &unit);
         let (fit, held) = opened.windows.part(&log);
         if fit.channels.iter().all(|series| series.rows.len() < 2) {
-            return Err(CaseError::key(&opened.file, "windows.fit", "holds no sample of the log"));
+            return Err(CaseError::key(
+                &opened.file,
+                "windows.fit",
+                "holds no sample of the log",
+            ));
         }
         if held.counts().iter().all(|count| *count < 2) {
-            return Err(CaseError::key(&opened.file, "windows.hold", "holds no sample of the log"));
+            return Err(CaseError::key(
+                &opened.file,
+                "windows.hold",
+                "holds no sample of the log",
+            ));
         }
         let step_s = motion.step_s();
         let scene = Scene::new(&motion, &environment, from_s, to_s, step_s);
@@ -86,7 +97,12 @@ impl Subject {
             position_sigma_m: opened.text.reference.position_sigma_m,
             field_sigma_ut: opened.text.environment.field_sigma_ut,
         };
-        let Log { start_s, masked, stream, .. } = log;
+        let Log {
+            start_s,
+            masked,
+            stream,
+            ..
+        } = log;
         Ok(Subject {
             twin: Twin::new(unit, environment, scene, start_s)?,
             opened,
@@ -128,22 +144,50 @@ fn column(channel: &Channel) -> Column {
 fn environment(opened: &Opened, unit: &UnitDescription) -> Result<Environment, CaseError> {
     let given = &opened.text.environment;
     let needs = |kind: Kind| unit.channels.iter().any(|channel| channel.sensor == kind);
-    let absent = |key: &str, sensors: &str| CaseError::key(&opened.file, format!("environment.{key}"), format!("is absent; the unit's {sensors} need it"));
+    let absent = |key: &str, sensors: &str| {
+        CaseError::key(
+            &opened.file,
+            format!("environment.{key}"),
+            format!("is absent; the unit's {sensors} need it"),
+        )
+    };
     let gravity = given.gravity_m_s2.or((!needs(Kind::Accelerometer)).then_some(0.0));
     let latitude_deg = given.latitude_deg.or((!needs(Kind::Gyro)).then_some(0.0));
     let field_n_ut = given.field_n_ut.or((!needs(Kind::Magnetometer)).then_some([0.0; 3]));
     let environment = Environment {
         gravity: gravity.ok_or_else(|| absent("gravity_m_s2", "accelerometers"))?,
-        latitude: latitude_deg.ok_or_else(|| absent("latitude_deg", "gyros"))?.to_radians(),
+        latitude: latitude_deg
+            .ok_or_else(|| absent("latitude_deg", "gyros"))?
+            .to_radians(),
         field_n_ut: Vector3::from(field_n_ut.ok_or_else(|| absent("field_n_ut", "magnetometers"))?),
         temperature_c: given.temperature_c.unwrap_or(25.0),
     };
     let checks = [
-        ("gravity_m_s2", (0.0..100.0).contains(&environment.gravity), "must be in m/s2, 0 to 100"),
-        ("latitude_deg", environment.latitude.abs() <= std::f64::consts::FRAC_PI_2, "must be in degrees, -90 to 90"),
-        ("field_n_ut", environment.field_n_ut.norm() < 1000.0, "must be in microtesla, below 1000"),
-        ("temperature_c", (-100.0..200.0).contains(&environment.temperature_c), "must be in degrees Celsius, -100 to 200"),
-        ("field_sigma_ut", (0.0..1000.0).contains(&given.field_sigma_ut), "must be in microtesla, 0 or more"),
+        (
+            "gravity_m_s2",
+            (0.0..100.0).contains(&environment.gravity),
+            "must be in m/s2, 0 to 100",
+        ),
+        (
+            "latitude_deg",
+            environment.latitude.abs() <= std::f64::consts::FRAC_PI_2,
+            "must be in degrees, -90 to 90",
+        ),
+        (
+            "field_n_ut",
+            environment.field_n_ut.norm() < 1000.0,
+            "must be in microtesla, below 1000",
+        ),
+        (
+            "temperature_c",
+            (-100.0..200.0).contains(&environment.temperature_c),
+            "must be in degrees Celsius, -100 to 200",
+        ),
+        (
+            "field_sigma_ut",
+            (0.0..1000.0).contains(&given.field_sigma_ut),
+            "must be in microtesla, 0 or more",
+        ),
     ];
     match checks.iter().find(|(_, holds, _)| !holds) {
         Some((key, _, problem)) => Err(CaseError::key(&opened.file, format!("environment.{key}"), *problem)),
@@ -153,7 +197,13 @@ fn environment(opened: &Opened, unit: &UnitDescription) -> Result<Environment, C
 
 /// Keeps the rows of a window: nothing outside them is predicted, fitted or judged.
 fn within_windows(log: Log, opened: &Opened) -> Log {
-    let spans: Vec<Span> = opened.windows.fit().iter().chain(opened.windows.hold()).copied().collect();
+    let spans: Vec<Span> = opened
+        .windows
+        .fit()
+        .iter()
+        .chain(opened.windows.hold())
+        .copied()
+        .collect();
     keep_rows(log, |start_s| spans.iter().any(|span| span.contains(start_s)))
 }
 
@@ -166,7 +216,10 @@ fn keep_rows(mut log: Log, wanted: impl Fn(f64) -> bool) -> Log {
     }
     for series in &mut log.channels {
         *series = series.only(|row| new_row[row].is_some());
-        series.rows.iter_mut().for_each(|row| *row = new_row[*row as usize].unwrap_or(*row));
+        series
+            .rows
+            .iter_mut()
+            .for_each(|row| *row = new_row[*row as usize].unwrap_or(*row));
     }
     log.start_s.retain(|start_s| wanted(*start_s));
     log

@@ -31,7 +31,9 @@ pub fn read_bytes(file: &Path) -> Result<Vec<u8>, CaseError> {
     let mut bytes = Vec::new();
     reader.take(LARGEST + 1).read_to_end(&mut bytes).map_err(wrap)?;
     if bytes.len() as u64 > LARGEST {
-        return Err(wrap(io::Error::other("is longer than 512 MiB; cut the log into several cases")));
+        return Err(wrap(io::Error::other(
+            "is longer than 512 MiB; cut the log into several cases",
+        )));
     }
     Ok(bytes)
 }
