@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     library::Library,
+    onset,
     problem::{Component, Problem},
     refine::{Refined, model_of, refine},
 };
@@ -93,6 +94,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         match found {
             Some((gain, larger, refined)) if gain > MARGIN => {
                 (set, best) = (larger, refined);
+                (set, best) = bounded(problem, library, set, best);
                 (set, best) = prune(problem, library, set, best);
                 scores = renewed_scores(problem, library, &set, &best);
             }
@@ -246,6 +248,38 @@ fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refin
         }
     }
     library.products.scores(problem, &residuals)
+}
+
+/// Gives the member added last the stretch of time in which it is on, if it is not always.
+fn bounded(problem: &Problem, library: &mut Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
+    let Some(last) = set
+        .last()
+        .copied()
+        .filter(|last| !library.hypotheses[*last].places.is_empty())
+    else {
+        return (set, best);
+    };
+    let others = model_of(library, &set[..set.len() - 1], &best.thetas[..set.len() - 1]);
+    let own = &library.hypotheses[last];
+    let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
+    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
+    let Some(span) = onset::stretch(problem, &others, slopes, &sigmas) else {
+        return (set, best);
+    };
+    let model = model_of(library, &set, &best.thetas);
+    library.hypotheses[last].span = Some(span);
+    let mut model = model;
+    model[set.len() - 1].span = Some(span);
+    let renewed = problem.slopes(&model, set.len() - 1);
+    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
+        library.products.renew(problem, place, column);
+    }
+    let refined = refine(problem, library, &set, &best.thetas);
+    if refined.log_evidence > best.log_evidence {
+        return (set, refined);
+    }
+    library.hypotheses[last].span = None;
+    (set, best)
 }
 
 /// Drops members the others can do without.

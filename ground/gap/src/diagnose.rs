@@ -320,7 +320,10 @@ fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<C
                 .any(|sized| sized.value.abs() > SUSPICIOUS * sized.parameter.prior_sigma),
             parameters,
             share: total,
-            when: regime::when(&feels, &energy),
+            when: match hypothesis.span {
+                Some(span) => format!("from {:.1} to {:.1} s", span.from, span.to),
+                None => regime::when(&feels, &energy),
+            },
             confirm_by: hypothesis.cause.effect.page().confirm_by,
             physics: hypothesis.cause.effect.page().physics,
         }

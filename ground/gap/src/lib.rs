@@ -26,6 +26,7 @@ pub mod library;
 pub mod log;
 pub mod model;
 pub mod next;
+pub mod onset;
 pub mod page;
 pub mod problem;
 pub mod products;

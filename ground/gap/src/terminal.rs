@@ -89,7 +89,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     let stream = subject.stream;
     writeln!(
         text,
-        "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}",
+        "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
         stream.lost, stream.repeated, stream.rejected, subject.unseen
     )?;
     if diagnosis.causes.is_empty() {
