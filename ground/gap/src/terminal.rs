@@ -90,7 +90,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     writeln!(
         text,
         "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
-        stream.lost, stream.repeated, stream.rejected, subject.unseen
+        stream.lost, stream.repeated, stream.rejected, subject.unseen, subject.thinned
     )?;
     if diagnosis.causes.is_empty() {
         let said = if diagnosis.none_of_these > 0.5 {
