@@ -23,6 +23,9 @@ const MARGIN: f64 = 3.0;
 /// Candidates of a screen that are fitted exactly.
 const CANDIDATES: usize = 4;
 
+/// [nats] behind the chosen effect from which a rival is not worth an exact fit.
+const FAR: f64 = 50.0;
+
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
 
@@ -314,15 +317,18 @@ fn compare(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], 
     )];
     let mut linear = gains(library, scores, &others, base);
     linear[own] = f64::NEG_INFINITY;
+    let own_gain = rivals[0].1;
     for rival in leading(&linear, CANDIDATES) {
+        if linear[rival] < own_gain - FAR {
+            rivals.push((rival, linear[rival]));
+            continue;
+        }
         let mut tried = others.clone();
         tried.push(rival);
         let refined = refine(problem, library, &tried, &thetas);
         if is_physical(library, &tried, &refined) {
-            rivals.push((
-                rival,
-                refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior,
-            ));
+            let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
+            rivals.push((rival, gain));
         }
     }
     rivals.sort_by(|one, other| other.1.total_cmp(&one.1));
