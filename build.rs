@@ -14,7 +14,7 @@ fn main() {
             "cargo:rustc-link-search={}",
             env::var("CARGO_MANIFEST_DIR").expect("set by cargo")
         );
-        for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "--icf=all"] {
             println!("cargo:rustc-link-arg-bins={argument}");
         }
     }

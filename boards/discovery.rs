@@ -22,7 +22,7 @@ use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+    ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, recorder, stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -30,7 +30,12 @@ pub type Discovery = Stm32f407<PB8, PB7>;
 
 /// Starts the chip and hands out its parts.
 pub fn init() -> Parts<Discovery> {
-    let (p, watchdog, reset) = start();
+    let Started {
+        peripherals: p,
+        watchdog,
+        reset,
+        oscillator,
+    } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PD8, p.PD9, p.DMA1_CH3);
     Parts {
         sensor_bus: SensorBus::new(p.I2C1, p.PB8, p.PB7, p.DMA1_CH7, p.DMA1_CH0, p.PE11),
@@ -49,5 +54,7 @@ pub fn init() -> Parts<Discovery> {
         retained: ResetSafeRam::new(),
         recorder: recorder(),
         reset,
+        oscillator,
+        stack_use,
     }
 }

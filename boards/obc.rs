@@ -23,7 +23,7 @@ use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    ResetSafeRam, SensorBus, Stm32f407, VehicleInputs, gyros, recorder, start, telemetry, umbilical,
+    ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, recorder, stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -31,7 +31,12 @@ pub type Obc = Stm32f407<PB6, PB7>;
 
 /// Starts the chip and hands out its parts.
 pub fn init() -> Parts<Obc> {
-    let (p, watchdog, reset) = start();
+    let Started {
+        peripherals: p,
+        watchdog,
+        reset,
+        oscillator,
+    } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PB10, p.PB11, p.DMA1_CH3);
     Parts {
         sensor_bus: SensorBus::new(p.I2C1, p.PB6, p.PB7, p.DMA1_CH7, p.DMA1_CH0, p.PB5),
@@ -50,5 +55,7 @@ pub fn init() -> Parts<Obc> {
         retained: ResetSafeRam::new(),
         recorder: recorder(),
         reset,
+        oscillator,
+        stack_use,
     }
 }

@@ -49,6 +49,10 @@ pub struct Parts<B: Board> {
     pub recorder: B::Recorder,
     /// Why the unit started.
     pub reset: ResetCause,
+    /// What its time comes from.
+    pub oscillator: Oscillator,
+    /// How much of the stack has been used; may take as long as a packet's encoding.
+    pub stack_use: fn() -> StackUse,
 }
 
 /// Frees a bus on which a transfer was abandoned.
@@ -100,4 +104,34 @@ pub enum ResetCause {
     Software,
     /// The reset pin.
     Pin,
+}
+
+/// What the unit's clock, and with it every time and baud rate, comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Oscillator {
+    /// The crystal.
+    #[default]
+    Crystal,
+    /// The microcontroller's own oscillator, because the crystal did not start: off by up to 8 % over temperature.
+    Internal,
+}
+
+impl Oscillator {
+    /// Its name on the console.
+    pub fn name(self) -> &'static str {
+        match self {
+            Oscillator::Crystal => "crystal",
+            Oscillator::Internal => "internal",
+        }
+    }
+}
+
+/// How deep the stack has grown since the start. Both are zero where nobody knows, as on a host.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StackUse {
+    /// Bytes used at most.
+    pub used: usize,
+    /// Bytes there are.
+    pub size: usize,
 }

@@ -4,7 +4,7 @@
 //! `0-3` magic, `4` cause, `5` length of the place, `6-7` spare, `8-11` pc or line, `12-15` lr, `16-19` CFSR,
 //! `20-27` uptime [us], `28-59` last characters of the place (source file). Anything whose checksum is wrong is refused.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use heapless::String;
 
 /// Bytes of an encoded record.
@@ -14,7 +14,8 @@ const MAGIC: [u8; 4] = *b"EMCR";
 const CHECKED: usize = CRASH_BYTES - 4;
 const PLACE: usize = 28;
 const PLACE_BYTES: usize = CHECKED - PLACE;
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// Without a table, which would take a kilobyte of flash.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What ended the previous run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

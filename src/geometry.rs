@@ -2,9 +2,18 @@
 //!
 //! The plates stand on the faces of a nearly regular tetrahedron, tilted by atan(1/3) (thesis, section 3.2; the exact
 //! angle is 18.4349 deg, its 18.4345 a slip). The thesis' frame e is left-handed: `x_b = z_e, y_b = y_e, z_b = x_e`; it
-//! does not appear here. Gyro `i` senses the right-handed rate about `-z` of plate `i`.
+//! does not appear here, but only in [`frame_e`], the door for figures written in it. Gyro `i` senses the right-handed rate
+//! about `-z` of plate `i`.
 
-use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix};
+pub mod frame_e;
+
+use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix, Vector3};
+
+/// How many plates there are.
+pub const PLATES: usize = 4;
+
+/// Axes of four three-axis sensors: x, y, z of plate 1, then of plate 2, and so on.
+pub const TRIAD_AXES: usize = 3 * PLATES;
 
 /// cos atan(1/3) = 3/sqrt(10).
 const C: f32 = 0.948_683_3;
@@ -21,6 +30,22 @@ pub fn dcm_bp(plate: usize) -> Matrix3<f32> {
         2 => Matrix3::new(S / 2.0, -H, -C / 2.0, S * H, 0.5, -C * H, C, 0.0, S),
         _ => Matrix3::new(-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0),
     }
+}
+
+/// Sense axes in b of the accelerometers, which are those of the magnetometers too: the rows of the 12 x 3 stack
+/// `[M1; M2; M3; M4]^T` of section 3.3. Each plate is a rotation, so the stack `H` has `H^T H = 4 I` and its pseudo-inverse
+/// is `H^T / 4`: the mean of the four plates.
+pub fn triad_axes_b() -> [Vector3<f32>; TRIAD_AXES] {
+    core::array::from_fn(|k| dcm_bp(k / 3).column(k % 3).into_owned())
+}
+
+/// [m] place of a plate's accelerometer in b, from the unit's centre of rotation.
+///
+/// Reference design: 16 mm and -9 mm along the plate's axes from its middle, which is 42 mm (sides) or 38 mm (base) from
+/// the centre, against `z_p`. A calibration says where they are on a unit.
+pub fn accelerometer_place_b(plate: usize) -> Vector3<f32> {
+    let distance = if plate < 3 { 0.042 } else { 0.038 };
+    dcm_bp(plate) * Vector3::new(0.016, -0.009, -distance)
 }
 
 /// Sense axes of the four gyros in b, one a row: `gyro = gyro_axes_b() * omega_b`.
@@ -48,8 +73,6 @@ pub fn rate_from_gyros(present: u8) -> Option<SMatrix<f32, 3, 4>> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
 
     /// f32 rounding of products of three numbers below one.
@@ -65,6 +88,21 @@ mod tests {
                 "plate {plate}"
             );
         }
+    }
+
+    #[test]
+    fn the_pseudo_inverse_of_the_stack_is_a_quarter_of_its_transpose() {
+        let axes_b = SMatrix::<f32, 12, 3>::from_fn(|k, axis| triad_axes_b()[k][axis]);
+        assert!((axes_b.transpose() * axes_b - Matrix3::identity() * 4.0).norm() < 12.0 * ROUNDING);
+        let force_b = Vector3::new(1.0, -2.0, 9.8);
+        assert!((axes_b.transpose() * (axes_b * force_b) / 4.0 - force_b).norm() < 20.0 * ROUNDING);
+    }
+
+    #[test]
+    fn plate_four_measures_down_along_its_z() {
+        let rest = triad_axes_b().map(|axis_b| axis_b.dot(&Vector3::new(0.0, 0.0, -1.0)));
+        assert_eq!(rest[9..], [0.0, 0.0, 1.0]);
+        assert!((rest[0] + C).abs() < ROUNDING && (rest[2] + S).abs() < ROUNDING);
     }
 
     #[test]

@@ -20,18 +20,25 @@ macro_rules! log_line {
     };
 }
 
+pub mod attitude;
 pub mod board;
 pub mod budget;
+pub mod calibration;
 pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod faults;
 pub mod geometry;
 pub mod increments;
+pub mod kalman;
 pub mod mode;
 pub mod packet;
+pub mod quest;
 pub mod recorder;
+pub mod redundancy;
 pub mod resume;
 pub mod sample;
 pub mod sensor;
+pub mod triad;
 pub mod unit;

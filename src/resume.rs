@@ -4,7 +4,7 @@
 //! `0-3` magic, `4` mode, `5` recording, `6-7` counter of the next packet, `8-9` resets, `10-11` zero. What power-on
 //! leaves in RAM, or what a reset tore in mid-write, is refused by its checksum.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use crate::mode::Mode;
 
@@ -13,7 +13,8 @@ pub const RESUME_BYTES: usize = 16;
 
 const MAGIC: [u8; 4] = *b"EMRS";
 const CHECKED: usize = RESUME_BYTES - 4;
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// Without a table, which would take a kilobyte of flash.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What the unit was doing when a reset struck.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -33,7 +33,7 @@ use crate::{
 };
 
 use gyros::Gyros;
-use shared::Shared;
+use shared::{Shared, Start};
 
 /// What a laboratory may choose without touching the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +95,14 @@ impl Settings {
 pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     let resume = parts.retained.resume();
     let crash = parts.retained.take_crash();
-    let shared = Shared::new(settings, parts.reset, resume, crash);
+    let start = Start {
+        reset: parts.reset,
+        resume,
+        crash,
+        oscillator: parts.oscillator,
+        stack_use: parts.stack_use,
+    };
+    let shared = Shared::new(settings, start);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();

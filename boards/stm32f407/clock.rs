@@ -2,7 +2,8 @@
 //!
 //! Out: SYSCLK 168 MHz, AHB 168, APB1 42, APB2 84 MHz either way; flash caches on. From the crystal, time is as good
 //! as the crystal. From the HSI it is off by up to 1 % at 25 degC and 8 % over temperature (STM32F407 datasheet, table
-//! "HSI oscillator characteristics"): the unit flies on, the log says so, and times and baud rates carry that error.
+//! "HSI oscillator characteristics"): the unit flies on, log, status and derived frames say so, and times and baud rates
+//! carry that error.
 //!
 //! A crystal that stops in flight raises the clock security system's NMI (RM0090 section 7.2.7). It has no handler of
 //! its own: it ends in a crash record and a reset, after which the crystal does not start and the HSI takes over.
@@ -13,13 +14,14 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
+use emems::board::Oscillator;
 
 /// Reads of RCC_CR until the crystal is given up: at least four cycles of the 16 MHz HSI each, so at least 100 ms, as
 /// long as ST's own start-up code waits. A healthy crystal needs 2 ms (STM32F407 datasheet, tSU(HSE)).
 const HSE_READS: u32 = 400_000;
 
-/// Starts the clocks. The HAL would wait for a dead crystal for ever, so the crystal is tried before it is asked to.
-pub fn start() -> Peripherals {
+/// Starts the clocks and says what they come from. The HAL would wait for a dead crystal for ever, so the crystal is tried before it is asked to.
+pub fn start() -> (Peripherals, Oscillator) {
     let crystal = hse_starts();
     let mut config = Config::default();
     let (source, prediv) = if crystal {
@@ -52,12 +54,12 @@ pub fn start() -> Peripherals {
         w.set_icen(true);
         w.set_dcen(true);
     });
-    if crystal {
-        RCC.cr().modify(|w| w.set_csson(true));
-    } else {
+    if !crystal {
         defmt::warn!("the 8 MHz crystal did not start: running from the HSI, times are off by up to 8 %");
+        return (peripherals, Oscillator::Internal);
     }
-    peripherals
+    RCC.cr().modify(|w| w.set_csson(true));
+    (peripherals, Oscillator::Crystal)
 }
 
 fn hse_starts() -> bool {

@@ -18,12 +18,13 @@ mod crash;
 mod gyros;
 mod lines;
 mod retained;
+mod stack;
 
 use core::marker::PhantomData;
 
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
-use emems::board::{Board, ResetCause, Watchdog};
+use emems::board::{Board, Oscillator, ResetCause, Watchdog};
 use emems::recorder::MemoryRecorder;
 use static_cell::ConstStaticCell;
 
@@ -31,6 +32,7 @@ pub use self::bus::SensorBus;
 pub use self::gyros::gyros;
 pub use self::lines::{VehicleInputs, telemetry, umbilical};
 pub use self::retained::ResetSafeRam;
+pub use self::stack::stack_use;
 
 bind_interrupts!(struct Irqs {
     I2C1_EV => i2c::EventInterruptHandler<peripherals::I2C1>;
@@ -82,14 +84,32 @@ impl Watchdog for Iwdg {
 /// and whoever feeds must do so every 0.6 s.
 const WATCHDOG_US: u32 = 1_000_000;
 
+/// A chip that runs.
+pub struct Started {
+    /// Its pins and peripherals.
+    pub peripherals: Peripherals,
+    /// Its watchdog.
+    pub watchdog: Iwdg,
+    /// Why it started.
+    pub reset: ResetCause,
+    /// What its clocks come from.
+    pub oscillator: Oscillator,
+}
+
 /// Starts the watchdog, then the clocks and the time driver.
 ///
 /// In this order, so that an oscillator that never gets ready ends in a reset and not in a loop of the HAL.
-pub fn start() -> (Peripherals, Iwdg, ResetCause) {
-    let cause = retained::reset_cause();
+pub fn start() -> Started {
+    let reset = retained::reset_cause();
     embassy_stm32::pac::DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
     // SAFETY: `embassy_stm32::init` has not handed out the peripherals yet, and no board file takes this one from them.
     let mut watchdog = IndependentWatchdog::new(unsafe { peripherals::IWDG::steal() }, WATCHDOG_US);
     watchdog.unleash();
-    (clock::start(), Iwdg(watchdog), cause)
+    let (peripherals, oscillator) = clock::start();
+    Started {
+        peripherals,
+        watchdog: Iwdg(watchdog),
+        reset,
+        oscillator,
+    }
 }

@@ -24,14 +24,18 @@ impl<const N: usize> Kept<N> {
     }
 
     fn read(&self) -> [u8; N] {
-        // SAFETY: the memory exists, every bit pattern is a byte, and a volatile read takes what is there whether or not
-        // this run has written it.
-        unsafe { self.0.get().cast::<[u8; N]>().read_volatile() }
+        let first = self.0.get().cast::<u8>();
+        // SAFETY: these N bytes exist, every bit pattern is a byte, and a volatile read takes what is there whether or not
+        // this run has written it. One by one, because a volatile read of them all is N loads and N stores of code.
+        core::array::from_fn(|index| unsafe { first.add(index).read_volatile() })
     }
 
     fn write(&self, bytes: [u8; N]) {
-        // SAFETY: as for `read`; volatile, because nothing in this run may ever read it back.
-        unsafe { self.0.get().cast::<[u8; N]>().write_volatile(bytes) }
+        let first = self.0.get().cast::<u8>();
+        for (index, byte) in bytes.into_iter().enumerate() {
+            // SAFETY: as for `read`; volatile, because nothing in this run may ever read it back.
+            unsafe { first.add(index).write_volatile(byte) }
+        }
     }
 }
 

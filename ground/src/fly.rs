@@ -4,8 +4,10 @@
 //! (the emulated board or the host one) is a [`board::Flight`]; everything here is the same for both.
 
 pub mod board;
+mod interrupt;
 pub mod plan;
 mod progress;
+pub mod site;
 pub mod source;
 pub mod watch;
 
@@ -15,6 +17,7 @@ use twin::{plant::Plant, run::Bench};
 
 use self::{
     board::{BoardError, Remark},
+    interrupt::Interrupt,
     plan::{Arguments, PlanError},
     progress::Progress,
     source::{Source, SourceError},
@@ -45,6 +48,9 @@ pub enum FlyError {
     /// The console.
     #[error(transparent)]
     Console(#[from] console::Error),
+    /// The operating system's interrupt.
+    #[error("Ctrl-C cannot be listened to: {0}")]
+    Interrupt(#[from] ctrlc::Error),
     /// The thread of the flight.
     #[error("the flight cannot be run beside the console: {0}")]
     Thread(#[from] io::Error),
@@ -58,6 +64,10 @@ pub enum FlyError {
 /// # Errors
 /// See [`FlyError`].
 pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
+    fly_until(arguments, &Interrupt::listen()?)
+}
+
+fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<(), FlyError> {
     let source = source::open(arguments)?;
     let duration = plan::duration_of(arguments.duration, source.truth.duration_s());
     let faults = plan::faults(&arguments.silent, duration)?;
@@ -69,15 +79,15 @@ pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
     let progress = Progress::start(duration, arguments.real_time || arguments.console, arguments.console);
     let plant = Plant::new(source.truth.clone(), arguments.seed);
     let (seen, remarks) = if arguments.console {
-        beside_the_console(arguments, folder, progress, move |watch| {
+        beside_the_console(arguments, folder, progress, interrupt, move |watch| {
             flight(plant, &faults, end, watch)
         })?
     } else {
-        let mut watch = Watch::new(folder, progress, None, arguments.derived);
+        let mut watch = Watch::new(folder, progress, None, arguments.derived, interrupt.clone());
         let remarks = flight(plant, &faults, end, &mut watch)?;
         (watch.finish()?, remarks)
     };
-    report(arguments, &source, seen, remarks)
+    report(arguments, &source, duration, seen, remarks)
 }
 
 /// Flies in a thread of its own while the user has the terminal; ends when both do.
@@ -85,11 +95,12 @@ fn beside_the_console(
     arguments: &Arguments,
     folder: Folder,
     progress: Progress,
+    interrupt: &Interrupt,
     flight: impl FnOnce(&mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send + 'static,
 ) -> Result<(Seen, Vec<Remark>), FlyError> {
     let (line, unit) = line::channel("the flying unit");
     let kept = folder.path().join("umbilical.txt");
-    let mut watch = Watch::new(folder, progress, Some(unit), arguments.derived);
+    let mut watch = Watch::new(folder, progress, Some(unit), arguments.derived, interrupt.clone());
     let flying = thread::Builder::new()
         .name("flight".into())
         .spawn(move || -> Result<_, FlyError> {
@@ -103,13 +114,25 @@ fn beside_the_console(
 }
 
 /// Writes the page and prints the summary.
-fn report(arguments: &Arguments, source: &Source, seen: Seen, remarks: Vec<Remark>) -> Result<(), FlyError> {
+fn report(
+    arguments: &Arguments,
+    source: &Source,
+    planned: Duration,
+    seen: Seen,
+    remarks: Vec<Remark>,
+) -> Result<(), FlyError> {
     let board = if arguments.host {
         "host, virtual time"
     } else {
         "emulated STM32F4, release image"
     };
     let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
+    if seen.flown < planned {
+        rows.push((
+            "ended",
+            format!("when asked to, before the {} s planned", planned.as_secs_f64()),
+        ));
+    }
     rows.extend(remarks);
     rows.extend(seen.summary.rows());
     let title = format!("{} flight, unit {}", source.name, arguments.seed);
@@ -178,8 +201,8 @@ mod tests {
             &out,
         ]);
         let arguments = arguments.expect("arguments");
-        fly(&arguments).expect("first flight");
-        fly(&arguments).expect("second flight");
+        fly_until(&arguments, &Interrupt::default()).expect("first flight");
+        fly_until(&arguments, &Interrupt::default()).expect("second flight");
         let packets = |name: &str| fs::read(place.path().join(name).join("packets.txt")).expect(name);
         assert_eq!(packets("tumble-7"), packets("tumble-7-2"));
         let counts = fs::read_to_string(place.path().join("tumble-7/counts.csv")).expect("counts");
@@ -193,6 +216,40 @@ mod tests {
     }
 
     #[test]
+    fn an_interrupted_flight_keeps_what_was_flown_with_its_page_and_summary() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().to_string_lossy();
+        let arguments = words(&["--host", "--motion", "still", "--duration", "1000h", "--out", &out]);
+        let interrupt = Interrupt::default();
+        assert!(!interrupt.raise() && interrupt.raise(), "the second ends the program");
+        fly_until(&arguments.expect("arguments"), &interrupt).expect("flight");
+        let read = |name: &str| fs::read_to_string(place.path().join("still-1").join(name)).expect(name);
+        assert!(
+            read("summary.txt").contains("before the 3600000 s planned"),
+            "{}",
+            read("summary.txt")
+        );
+        assert!(read("index.html").contains("before the 3600000 s planned"));
+    }
+
+    #[test]
+    fn a_place_goes_with_a_motion_file_only() {
+        assert!(
+            words(&[
+                "--motion-file",
+                "x.csv",
+                "--latitude-deg",
+                "-2.37",
+                "--field-n-ut",
+                "-1,2,3"
+            ])
+            .is_ok()
+        );
+        assert!(words(&["--motion", "still", "--latitude-deg", "-2.37"]).is_err());
+        assert!(words(&["--motion-file", "x.csv", "--latitude-deg", "237"]).is_err());
+    }
+
+    #[test]
     fn two_sources_at_once_are_refused() {
         assert!(words(&["--motion", "still", "--recording", "x.csv"]).is_err());
         assert!(words(&["--recording", "x.csv", "--motion-file", "y.csv"]).is_err());
@@ -203,7 +260,10 @@ mod tests {
         let place = tempfile::tempdir().expect("temporary folder");
         let out = place.path().to_string_lossy();
         let arguments = words(&["--host", "--recording", "no-such-file.csv", "--out", &out]).expect("arguments");
-        let error = fly(&arguments).err().map(|error| error.to_string()).unwrap_or_default();
+        let error = fly_until(&arguments, &Interrupt::default())
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default();
         assert!(error.contains("no-such-file.csv"), "{error}");
         assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 0);
     }

@@ -16,6 +16,9 @@ enum Command {
     Console(ground::console::Arguments),
     Gap(gap::Arguments),
     Size(ground::size::Arguments),
+    Allan(bench::allan::Arguments),
+    Calibrate(bench::calibrate::Arguments),
+    Design(bench::design::command::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -36,6 +39,9 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Gap(arguments) => gap::run(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
+        Command::Allan(arguments) => bench::allan::run(&arguments)?,
+        Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
+        Command::Design(arguments) => bench::design::command::run(&arguments)?,
     }
     Ok(())
 }

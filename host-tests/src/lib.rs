@@ -1,5 +1,9 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
+pub mod counts;
+pub mod reference;
+pub mod watched;
+
 use std::sync::Arc;
 
 use emems::{

@@ -34,6 +34,7 @@ fn help_lists_every_word_and_version_and_status_answer() {
     }
     assert!(flown.replied("G_VE: e-MEMS 0.1.0"), "{replies:#?}");
     assert!(flown.replied("G_ST WAIT task none recording 0"), "{replies:#?}");
+    assert!(flown.replied("G_ST clock crystal stack 0 of 0 bytes"), "{replies:#?}");
 }
 
 #[test]

@@ -111,6 +111,74 @@ fn a_part_that_holds_sda_is_freed_by_clock_pulses() {
     assert!(flown.second(5).iter().all(|reading| reading.errors.0 == 0));
 }
 
+/// [ns] longer than any read may take.
+const TOO_LONG: u64 = 20 * MS;
+/// [ns] shorter than any.
+const A_WHILE: u64 = MS / 5;
+/// [ns] by how much the packet of a cycle with such a part may come later than 10 ms after the cycle's start.
+const LATER: u64 = 15 * MS;
+/// Slots of the gyros, which are on another bus.
+const GYROS: std::ops::Range<usize> = 8..12;
+
+#[test]
+fn a_part_that_stretches_the_clock_too_long_is_cut_off_and_all_others_are_read() {
+    for slot in (0..SENSOR_COUNT).filter(|slot| !GYROS.contains(slot)) {
+        let flown = still()
+            .fault(3 * S, Fault::Stretching(slot, TOO_LONG))
+            .fault(3 * S + 200 * MS, Fault::Stretching(slot, 0))
+            .say(1, b"G_DL")
+            .fly(5 * S);
+        assert!(
+            flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= LATER),
+            "slot {slot}: {:?}",
+            flown.periods()
+        );
+        let hit = flown.derived.iter().find(|frame| frame.health.0 as u16 != 0);
+        let hit = hit.expect("a cycle with an error");
+        assert_eq!(hit.health.0 as u16, 1 << slot, "slot {slot}: nothing else is lost");
+        assert!(hit.health.contains(Health::BUS_RECOVERED), "slot {slot}");
+        // Sixteen milliseconds for the one; the others, freeing the bus and waiting for its plate take the rest.
+        assert!(
+            (19_000..26_000).contains(&hit.cycle_us),
+            "slot {slot}: {} us",
+            hit.cycle_us
+        );
+        assert!(
+            flown.second(4).iter().all(|reading| reading.errors.0 == 0),
+            "slot {slot}"
+        );
+    }
+}
+
+#[test]
+fn a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most() {
+    for slot in [0, 5, 15] {
+        let flown = still().fault(3 * S, Fault::Stretching(slot, 60 * S)).fly(6 * S);
+        let plate = 0b0001_0000_0001_0001 << (slot % 4);
+        for reading in &flown.second(5) {
+            let errors = reading.errors.0;
+            assert!(
+                errors >> slot & 1 == 1 && errors & !plate == 0,
+                "slot {slot}: {errors:04X}"
+            );
+        }
+        // The three parts of its plate are each cut off once, in one cycle.
+        assert!(
+            flown
+                .periods()
+                .iter()
+                .all(|period| period.abs_diff(200 * MS) <= 3 * 17 * MS)
+        );
+    }
+}
+
+#[test]
+fn a_part_that_stretches_the_clock_for_a_while_is_waited_for() {
+    let flown = still().fault(3 * S, Fault::Stretching(4, A_WHILE)).fly(6 * S);
+    assert!(flown.packets.iter().all(|(_, reading)| reading.errors.0 == 0));
+    assert!(flown.strange.is_empty());
+}
+
 #[test]
 fn the_multiplexer_gone_takes_the_i2c_parts_and_nothing_else() {
     let flown = still()

@@ -57,3 +57,47 @@ fn a_reset_in_flight_resumes_flight_within_400_ms() {
         "the counter goes on; at most the packet on the line is lost"
     );
 }
+
+/// [ns] the independent watchdog, and the moment in between of its last feeding.
+const WATCHDOG: std::ops::Range<u64> = S..S + 250 * MS;
+
+/// A flight in which a part of the unit hangs, and the words that show that it goes on.
+fn a_hang_ends_in_a_reset_that_resumes_flight(fault: Fault) {
+    let hangs = 5 * S + 77 * MS;
+    let flown = Flight::ideal(world("still"))
+        .say(S, b"G_MVG_MV")
+        .say(2 * S, b"G_MG")
+        .fault(hangs, fault)
+        .say(hangs + 2 * S, b"G_ST")
+        .fly(hangs + 4 * S);
+    let [(struck, cause)] = flown.report.resets[..] else {
+        panic!("{fault:?}: {:?}", flown.report.resets)
+    };
+    assert_eq!(cause, ResetCause::Watchdog, "{fault:?}");
+    assert!(WATCHDOG.contains(&(struck - hangs)), "{fault:?}: {}", struck - hangs);
+    for reply in [
+        "started: Watchdog",
+        "G_ST FLIGHT task none recording 1",
+        "started Watchdog resets 1",
+    ] {
+        assert!(flown.replied(reply), "{fault:?}: {reply} in {:?}", flown.replies());
+    }
+    let after: Vec<u16> = (flown.packets.iter())
+        .filter(|(at, reading)| *at > struck && reading.errors.0 == 0)
+        .map(|(_, reading)| reading.counter)
+        .collect();
+    assert!(after.len() >= 10, "{fault:?}: {after:?}");
+    let before = flown.packets.iter().rfind(|(at, _)| *at < struck);
+    let step = after[0] - before.expect("packets before the reset").1.counter;
+    assert!((1..=2).contains(&step), "{fault:?}: the counter went on by {step}");
+}
+
+#[test]
+fn a_part_that_never_yields_lets_the_watchdog_bite_and_flight_is_resumed() {
+    a_hang_ends_in_a_reset_that_resumes_flight(Fault::DmaHung);
+}
+
+#[test]
+fn a_part_that_never_votes_lets_the_watchdog_bite_though_all_others_go_on() {
+    a_hang_ends_in_a_reset_that_resumes_flight(Fault::RecorderHung);
+}

@@ -12,7 +12,7 @@ use core::fmt::Display;
 use embassy_time::{Duration, Instant};
 
 use super::{
-    clock::{TimedOut, next_on_grid},
+    clock::{TimedOut, next_on_grid, now},
     gyros::Gyros,
     plates::{Plates, Taken},
     shared::{Cycle, Shared},
@@ -59,7 +59,7 @@ pub async fn run<B: Board>(
         standing: [Standing::Lost; SENSOR_COUNT],
         health: Health::default(),
     };
-    if shared.reset == ResetCause::PowerOn {
+    if shared.start.reset == ResetCause::PowerOn {
         let started = shared.clock.until(Instant::from_millis(GYRO_START_MS));
         votes.waiting(Voter::Acquire, started).await;
     }
@@ -68,9 +68,9 @@ pub async fn run<B: Board>(
             .configure(slot, acquisition.budget.limit_us(0, 0, false))
             .await;
     }
-    let resume = shared.resume.unwrap_or_default();
+    let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
-    let resets = resume.resets.saturating_add(u16::from(shared.resume.is_some()));
+    let resets = shared.start.resets();
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
     // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.
@@ -97,7 +97,7 @@ pub async fn run<B: Board>(
         });
         start += period;
         let limit_us = acquisition.budget.limit_us(0, 0, true);
-        if Instant::now() + Duration::from_micros(2 * limit_us) < start {
+        if now() + Duration::from_micros(2 * limit_us) < start {
             acquisition.verify(verified, limit_us).await;
             verified = (verified + 1) % SENSOR_COUNT;
         }
@@ -120,7 +120,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
         let mut reading = Reading::unread(counter);
         let mut slots_us = [NO_SLOT; SENSOR_COUNT];
         for (slot, slot_us) in slots_us.iter_mut().enumerate() {
-            let elapsed_us = start.elapsed().as_micros();
+            let elapsed_us = (now() - start).as_micros();
             let waiting = (SENSOR_COUNT - 1 - slot) as u64;
             let lost = self.standing[slot] == Standing::Lost;
             let limit_us = self.budget.limit_us(elapsed_us, waiting, lost);
@@ -146,7 +146,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
             packet: packet::encode(&reading),
             increments: self.shared.integrator.borrow_mut().take(),
             health: core::mem::take(&mut self.health).with(self.gyros.take_health()),
-            cycle_us: start.elapsed().as_micros() as u32,
+            cycle_us: (now() - start).as_micros() as u32,
         }
     }
 
@@ -228,15 +228,18 @@ impl<B: Board> Acquisition<'_, '_, B> {
         match outcome {
             Ok(Ok(value)) => return Some(value),
             Ok(Err(error)) => self.lose(slot, &error),
-            Err(TimedOut) => {
-                self.lose(slot, &"no answer in time");
-                if SENSORS[slot].kind != Kind::Gyro {
-                    self.health = self.health.with(Health::BUS_RECOVERED);
-                    self.switch.recover().await;
-                }
-            }
+            Err(TimedOut) => self.abandon(slot).await,
         }
         None
+    }
+
+    /// A sensor that was cut off in the middle of a transfer.
+    async fn abandon(&mut self, slot: usize) {
+        self.lose(slot, &"no answer in time");
+        if SENSORS[slot].kind != Kind::Gyro {
+            self.health = self.health.with(Health::BUS_RECOVERED);
+            self.switch.recover().await;
+        }
     }
 
     fn lose(&mut self, slot: usize, why: &dyn Display) {

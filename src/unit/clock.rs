@@ -23,11 +23,17 @@ pub struct Clock {
     next: Cell<Instant>,
 }
 
+/// The hardware clock. Not inlined wherever it is read: flash is short.
+#[inline(never)]
+pub fn now() -> Instant {
+    Instant::now()
+}
+
 /// The next instant on the grid of multiples of `interval` of the unit's time, shifted by `phase`. Parts that do their
 /// work on shifted grids keep out of each other's way, and do it at the same times whatever start-up took.
 pub fn next_on_grid(interval: Duration, phase: Duration) -> Instant {
     let interval = interval.as_ticks().max(1);
-    let since = Instant::now().as_ticks().saturating_sub(phase.as_ticks());
+    let since = now().as_ticks().saturating_sub(phase.as_ticks());
     Instant::from_ticks((since / interval + 1) * interval) + phase
 }
 
@@ -39,7 +45,7 @@ impl Clock {
     /// A clock that starts now.
     pub fn new() -> Self {
         Clock {
-            now: Cell::new(Instant::now()),
+            now: Cell::new(now()),
             next: Cell::new(Instant::MAX),
         }
     }
@@ -47,7 +53,7 @@ impl Clock {
     /// Runs the parts that wait on this clock.
     pub async fn drive<F: Future>(&self, mut parts: Pin<&mut F>) -> F::Output {
         poll_fn(|context| {
-            self.now.set(Instant::now());
+            self.now.set(now());
             self.next.set(Instant::MAX);
             let polled = parts.as_mut().poll(context);
             if polled.is_pending() && self.next.get() != Instant::MAX {
@@ -83,11 +89,12 @@ impl Clock {
         Within {
             future,
             clock: self,
-            until: Instant::now() + limit,
+            until: now() + limit,
         }
     }
 
-    /// Whether `at` has come; if not, it is waited for.
+    /// Whether `at` has come; if not, it is waited for. Not inlined into each of the unit's waits: flash is short.
+    #[inline(never)]
     fn has_come(&self, at: Instant) -> bool {
         let come = at <= self.now.get();
         if !come {
@@ -122,7 +129,7 @@ impl<F: Future> Future for Within<'_, F> {
 
 impl DelayNs for &Clock {
     async fn delay_ns(&mut self, ns: u32) {
-        self.until(Instant::now() + Duration::from_micros(u64::from(ns).div_ceil(1000)))
+        self.until(now() + Duration::from_micros(u64::from(ns).div_ceil(1000)))
             .await;
     }
 }

@@ -5,6 +5,7 @@ use super::{
     vote::{Voter, Votes},
 };
 use crate::{
+    board::Oscillator,
     derived::{Derived, Health},
     mode::State,
 };
@@ -17,21 +18,26 @@ pub async fn run(shared: &Shared, votes: &Votes) {
     loop {
         let cycle = votes.waiting(Voter::Estimate, cycles.next_message_pure()).await;
         let state = *shared.state.borrow();
-        shared.publish_derived(derive(&cycle, state, shared.recorder_refused.get()));
+        let health = cycle
+            .health
+            .with_if(Health::RECORDER_REFUSED, shared.recorder_refused.get())
+            .with_if(
+                Health::INTERNAL_OSCILLATOR,
+                shared.start.oscillator == Oscillator::Internal,
+            );
+        shared.publish_derived(derive(&cycle, state, health));
     }
 }
 
-fn derive(cycle: &Cycle, state: State, recorder_refused: bool) -> Derived {
+fn derive(cycle: &Cycle, state: State, health: Health) -> Derived {
     let reading = &cycle.sample.reading;
     Derived {
         counter: reading.counter,
         start_us: cycle.sample.start_us,
         mode: state.mode,
-        health: cycle
-            .health
+        health: health
             .with(Health(reading.errors.0.into()))
-            .with_if(Health::RECORDING, state.recording)
-            .with_if(Health::RECORDER_REFUSED, recorder_refused),
+            .with_if(Health::RECORDING, state.recording),
         cycle_us: cycle.cycle_us,
         slots_us: cycle.sample.slots_us,
         increments: cycle.increments,

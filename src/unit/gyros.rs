@@ -12,7 +12,7 @@ use embedded_hal_async::spi::SpiDevice;
 
 use super::{
     Settings,
-    clock::{Clock, next_on_grid},
+    clock::{Clock, next_on_grid, now},
     shared::Shared,
     vote::{Voter, Votes},
 };
@@ -81,9 +81,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         self.answers(plate, false);
         self.parts.lock().await[plate].start_self_test().await?;
         loop {
-            self.clock
-                .until(Instant::now() + Duration::from_millis(TEST_POLL_MS))
-                .await;
+            self.clock.until(now() + Duration::from_millis(TEST_POLL_MS)).await;
             if let Some(diagnosis) = self.parts.lock().await[plate].self_test_result().await? {
                 return Ok(diagnosis);
             }
@@ -109,7 +107,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         let answering = self.answering.get();
         let is_answering = |plate: &usize| answering >> plate & 1 == 1;
         self.clock.until(self.last_frame.get() + STALL).await;
-        let asked = Instant::now();
+        let asked = now();
         for plate in (0..4).filter(is_answering) {
             let request = parts[plate].request(adis16265::GYRO_OUT).await;
             let _ = self.settle(plate, request);
@@ -140,7 +138,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
 
     /// As [`Gyros::settle`], after frames outside a fast sample, which will have to pause before its own.
     fn rest<T>(&self, plate: usize, outcome: Result<T, Error<SPI::Error>>) -> Result<T, Error<SPI::Error>> {
-        self.last_frame.set(Instant::now());
+        self.last_frame.set(now());
         self.settle(plate, outcome)
     }
 

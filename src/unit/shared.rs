@@ -12,7 +12,7 @@ use heapless::String;
 
 use super::{Settings, clock::Clock};
 use crate::{
-    board::ResetCause,
+    board::{Oscillator, ResetCause, StackUse},
     crash::CrashRecord,
     derived::{Derived, Health},
     increments::{Increments, Integrator},
@@ -55,18 +55,35 @@ pub type Line = String<128>;
 /// A packet on its way from the recorder's part to the umbilical's.
 pub type DumpedPacket = [u8; PACKET_BYTES];
 
-/// The shared state. Everything in it is touched between two awaits only.
-pub struct Shared {
-    /// The clock all parts wait on.
-    pub clock: Clock,
-    /// What was chosen.
-    pub settings: Settings,
+/// What the board says of this start.
+pub struct Start {
     /// Why the unit started.
     pub reset: ResetCause,
     /// What it was doing before.
     pub resume: Option<Resume>,
     /// The crash before this start.
     pub crash: Option<CrashRecord>,
+    /// What its time comes from.
+    pub oscillator: Oscillator,
+    /// How much of the stack has been used.
+    pub stack_use: fn() -> StackUse,
+}
+
+impl Start {
+    /// Resets since power-on, the one before this start among them.
+    pub fn resets(&self) -> u16 {
+        self.resume.map_or(0, |resume| resume.resets.saturating_add(1))
+    }
+}
+
+/// The shared state. Everything in it is touched between two awaits only.
+pub struct Shared {
+    /// The clock all parts wait on.
+    pub clock: Clock,
+    /// What was chosen.
+    pub settings: Settings,
+    /// What the board says of this start.
+    pub start: Start,
     /// Mode, task, confirmations.
     pub state: RefCell<State>,
     /// The gyros' running integration.
@@ -97,14 +114,12 @@ pub struct Shared {
 
 impl Shared {
     /// The state at start.
-    pub fn new(settings: Settings, reset: ResetCause, resume: Option<Resume>, crash: Option<CrashRecord>) -> Self {
+    pub fn new(settings: Settings, start: Start) -> Self {
         Shared {
             clock: Clock::new(),
             settings,
-            reset,
-            resume,
-            crash,
-            state: RefCell::new(State::resumed(resume)),
+            state: RefCell::new(State::resumed(start.resume)),
+            start,
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
             discretes: Cell::default(),
             recorder: Cell::default(),

@@ -3,10 +3,10 @@
 //! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
 
 use embassy_futures::select::{Either4, select4};
-use embassy_time::Instant;
 use embedded_io_async::Read;
 
 use super::{
+    clock::now,
     shared::Shared,
     telemetry::write,
     vote::{Voter, Votes},
@@ -23,7 +23,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         return;
     };
-    if let Some(crash) = &shared.crash {
+    if let Some(crash) = &shared.start.crash {
         shared.say(format_args!(
             "crash before this start: {:?} at {} {}",
             crash.cause, crash.at, crash.place
@@ -32,7 +32,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
     shared.say(format_args!(
         "e-MEMS {} started: {:?}",
         env!("CARGO_PKG_VERSION"),
-        shared.reset
+        shared.start.reset
     ));
     loop {
         let next = select4(
@@ -76,7 +76,7 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
             }
         };
         for byte in heard {
-            if let Some(heard) = parser.hear(*byte, Instant::now().as_micros()) {
+            if let Some(heard) = parser.hear(*byte, now().as_micros()) {
                 answer(shared, heard).await;
             }
         }
@@ -97,7 +97,7 @@ async fn answer(shared: &Shared, heard: Heard) {
             ));
         }
     };
-    let verdict = shared.state.borrow_mut().command(command, Instant::now().as_micros());
+    let verdict = shared.state.borrow_mut().command(command, now().as_micros());
     let word = Printable(word_of(command));
     match verdict {
         Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
@@ -141,7 +141,7 @@ fn status(shared: &Shared) {
     let state = *shared.state.borrow();
     let (lift_off, micro_g) = shared.discretes.get();
     let recorder = shared.recorder.get();
-    let resets = shared.resume.map_or(0, |resume| resume.resets);
+    let resets = shared.start.resets();
     shared.say(format_args!(
         "G_ST {} task {} recording {} derived {}",
         state.mode.name(),
@@ -165,8 +165,15 @@ fn status(shared: &Shared) {
         recorder.used,
         recorder.capacity,
         if recorder.erasing.is_some() { "erasing" } else { "ready" },
-        shared.reset,
-        Instant::now().as_secs()
+        shared.start.reset,
+        now().as_secs()
+    ));
+    let stack = (shared.start.stack_use)();
+    shared.say(format_args!(
+        "G_ST clock {} stack {} of {} bytes",
+        shared.start.oscillator.name(),
+        stack.used,
+        stack.size
     ));
 }
 

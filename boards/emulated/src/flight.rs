@@ -241,6 +241,7 @@ impl Pilot {
         while let Some(scheduled) = self.faults.pop_if(|scheduled| scheduled.at <= stop.at.0) {
             match scheduled.fault {
                 Fault::Reset => session.reset_by_pin(stop.at, stop.instruction_count, host),
+                Fault::DmaHung => session.board_mut().mcu.hang_dma(),
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }
         }

@@ -17,7 +17,10 @@ use rigless::{
         Bus, Error,
         stm32f427::{
             Stm32f427,
-            generated::rcc::{Register, cr},
+            generated::{
+                dma2,
+                rcc::{Register, cr},
+            },
             peripherals::{
                 gpio::{Gpio, Pin},
                 i2c::I2c,
@@ -66,6 +69,7 @@ pub struct Wired {
     slots: Slots,
     covers: Covers,
     crystal: bool,
+    dma_hung: bool,
 }
 
 impl Wired {
@@ -111,6 +115,7 @@ impl Wired {
             slots,
             covers,
             crystal: true,
+            dma_hung: false,
         })
     }
 
@@ -138,6 +143,20 @@ impl Wired {
         self.crystal = false;
     }
 
+    /// DMA1 stands still in mid-transfer until the next reset.
+    pub fn hang_dma(&mut self) {
+        self.dma_hung = true;
+    }
+
+    /// EN of a stream stays set until the item under way is through (RM0090 section 10.3.17), and here it never is.
+    fn keep_dma_from_stopping(&mut self) {
+        let registers = self.part.bus_mut().slot_mut(self.slots.dma1).registers_mut();
+        for control in [dma2::Register::S0cr, dma2::Register::S7cr] {
+            let value = registers.get(control);
+            registers.set(control, dma2::s0cr::EN.set(value, 1));
+        }
+    }
+
     /// The model lets HSERDY rise whether or not there is a crystal, so it is kept down.
     fn keep_hse_from_starting(&mut self) {
         let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
@@ -157,9 +176,10 @@ impl Mcu for Wired {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.part.reset(at, cause);
+        self.dma_hung = false;
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);
         i2c.inherit(&mut self.sensor_port.i2c);
-        self.sensor_port.i2c = i2c;
+        self.sensor_port = SensorPort::new(i2c, self.sensor_port.plant.clone());
         self.bus_pins = BusPins::new(self.bus_pins.plant.clone());
         self.discrete_pins.gpio = Gpio::default();
     }
@@ -178,6 +198,9 @@ impl Mcu for Wired {
             covers::forget_spurious_matches(self.part.bus_mut().slot_mut(slot).registers_mut());
         } else if slot == self.slots.rcc && !self.crystal {
             self.keep_hse_from_starting();
+        } else if slot == self.slots.dma1 && self.dma_hung {
+            self.keep_dma_from_stopping();
+            return (self.part.bus_mut(), None);
         }
         let (bus, model) = self.part.split(slot);
         let model = if slot == self.slots.i2c1 {

@@ -16,7 +16,7 @@ use rigless::{
             i2c::I2c,
         },
     },
-    time::EventId,
+    time::{EventId, VirtualNanos},
 };
 
 use crate::chips::SharedPlant;
@@ -48,6 +48,8 @@ pub struct SensorPort {
     /// board sees the stream's count, so it sets this before each event.
     pub nack_next: bool,
     held: bool,
+    /// The end of a byte that waits until SCL is let go: the event then, and the model's own.
+    stretched: Option<(EventId, EventId)>,
 }
 
 impl SensorPort {
@@ -57,7 +59,24 @@ impl SensorPort {
             plant,
             nack_next: false,
             held: false,
+            stretched: None,
         }
+    }
+
+    /// The model's event that `event` stands for, unless SCL is held low: then it is put off until SCL is let go, since no
+    /// byte ends without its clocks (UM10204 section 3.1.9). START and STOP, which the model carries out at once, are not
+    /// held up; the byte that follows is.
+    fn clocked(&mut self, event: EventId, context: &mut DeviceContext<'_>) -> Option<EventId> {
+        let own = match self.stretched.take_if(|(then, _)| *then == event) {
+            Some((_, own)) => own,
+            None => event,
+        };
+        let until = VirtualNanos(self.plant.lock().scl_held_until());
+        if until <= context.now() {
+            return Some(own);
+        }
+        self.stretched = Some((context.schedule(until), own));
+        None
     }
 
     /// Brings the registers to what the lines say, before anything else sees them; whether SDA is held.
@@ -108,6 +127,9 @@ impl Device for SensorPort {
             // The byte on the wire never ends: nobody can clock it. Only a reset of the peripheral forgets it.
             return;
         }
+        let Some(event) = self.clocked(event, context) else {
+            return;
+        };
         if !self.nack_next {
             return self.i2c.on_event(event, registers, context);
         }
@@ -124,6 +146,7 @@ impl Device for SensorPort {
 
     fn reset(&mut self) {
         self.i2c.reset();
+        self.stretched = None;
     }
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -149,8 +172,11 @@ impl BusPins {
     }
 
     fn pull(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
-        let sda = Level::from(!self.plant.lock().sda_held());
-        self.gpio.drive(SCL, Some(Level::High), registers, context);
+        let plant = self.plant.lock();
+        let sda = Level::from(!plant.sda_held());
+        let scl = Level::from(plant.scl_held_until() <= context.now().0);
+        drop(plant);
+        self.gpio.drive(SCL, Some(scl), registers, context);
         self.gpio.drive(SDA, Some(sda), registers, context);
         self.gpio.drive(MUX_RESET, Some(Level::High), registers, context);
     }

@@ -1,5 +1,6 @@
 //! What befalls the unit, and how the release image goes on.
 
+#[allow(dead_code, reason = "each test file uses its own share of the bench")]
 mod bench;
 
 use bench::{MS, Tape, flown};
@@ -92,4 +93,73 @@ fn without_the_multiplexer_the_gyros_are_still_read() {
     let errors = errors(&tape);
     assert_eq!(errors[4], 0xF0FF, "{errors:x?}");
     assert_eq!(errors.last(), Some(&0), "{errors:x?}");
+}
+
+/// [ns] from the hang to the reset: the watchdog's second, and the 0.2 s in which it may last have been fed before.
+const BITES: std::ops::Range<u64> = 800 * MS..1_250 * MS;
+
+#[test]
+fn a_part_that_hangs_lets_the_watchdog_bite_and_flight_is_resumed() {
+    let hangs = 1_777;
+    let mut tape = Tape {
+        script: vec![
+            (900 * MS, b"G_MVG_MV".to_vec()),
+            ((hangs + 2_000) * MS, b"G_ST".to_vec()),
+        ],
+        ..Tape::default()
+    };
+    let report = flown(
+        &Options::default(),
+        &[at(hangs, Fault::DmaHung)],
+        hangs + 2_500,
+        &mut tape,
+    );
+    let [(struck, cause)] = report.resets[..] else {
+        panic!("{:?}", report.resets)
+    };
+    assert_eq!(cause, ResetCause::Watchdog);
+    assert!(BITES.contains(&(struck - hangs * MS)), "{struck}");
+    for reply in ["started: Watchdog", "G_ST FLIGHT", "started Watchdog resets 1"] {
+        assert!(tape.said().contains(reply), "{reply} in {}", tape.said());
+    }
+    let (before, after): (Vec<_>, Vec<_>) = tape.packets().into_iter().partition(|(at, _)| *at < struck);
+    assert!(after.len() >= 5, "{} packets after the reset", after.len());
+    assert!(after.iter().all(|(_, reading)| reading.errors.0 == 0), "{after:?}");
+    let step = after[0].1.counter - before.last().expect("packets").1.counter;
+    assert!((1..=2).contains(&step), "the counter went on by {step}");
+}
+
+#[test]
+fn a_part_that_stretches_the_clock_too_long_is_cut_off_and_all_others_are_read() {
+    // The accelerometer, magnetometer and thermometer of three plates, each in one cycle of its own.
+    let slots = [0, 5, 14];
+    let stretched = slots.into_iter().zip([900, 1_700, 2_500]).flat_map(|(slot, ms)| {
+        [
+            at(ms, Fault::Stretching(slot, 20 * MS)),
+            at(ms + 200, Fault::Stretching(slot, 0)),
+        ]
+    });
+    let faults: Vec<Scheduled> = stretched.collect();
+    let mut tape = Tape::default();
+    let report = flown(&Options::default(), &faults, 3_500, &mut tape);
+    assert_eq!(report.resets, []);
+    let errors = errors(&tape);
+    assert!(errors.len() >= 14, "a packet every 200 ms: {errors:x?}");
+    let hit: Vec<u16> = errors.iter().copied().filter(|errors| *errors != 0).collect();
+    assert!(hit.iter().all(|errors| errors.count_ones() == 1), "{errors:x?}");
+    assert!(slots.iter().all(|slot| hit.contains(&(1 << slot))), "{errors:x?}");
+    assert_eq!(errors.last(), Some(&0), "{errors:x?}");
+}
+
+#[test]
+fn a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most() {
+    // The magnetometer of the second plate, and so that plate's other two.
+    let plate = 0b0010_0000_0010_0010;
+    let mut tape = Tape::default();
+    let faults = [at(900, Fault::Stretching(5, 60_000 * MS))];
+    flown(&Options::default(), &faults, 2_300, &mut tape);
+    let errors = errors(&tape);
+    assert!(errors.len() >= 9, "a packet every 200 ms: {errors:x?}");
+    let last = *errors.last().expect("packets");
+    assert!(last & 1 << 5 != 0 && last & !plate == 0, "{errors:x?}");
 }

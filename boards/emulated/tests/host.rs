@@ -4,11 +4,7 @@
 mod bench;
 
 use bench::{MS, Tape, image};
-use emems::{
-    derived::{self, Derived},
-    sample::NO_SLOT,
-    unit::Settings,
-};
+use emems::{sample::NO_SLOT, unit::Settings};
 use twin::{host, part::Nanos, plant::Plant};
 
 /// [us] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant.
@@ -36,14 +32,6 @@ fn on_host(motion: &str, duration: Nanos, script: &[(Nanos, Vec<u8>)]) -> Tape {
     tape
 }
 
-fn derived_frames(tape: &Tape) -> Vec<Derived> {
-    let bytes: Vec<u8> = tape.telemetry.iter().map(|(_, byte)| *byte).collect();
-    let frames = bytes.split_inclusive(|byte| *byte == b'\n');
-    frames
-        .filter_map(|line| derived::decode(line.get(line.len().checked_sub(derived::DERIVED_BYTES)?..)?).ok())
-        .collect()
-}
-
 #[test]
 fn host_run_and_image_emit_the_same_packets_byte_for_byte() {
     for (motion, duration) in [("tumble", 60_000 * MS), ("rotation-1", 30_000 * MS)] {
@@ -69,7 +57,7 @@ fn both_boards_take_each_sensor_at_the_same_time() {
     let script = [(MS, b"G_DL".to_vec())];
     let image = on_image("still", 4_000 * MS, &script);
     let host = on_host("still", 4_000 * MS, &script);
-    let (image, host) = (derived_frames(&image), derived_frames(&host));
+    let (image, host) = (image.derived(), host.derived());
     assert!(image.len() > 10 && image.len() == host.len());
     for (image, host) in image.iter().zip(&host).skip(2) {
         assert_eq!(image.start_us.abs_diff(host.start_us), 0);

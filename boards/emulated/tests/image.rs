@@ -1,11 +1,17 @@
 //! The release image on the stand: what it reads, when it sends, what it is told.
 
+#[allow(dead_code, reason = "each test file uses its own share of the bench")]
 mod bench;
 
 use bench::{MS, Tape, flown, image, world};
-use emems::{sample::Reading, unit::Settings};
+use emems::{derived::Health, sample::Reading, unit::Settings};
 use emulated::{Covers, Error, Options, fly_with};
-use twin::{host, part::Nanos, plant::Plant};
+use twin::{
+    host,
+    part::Nanos,
+    plant::Plant,
+    run::{Fault, Scheduled},
+};
 
 /// [ns] between packets.
 const PERIOD: Nanos = 200 * MS;
@@ -145,13 +151,19 @@ fn a_framing_error_on_every_byte_loses_the_command_and_nothing_else() {
 }
 
 #[test]
-fn a_board_without_its_crystal_says_so_in_the_log_and_flies_on() {
+fn a_board_without_its_crystal_says_so_everywhere_and_flies_on() {
     let options = Options {
         no_crystal: true,
         ..Options::default()
     };
-    let mut tape = Tape::default();
-    flown(&options, &[], 700, &mut tape);
+    let mut tape = Tape {
+        script: vec![(500 * MS, b"G_DLG_ST".to_vec())],
+        ..Tape::default()
+    };
+    flown(&options, &[], 1_000, &mut tape);
+    assert!(tape.said().contains("G_ST clock internal"), "{}", tape.said());
+    let health = tape.derived().last().expect("derived frames").health;
+    assert!(health.contains(Health::INTERNAL_OSCILLATOR), "{health:?}");
     assert!(
         tape.log
             .iter()
@@ -180,4 +192,44 @@ fn a_static_is_read_by_its_name_and_a_wrong_name_is_refused() {
         &mut Tape::default(),
     );
     assert!(matches!(&refused, Err(Error::Image(error)) if error.to_string().contains("NO_SUCH_STATIC")));
+}
+
+/// [bytes] what the stack may have grown to: 60 % of its place.
+const STACK_CEILING: usize = 32 * 1024 * 6 / 10;
+
+#[test]
+fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
+    let faults = [
+        Scheduled {
+            at: 1_500 * MS,
+            fault: Fault::BusStuck(true),
+        },
+        Scheduled {
+            at: 1_900 * MS,
+            fault: Fault::BusStuck(false),
+        },
+    ];
+    let mut tape = Tape {
+        script: vec![
+            (500 * MS, b"G_DLG_MTG_HE".to_vec()),
+            (2_100 * MS, b"G_AT".to_vec()),
+            (7_500 * MS, b"G_ST".to_vec()),
+        ],
+        ..Tape::default()
+    };
+    flown(&Options::default(), &faults, 8_000, &mut tape);
+    let said = tape.said();
+    let used = said
+        .split("stack ")
+        .nth(1)
+        .and_then(|rest| rest.split_once(" of 32768 bytes"));
+    let used: usize = used.and_then(|(used, _)| used.parse().ok()).expect("the status tells");
+    println!("{used} bytes of stack");
+    // A mark that was never painted or never read would be 0 or all of it.
+    assert!((512..=STACK_CEILING).contains(&used), "{used}");
+    assert!(
+        tape.derived()
+            .iter()
+            .all(|frame| !frame.health.contains(Health::INTERNAL_OSCILLATOR))
+    );
 }

@@ -135,8 +135,13 @@ impl Plant {
         self.i2c.clock_pulse();
     }
 
-    /// Lets a fault strike. A slot or plate the unit does not have is left alone, and so is [`Fault::Reset`], which
-    /// is the controller's.
+    /// Until when a part holds SCL low; `now` or earlier if none does.
+    pub fn scl_held_until(&self) -> Nanos {
+        self.i2c.switch.scl_held_until()
+    }
+
+    /// Lets a fault strike. A slot or plate the unit does not have is left alone, and so are the faults of the controller
+    /// and its recorder.
     pub fn apply(&mut self, fault: Fault, now: Nanos) {
         match fault {
             Fault::Silent(slot) => self.silence(slot, true, now),
@@ -149,7 +154,8 @@ impl Plant {
                     gyro.babble(babbling);
                 }
             }
-            Fault::Reset => {}
+            Fault::Stretching(slot, duration) => self.stretch(slot, duration),
+            Fault::DmaHung | Fault::RecorderHung | Fault::Reset => {}
         }
     }
 
@@ -157,13 +163,29 @@ impl Plant {
         let Some(sensor) = SENSORS.get(slot) else {
             return;
         };
-        let address = match sensor.kind {
-            Kind::Gyro => return self.gyro[sensor.plate].silence(silent, now),
-            Kind::Accelerometer => lis331hh::ADDRESS,
-            Kind::Magnetometer => hmc5883l::ADDRESS,
-            Kind::Thermometer => tmp102::ADDRESS,
+        match i2c_address(sensor.kind) {
+            Some(address) => self.i2c.switch.silence_part(sensor.plate, address, silent, now),
+            None => self.gyro[sensor.plate].silence(silent, now),
+        }
+    }
+
+    fn stretch(&mut self, slot: usize, duration: Nanos) {
+        let Some(sensor) = SENSORS.get(slot) else {
+            return;
         };
-        self.i2c.switch.silence_part(sensor.plate, address, silent, now);
+        if let Some(address) = i2c_address(sensor.kind) {
+            self.i2c.switch.stretch_part(sensor.plate, address, duration);
+        }
+    }
+}
+
+/// Where a kind of sensor is on its plate's I2C bus.
+fn i2c_address(kind: Kind) -> Option<u8> {
+    match kind {
+        Kind::Gyro => None,
+        Kind::Accelerometer => Some(lis331hh::ADDRESS),
+        Kind::Magnetometer => Some(hmc5883l::ADDRESS),
+        Kind::Thermometer => Some(tmp102::ADDRESS),
     }
 }
 

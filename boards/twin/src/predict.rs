@@ -12,6 +12,8 @@ mod chain;
 mod emems;
 mod grid;
 mod scene;
+#[cfg(test)]
+mod tests;
 mod unit;
 
 use std::borrow::Cow;
@@ -42,7 +44,8 @@ pub struct Twin {
     /// Low-passes of the nominal channels, by kind and time constant.
     filters: Vec<(Kind, f64, Filter)>,
     known: Vec<Active>,
-    /// What the centre feels at the nominal instants of a slot [s]: many effects ask for it, and few move the instants.
+    /// What the centre feels when a channel is read, less the delay of its low-pass, by that instant after the start of the
+    /// cycle [s]: many effects ask for it, and few move the instants.
     felt: Vec<(f64, Vec<Feel>)>,
     /// Inputs of the nominal channels after their low-pass: most effects leave them alone.
     plain: Vec<Vec<f64>>,
@@ -80,11 +83,12 @@ impl Twin {
             plain: Vec::new(),
             nominal: Vec::new(),
         };
-        for index in 0..twin.unit.channels.len() {
-            let slot_s = twin.unit.channels[index].slot_s;
-            if !twin.felt.iter().any(|(slot, _)| *slot == slot_s) {
-                let instants_s = twin.instants_s(index).into_iter();
-                twin.felt.push((slot_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
+        for channel in &twin.unit.channels {
+            let after_s = seen_s(channel);
+            if !twin.felt.iter().any(|(kept_s, _)| *kept_s == after_s) {
+                let instants_s = twin.starts_s.iter().map(|start_s| start_s + after_s);
+                twin.felt
+                    .push((after_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
             }
         }
         twin.plain = (0..twin.unit.channels.len())
@@ -166,13 +170,13 @@ impl Twin {
         };
         let felt = match chain.is_delayed() {
             true => None,
-            false => self.felt.iter().find(|(slot_s, _)| *slot_s == channel.slot_s),
+            false => self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel)),
         };
         for (row, (reading, t_s)) in readings.iter_mut().zip(&t_s).enumerate() {
             let added = match (chain.is_additive(), felt) {
                 (false, _) => 0.0,
                 (true, Some((_, felt))) => chain.added(&felt[row], *reading),
-                (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s)), *reading),
+                (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s) - channel.tau_s()), *reading),
             };
             // A high-pass takes the bias with it.
             *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
@@ -256,6 +260,12 @@ impl Twin {
         });
         columns.collect()
     }
+}
+
+/// [s] after the start of the cycle: what a channel's low-pass lets through when it is read, to first order in its time
+/// constant. What an effect adds comes from then; for terms of some percent of a reading that is exact enough.
+fn seen_s(channel: &Channel) -> f64 {
+    channel.slot_s - channel.tau_s()
 }
 
 fn combine(sum: &mut [f64], weight: f64, other: &[f64], other_weight: f64) {

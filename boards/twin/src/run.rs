@@ -41,8 +41,15 @@ pub enum Fault {
     SdaHeld,
     /// The bus is held for good (`true`) or released.
     BusStuck(bool),
+    /// The I2C part in this reading-order slot holds SCL low for so long [ns] whenever it is called; 0: no longer.
+    Stretching(usize, Nanos),
     /// The gyro of this plate answers noise (`true`) or is itself again.
     GyroGarbage(usize, bool),
+    /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
+    /// never comes round. A reset frees it.
+    DmaHung,
+    /// The recorder never gets ready: whoever records waits for ever, and everybody else goes on. A reset frees it.
+    RecorderHung,
     /// The reset pin.
     Reset,
 }

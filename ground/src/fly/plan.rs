@@ -11,6 +11,7 @@ use twin::{
     run::{Fault, Scheduled},
 };
 
+use super::site;
 use crate::table::SLOT_NAMES;
 
 /// How long a motion without an end is flown.
@@ -20,12 +21,14 @@ const ENDLESS_S: f64 = 60.0;
 ///
 /// Sensors, buses and lines are modelled at register level; what they measure comes from a motion or a recording. The
 /// telemetry is decoded as it comes and everything kept in a new folder: packets.txt, counts.csv, si.csv, log.txt,
-/// umbilical.txt, summary.txt, and plots of every sensor in index.html. The same arguments give the same packets.
+/// umbilical.txt, summary.txt, and plots of every sensor in index.html. The same arguments give the same packets. Ctrl-C
+/// ends the flight; what was flown is kept.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   ground fly                                       a sounding rocket, from the pad to re-entry
   ground fly --motion still --duration 10min --derived
   ground fly --recording 07_fast_rotation.csv.gz   what a real unit felt
+  ground fly --motion-file turns.csv --latitude-deg -2.37 --field-n-ut 24.2,-9.2,-4.1
   ground fly --motion tumble --silent a2@10s..20s --silent g4@15s
   ground fly --console                             and talk to it; type G_HE")]
 pub struct Arguments {
@@ -62,6 +65,9 @@ pub struct Arguments {
     /// Silence a sensor (a1..a4, m1..m4, g1..g4, t1..t4) from a time on, or for a while: a2@10s, g1@10s..20s
     #[arg(long, value_name = "SENSOR@TIME", value_parser = silence)]
     pub silent: Vec<Silence>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // clap would take the text for the command's.
+    pub site: site::Arguments,
 }
 
 /// A sensor that does not answer for a while.

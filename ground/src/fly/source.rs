@@ -6,7 +6,7 @@
 use std::{borrow::Cow, path::Path, sync::Arc};
 
 use twin::{
-    environment::{Environment, World},
+    environment::World,
     motion::{self, LIST, Recorded},
     recording::{FileError, Recording},
     truth::TruthSource,
@@ -51,10 +51,10 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
         }),
         (_, Some(path)) => Ok(Source {
             name: stem(path),
-            about: format!("recorded motion, {}, in the laboratory", file_name(path)),
+            about: format!("recorded motion, {}, at {}", file_name(path), arguments.site.about()),
             truth: Arc::new(World {
                 motion: Recorded::open(path)?,
-                environment: Environment::laboratory(),
+                environment: arguments.site.environment(),
             }),
         }),
         _ => by_name(arguments.motion.as_deref().unwrap_or(DEFAULT_MOTION)),

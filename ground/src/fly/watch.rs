@@ -1,7 +1,7 @@
 //! Whoever watches a flight: keeps every byte, decodes the telemetry as it comes, passes the umbilical on.
 //!
 //! In: what both lines and the log say. Out: the folder, the figures, and commands to the unit. A folder that cannot be
-//! written stops the flight, and so does a console that was closed.
+//! written stops the flight, and so do an interrupt and a console that was closed.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use twin::{
     run::{Bench, Flow},
 };
 
-use super::progress::Progress;
+use super::{interrupt::Interrupt, progress::Progress};
 use crate::{
     console::line::UnitEnd,
     digest::{Digest, Entry},
@@ -44,6 +44,7 @@ pub struct Watch {
     progress: Progress,
     console: Option<UnitEnd>,
     ask_derived: bool,
+    interrupt: Interrupt,
     packets: u64,
     flown: Nanos,
     failed: Option<FolderError>,
@@ -52,13 +53,20 @@ pub struct Watch {
 
 impl Watch {
     /// Before take-off. With a console, the umbilical is the console's to keep.
-    pub fn new(folder: Folder, progress: Progress, console: Option<UnitEnd>, ask_derived: bool) -> Self {
+    pub fn new(
+        folder: Folder,
+        progress: Progress,
+        console: Option<UnitEnd>,
+        ask_derived: bool,
+        interrupt: Interrupt,
+    ) -> Self {
         Watch {
             folder,
             digest: Digest::default(),
             progress,
             console,
             ask_derived,
+            interrupt,
             packets: 0,
             flown: 0,
             failed: None,
@@ -142,7 +150,7 @@ impl Bench for Watch {
         self.flown = now;
         self.progress.advanced(now, self.packets);
         self.tell_console(now, &[]);
-        if self.closed || self.failed.is_some() {
+        if self.closed || self.failed.is_some() || self.interrupt.is_raised() {
             Flow::Stop
         } else {
             Flow::Continue
@@ -163,7 +171,7 @@ mod tests {
     fn watch(place: &std::path::Path, console: Option<UnitEnd>, ask_derived: bool) -> Watch {
         let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
         let progress = Progress::start(Duration::from_secs(60), false, true);
-        Watch::new(folder, progress, console, ask_derived)
+        Watch::new(folder, progress, console, ask_derived, Interrupt::default())
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use emems::{
+    derived::{self, Derived},
     packet::{self, PACKET_BYTES},
     sample::Reading,
 };
@@ -78,6 +79,15 @@ impl Tape {
             }
         }
         packets
+    }
+
+    /// The derived frames heard whole.
+    pub fn derived(&self) -> Vec<Derived> {
+        let bytes: Vec<u8> = self.telemetry.iter().map(|(_, byte)| *byte).collect();
+        let frames = bytes.split_inclusive(|byte| *byte == b'\n');
+        frames
+            .filter_map(|line| derived::decode(line.get(line.len().checked_sub(derived::DERIVED_BYTES)?..)?).ok())
+            .collect()
     }
 }
 

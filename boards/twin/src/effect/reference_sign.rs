@@ -40,8 +40,8 @@ impl Effect for ReferenceSign {
             chain.aim.axis_b.component_mul_assign(&kept);
             return;
         }
-        // The rows of a table are one second apart, the first at the start of the log.
-        let row_s = site.log_s.0 + row - 1.0;
+        // The rows of a table stand at 0, 1, 2 s.
+        let row_s = row - 1.0;
         let axis_b = chain.aim.axis_b;
         let slot_s = site.channel.slot_s;
         chain.add(move |feel, input| match (feel.t_s - slot_s - row_s).abs() < 0.5 {
@@ -52,13 +52,9 @@ impl Effect for ReferenceSign {
 
     /// Signs on all rows, then, in a table, on each.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
-        let rows = if starts_s.len() <= MOST_ROWS {
-            starts_s.len() as u32
-        } else {
-            0
-        };
-        (0..=rows)
-            .flat_map(|row| SIGNS.map(move |signs| f64::from(8 * row + signs)))
+        let rows = if starts_s.len() <= MOST_ROWS { starts_s } else { &[] };
+        let rows = core::iter::once(0.0).chain(rows.iter().map(|start_s| start_s.round() + 1.0));
+        rows.flat_map(|row| SIGNS.map(move |signs| 8.0 * row + f64::from(signs)))
             .collect()
     }
 }

@@ -1,15 +1,19 @@
 //! The host board's parts.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::{Cell, RefCell},
+    rc::Rc,
+};
 
 use emems::{
-    board::{Board, Parts, ResetCause},
+    board::{Board, Oscillator, Parts, ResetCause, StackUse},
     recorder::MemoryRecorder,
 };
 
 use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
+    recorder::MayHang,
 };
 use crate::plant::Plant;
 
@@ -28,7 +32,7 @@ impl Board for Host {
     type Discretes = Inputs;
     type Watchdog = Fed;
     type Retained = Kept;
-    type Recorder = MemoryRecorder<RECORDS>;
+    type Recorder = MayHang<MemoryRecorder<RECORDS>>;
 }
 
 /// The outside ends of the host board.
@@ -44,12 +48,16 @@ pub struct Ends {
     pub fed: Fed,
     /// Memory that survives a reset.
     pub kept: Kept,
+    /// The sensor bus' DMA stands still.
+    pub dma_hung: Rc<Cell<bool>>,
+    /// The recorder never gets ready.
+    pub recorder_hung: Rc<Cell<bool>>,
 }
 
 /// The parts of a unit that starts because of `reset`.
 pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Parts<Host> {
     Parts {
-        sensor_bus: SensorBus::new(plant.clone()),
+        sensor_bus: SensorBus::new(plant.clone(), ends.dma_hung.clone()),
         gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate)),
         telemetry: Transmitter(ends.telemetry.clone()),
         umbilical_tx: Transmitter(ends.umbilical.clone()),
@@ -57,7 +65,12 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         discretes: Inputs(plant.clone()),
         watchdog: ends.fed.clone(),
         retained: ends.kept.clone(),
-        recorder: MemoryRecorder::new(),
+        recorder: MayHang {
+            recorder: MemoryRecorder::new(),
+            hung: ends.recorder_hung.clone(),
+        },
         reset,
+        oscillator: Oscillator::Crystal,
+        stack_use: StackUse::default,
     }
 }

@@ -3,7 +3,11 @@
 //! A transfer that is abandoned leaves the bus as the STM32F4 leaves it: every later one waits for ever, until
 //! [`RecoverBus::recover`].
 
-use std::{cell::RefCell, future::pending, rc::Rc};
+use std::{
+    cell::{Cell, RefCell},
+    future::pending,
+    rc::Rc,
+};
 
 use embassy_time::{Instant, Timer};
 use embedded_hal::{
@@ -30,24 +34,41 @@ async fn wait_until(at: Nanos) {
     Timer::at(Instant::from_micros(Instant::now().as_micros() + ahead_us)).await;
 }
 
+/// A DMA transfer that does not stop when it is told to. The STM32's HAL waits in place until it has.
+struct NeverStops;
+
+impl Drop for NeverStops {
+    fn drop(&mut self) {
+        clock::hang();
+    }
+}
+
 /// The sensor bus.
 pub struct SensorBus {
     plant: Rc<RefCell<Plant>>,
+    dma_hung: Rc<Cell<bool>>,
     abandoned: bool,
 }
 
 impl SensorBus {
-    /// The bus of these parts.
-    pub fn new(plant: Rc<RefCell<Plant>>) -> Self {
+    /// The bus of these parts, and whether the DMA that serves it stands still.
+    pub fn new(plant: Rc<RefCell<Plant>>, dma_hung: Rc<Cell<bool>>) -> Self {
         SensorBus {
             plant,
+            dma_hung,
             abandoned: false,
         }
     }
 
-    /// Plays a transaction from `now` on; when it is over, and whether it was acknowledged throughout.
-    fn play(&self, address: u8, operations: &mut [i2c::Operation<'_>], now: Nanos) -> (Nanos, Result<(), ErrorKind>) {
-        let mut plant = self.plant.borrow_mut();
+    /// Plays a transaction from `now` on; when it is over, and whether it was acknowledged throughout. It waits only
+    /// where a part holds SCL low, so that one abandoned there has not reached the bytes that follow.
+    async fn play(
+        &self,
+        address: u8,
+        operations: &mut [i2c::Operation<'_>],
+        now: Nanos,
+    ) -> (Nanos, Result<(), ErrorKind>) {
+        let plant = || self.plant.borrow_mut();
         let mut at = now + I2C_OVERHEAD;
         let byte = 9 * I2C_BIT;
         let mut direction = None;
@@ -55,9 +76,10 @@ impl SensorBus {
             let read = matches!(operation, i2c::Operation::Read(_));
             let before = direction.replace(read);
             if before != Some(read) {
-                at += byte + I2C_BIT + before.map_or(0, |_| I2C_TURN);
-                if !plant.i2c.start(address, read, at) {
-                    plant.i2c.stop(at);
+                at = self.clocked(at).await + byte + I2C_BIT + before.map_or(0, |_| I2C_TURN);
+                let acknowledged = plant().i2c.start(address, read, at);
+                if !acknowledged {
+                    plant().i2c.stop(at);
                     return (
                         at + I2C_BIT,
                         Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address)),
@@ -67,23 +89,34 @@ impl SensorBus {
             match operation {
                 i2c::Operation::Read(bytes) => {
                     for slot in bytes.iter_mut() {
-                        *slot = plant.i2c.read(at);
+                        at = self.clocked(at).await;
+                        *slot = plant().i2c.read(at);
                         at += byte;
                     }
                 }
                 i2c::Operation::Write(bytes) => {
                     for value in bytes.iter() {
-                        at += byte;
-                        if !plant.i2c.write(*value, at) {
-                            plant.i2c.stop(at);
+                        at = self.clocked(at).await + byte;
+                        let acknowledged = plant().i2c.write(*value, at);
+                        if !acknowledged {
+                            plant().i2c.stop(at);
                             return (at + I2C_BIT, Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data)));
                         }
                     }
                 }
             }
         }
-        plant.i2c.stop(at);
+        plant().i2c.stop(at);
         (at + I2C_BIT, Ok(()))
+    }
+
+    /// When SCL can rise: at `at`, or when the part that holds it lets go, which is then waited for.
+    async fn clocked(&self, at: Nanos) -> Nanos {
+        let free = self.plant.borrow().scl_held_until();
+        if free > at {
+            wait_until(free).await;
+        }
+        at.max(free)
     }
 }
 
@@ -94,12 +127,16 @@ impl i2c::ErrorType for SensorBus {
 impl embedded_hal_async::i2c::I2c for SensorBus {
     async fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Self::Error> {
         let now = clock::since_power_on();
+        if self.dma_hung.get() {
+            let _waited_for_in_place = NeverStops;
+            pending::<()>().await;
+        }
         if self.abandoned || self.plant.borrow().sda_held() {
             self.abandoned = true;
             pending::<()>().await;
         }
-        let (end, outcome) = self.play(address, operations, now);
         self.abandoned = true;
+        let (end, outcome) = self.play(address, operations, now).await;
         wait_until(end).await;
         self.abandoned = false;
         outcome
@@ -110,8 +147,9 @@ impl RecoverBus for SensorBus {
     async fn recover(&mut self) -> bool {
         {
             let mut plant = self.plant.borrow_mut();
-            for _ in 0..9 {
-                plant.clock_pulse();
+            // With SCL held low there are no edges, until the reset disconnects whoever holds it.
+            if plant.scl_held_until() <= clock::since_power_on() {
+                (0..9).for_each(|_| plant.clock_pulse());
             }
             plant.i2c.reset_pin();
         }

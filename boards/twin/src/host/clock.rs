@@ -25,6 +25,8 @@ struct Clock {
     alarms_us: BTreeSet<u64>,
     /// [ns] when the unit's clock started, since power-on.
     started: Nanos,
+    /// The processor runs in a circle.
+    hung: bool,
 }
 
 thread_local! {
@@ -67,6 +69,11 @@ pub fn spend(duration: Nanos) {
     CLOCK.with_borrow_mut(|clock| clock.now += duration);
 }
 
+/// The processor runs in a circle from here on: nothing is polled until the clock is started again.
+pub fn hang() {
+    CLOCK.with_borrow_mut(|clock| clock.hung = true);
+}
+
 #[derive(Default)]
 struct Woken(AtomicBool);
 
@@ -83,13 +90,13 @@ pub fn advance<F: Future + ?Sized>(mut future: Pin<&mut F>, until: Nanos) -> Pol
     let mut context = Context::from_waker(&waker);
     let until = CLOCK.with_borrow(|clock| until.saturating_sub(clock.started));
     loop {
-        while woken.0.swap(false, Ordering::Relaxed) {
+        while woken.0.swap(false, Ordering::Relaxed) && !CLOCK.with_borrow(|clock| clock.hung) {
             if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
                 return Poll::Ready(output);
             }
         }
         let due = CLOCK.with_borrow_mut(|clock| match clock.alarms_us.first() {
-            Some(at_us) if *at_us * 1000 <= until => {
+            Some(at_us) if *at_us * 1000 <= until && !clock.hung => {
                 clock.now = clock.now.max(*at_us * 1000) + WAKE;
                 clock.alarms_us.pop_first().is_some()
             }
@@ -112,6 +119,18 @@ mod tests {
     use embassy_time::{Duration, Instant, Timer};
 
     use super::*;
+
+    #[test]
+    fn a_hung_processor_polls_nothing_while_time_goes_on() {
+        start(0);
+        let mut unit = pin!(async {
+            Timer::after(Duration::from_secs(1)).await;
+            hang();
+            Timer::after(Duration::from_secs(1)).await;
+        });
+        assert_eq!(advance(unit.as_mut(), 5_000_000_000), Poll::Pending);
+        assert_eq!(since_power_on(), 5_000_000_000);
+    }
 
     #[test]
     fn a_future_sleeps_in_virtual_time_only() {

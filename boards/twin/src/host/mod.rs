@@ -8,6 +8,7 @@ mod board;
 mod bus;
 mod clock;
 mod lines;
+mod recorder;
 mod run;
 pub mod timing;
 

@@ -51,6 +51,8 @@ pub fn fly(
     while now < duration {
         clock::start(now + BOOT);
         ends.fed.0.set(now + BOOT);
+        ends.dma_hung.set(false);
+        ends.recorder_hung.set(false);
         let mut unit = pin!(unit::run(parts(&plant, &ends, cause), settings));
         let reset = loop {
             let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
@@ -67,6 +69,8 @@ pub fn fly(
             while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(Fault::DmaHung) => ends.dma_hung.set(true),
+                    Some(Fault::RecorderHung) => ends.recorder_hung.set(true),
                     Some(fault) => plant.borrow_mut().apply(fault, now),
                     None => {}
                 }

@@ -11,9 +11,9 @@ pub const I2C_BIT: Nanos = 2_500;
 /// [ns] from an alarm to the firmware's next step.
 pub const WAKE: Nanos = 8_000;
 /// [ns] the firmware's work around one I2C transaction, besides the wake at its end.
-pub const I2C_OVERHEAD: Nanos = 2_400;
+pub const I2C_OVERHEAD: Nanos = 4000;
 /// [ns] its work at each change of direction inside one.
-pub const I2C_TURN: Nanos = 11_700;
+pub const I2C_TURN: Nanos = 11000;
 /// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// [ns] the firmware's work around one word.
@@ -21,4 +21,4 @@ pub const SPI_OVERHEAD: Nanos = 4_800;
 /// [ns] a byte on a UART, 115200 8N1.
 pub const UART_BYTE: Nanos = 86_806;
 /// [ns] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 126_000;
+pub const BOOT: Nanos = 320_300;

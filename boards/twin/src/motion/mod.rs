@@ -10,6 +10,7 @@ mod profile;
 mod rate_table;
 mod recorded;
 mod rotation_test;
+mod smooth;
 mod sounding_rocket;
 mod spline;
 mod still;

@@ -51,6 +51,20 @@ impl Recorded {
         Self::of(&Table::read(bytes, file, &Self::columns())?)
     }
 
+    /// The same motion with what is above these corners smoothed away, without phase: for a truth instrument whose noise,
+    /// differentiated once (attitude) or twice (position), is more than the unit's own.
+    pub fn smoothed(&self, attitude_hz: f64, position_hz: f64) -> Self {
+        let step_s = self.step_s();
+        Self {
+            attitude: self.attitude.smoothed(attitude_hz, step_s),
+            position: self
+                .position
+                .as_ref()
+                .map(|position| position.smoothed(position_hz, step_s)),
+            temperature_c: self.temperature_c.clone(),
+        }
+    }
+
     /// [s] its usual step between attitudes: the median.
     pub fn step_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.attitude.t_s().windows(2).map(|pair| pair[1] - pair[0]).collect();

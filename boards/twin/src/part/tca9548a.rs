@@ -18,6 +18,9 @@ struct Socket {
     part: Box<dyn I2cPart>,
     silent: bool,
     addressed: bool,
+    /// [ns] how long it holds SCL low when it is called.
+    stretch: Nanos,
+    scl_held_until: Nanos,
 }
 
 /// The switch and its eight channels.
@@ -39,6 +42,8 @@ impl Tca9548a {
                 part,
                 silent: false,
                 addressed: false,
+                stretch: 0,
+                scl_held_until: 0,
             };
             parts.into_iter().map(socket).collect()
         });
@@ -71,6 +76,9 @@ impl Tca9548a {
         for socket in self.selected() {
             let called = !socket.silent && socket.part.address() == address;
             socket.addressed = called && socket.part.start(read, now);
+            if socket.addressed {
+                socket.scl_held_until = now + socket.stretch;
+            }
             acknowledged |= socket.addressed;
         }
         acknowledged
@@ -110,6 +118,25 @@ impl Tca9548a {
         self.addressed = false;
         self.control = 0;
         self.connected = 0;
+    }
+
+    /// Until when a part on a connected channel holds SCL low. A disconnected one does so unseen.
+    pub fn scl_held_until(&self) -> Nanos {
+        let connected = if self.silent { 0 } else { self.connected };
+        (self.channels.iter().enumerate())
+            .filter(|(channel, _)| connected >> channel & 1 == 1)
+            .flat_map(|(_, sockets)| sockets)
+            .map(|socket| socket.scl_held_until)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// The part at `address` on `channel` holds SCL low for `duration` after each time it acknowledges its address.
+    pub fn stretch_part(&mut self, channel: usize, address: u8, duration: Nanos) {
+        let sockets = self.channels.get_mut(channel).into_iter().flatten();
+        for socket in sockets.filter(|socket| socket.part.address() == address) {
+            socket.stretch = duration;
+        }
     }
 
     /// The switch is gone (`true`), and all behind it out of reach, or is back, deselected.
@@ -245,6 +272,23 @@ mod tests {
         mux.silence_part(9, A, true, 0);
         select(&mut mux, 1);
         assert_eq!(read(&mut mux, A), Some(0x00));
+    }
+
+    #[test]
+    fn a_part_that_is_called_holds_scl_until_it_lets_go_or_its_channel_is_disconnected() {
+        let mut mux = tree();
+        mux.stretch_part(0, A, 20);
+        select(&mut mux, 1);
+        assert_eq!(mux.scl_held_until(), 0, "it has not been called yet");
+        assert!(mux.start(A, true, 100));
+        assert_eq!(mux.scl_held_until(), 120);
+        mux.reset();
+        assert_eq!(mux.scl_held_until(), 0, "the bus is free, though the part holds on");
+        select(&mut mux, 1);
+        assert_eq!(mux.scl_held_until(), 120, "and is found holding");
+        select(&mut mux, 2);
+        assert!(mux.start(A, true, 110));
+        assert_eq!(mux.scl_held_until(), 0, "the other plates are not concerned");
     }
 
     #[test]

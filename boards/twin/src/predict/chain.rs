@@ -53,7 +53,8 @@ impl<'a> Chain<'a> {
         self.delays.push(Box::new(delay));
     }
 
-    /// Adds to every reading.
+    /// Adds to every reading. What is felt is that of the instant which the channel's low-pass lets through, so that what acts
+    /// on the sensor, and not behind its filter, is filtered to first order.
     pub fn add(&mut self, term: impl Fn(&Feel, f64) -> f64 + 'a) {
         self.terms.push(Box::new(term));
     }

@@ -13,6 +13,10 @@ use crate::geometry;
 
 /// [s] between two reads: 118.8 ms over sixteen.
 const READ_S: f64 = 7.425e-3;
+/// [m/s2] of one count of the LIS331HH at 6 g: 3 mg.
+const DIGIT: f64 = 3e-3 * 9.80665;
+/// [uT] of one gauss; the HMC5883L gives 1090 counts for it.
+const GAUSS_UT: f64 = 100.0;
 /// [s] a cycle.
 const CYCLE_S: f64 = 0.2;
 
@@ -113,13 +117,14 @@ fn thermometer() -> Channel {
 fn accelerometer(blank: &Channel) -> Channel {
     Channel {
         sensor: Kind::Accelerometer,
-        lsb: 0.02941995,
+        lsb: DIGIT,
         noise_sigma: 0.045,
         drift_sigma: 2e-4,
         bias_sigma: 0.02,
         scale_sigma: 1e-3,
         axis_sigma_rad: 2e-3,
-        range: [-58.8, 58.8],
+        // The data sheet says 6 g; the code goes a little further.
+        range: [-2048.0 * DIGIT, 2047.0 * DIGIT],
         bandwidth_hz: Some(25.0),
         ..blank.clone()
     }
@@ -128,7 +133,7 @@ fn accelerometer(blank: &Channel) -> Channel {
 fn magnetometer(blank: &Channel) -> Channel {
     Channel {
         sensor: Kind::Magnetometer,
-        lsb: 0.092,
+        lsb: GAUSS_UT / 1090.0,
         noise_sigma: 0.2,
         drift_sigma: 5e-4,
         bias_sigma: 0.1,

@@ -150,20 +150,7 @@ impl Scene {
             let w_dot = pose.attitude.rate_dot_nb_b - pose.attitude.rate_nb_b.cross(&earth_b);
             let f = to_b * (pose.acc_n - gravity_n);
             rates.push(w);
-            forces.push(SVector::from([
-                f.x,
-                f.y,
-                f.z,
-                w_dot.x,
-                w_dot.y,
-                w_dot.z,
-                w.x * w.x,
-                w.y * w.y,
-                w.z * w.z,
-                w.x * w.y,
-                w.x * w.z,
-                w.y * w.z,
-            ]));
+            forces.push(force_quantities(f, w_dot, w));
             fields.push(to_b * environment.field_n_ut);
             temperatures.push(Vector1::new(pose.temperature_c.unwrap_or(environment.temperature_c)));
             let q = pose.attitude.q_nb.into_inner();
@@ -189,6 +176,35 @@ impl Scene {
             field: Grid::natural(from_s, step_s, fields),
             temperature: Grid::natural(from_s, step_s, temperatures),
             pose: Grid::natural(from_s, step_s, poses),
+        }
+    }
+
+    /// The rows of a table, at 0, 1, 2 s and so on; between them there is nothing, so the channels must have
+    /// neither bandwidth nor slots. The rows' `t_s` is not looked at. At least one row.
+    pub fn table(rows: &[Feel]) -> Self {
+        let mut rows = rows.to_vec();
+        // A spline has two ends.
+        rows.extend(rows.last().copied());
+        let pose = |row: &Feel| {
+            let (q, p) = (row.q_nb.into_inner(), row.position_n);
+            SVector::from([q.w, q.i, q.j, q.k, p.x, p.y, p.z])
+        };
+        Self {
+            rate: Grid::natural(0.0, 1.0, rows.iter().map(|row| row.rate_b).collect()),
+            force: Grid::natural(
+                0.0,
+                1.0,
+                rows.iter()
+                    .map(|row| force_quantities(row.force_b, row.rate_dot_b, row.rate_b))
+                    .collect(),
+            ),
+            field: Grid::natural(0.0, 1.0, rows.iter().map(|row| row.field_b_ut).collect()),
+            temperature: Grid::natural(
+                0.0,
+                1.0,
+                rows.iter().map(|row| Vector1::new(row.temperature_c)).collect(),
+            ),
+            pose: Grid::natural(0.0, 1.0, rows.iter().map(pose).collect()),
         }
     }
 
@@ -228,6 +244,24 @@ impl Scene {
             Filter::Temperature(low_pass) => low_pass.at(&self.temperature, t_s).x,
         }
     }
+}
+
+/// What an accelerometer's input is linear in: force, angular acceleration, products of rates.
+fn force_quantities(f: Vector3<f64>, w_dot: Vector3<f64>, w: Vector3<f64>) -> SVector<f64, 12> {
+    SVector::from([
+        f.x,
+        f.y,
+        f.z,
+        w_dot.x,
+        w_dot.y,
+        w_dot.z,
+        w.x * w.x,
+        w.y * w.y,
+        w.z * w.z,
+        w.x * w.y,
+        w.x * w.z,
+        w.y * w.z,
+    ])
 }
 
 #[cfg(test)]
@@ -272,5 +306,21 @@ mod tests {
             let direct = aim.input(&scene.feel(t));
             assert!((scene.input(&aim, &none, t) - direct).abs() < 1e-6, "at {t}");
         }
+    }
+
+    #[test]
+    fn a_table_is_its_rows() {
+        let rows: Vec<Feel> = (0..5)
+            .map(|k| Feel {
+                rate_b: Vector3::new(0.1 * f64::from(k % 2), -0.2, 0.3 * f64::from(k)),
+                ..Scene::new(&Tumble::new(), &Environment::laboratory(), 0.0, 1.0, 0.1).feel(0.0)
+            })
+            .collect();
+        let scene = Scene::table(&rows);
+        for (k, row) in rows.iter().enumerate() {
+            assert_eq!(scene.feel(k as f64).rate_b, row.rate_b);
+            assert_eq!(scene.feel(k as f64).force_b, row.force_b);
+        }
+        assert_eq!(Scene::table(&rows[..1]).feel(0.0).rate_b, rows[0].rate_b);
     }
 }

@@ -7,6 +7,9 @@
 //! Refuses, naming file and key: what is no TOML, a missing or unknown key, a value of the wrong type, an axis that is no
 //! direction, a sigma or step that is negative or not finite, a range that is empty, a name used twice.
 
+#[cfg(test)]
+mod tests;
+
 use std::path::Path;
 
 use nalgebra::{Unit, Vector3};

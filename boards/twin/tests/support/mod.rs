@@ -11,6 +11,7 @@ use twin::effect::Active;
 use twin::environment::Environment;
 use twin::motion::Recorded;
 use twin::predict::{Column, Scene, Twin, UnitDescription};
+use twin::recording::Table;
 
 /// The practice cases, beside the project; `None`, with a message, where they are not.
 pub fn shared(file: &str) -> Option<PathBuf> {
@@ -43,6 +44,46 @@ pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Option<Case> {
     let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
     let (counters, measured) = packets(&shared(&format!("practice/{name}/measured.txt.gz"))?, &unit);
     let starts_s = counters.iter().map(|&k| 0.2 * f64::from(k)).collect();
+    Some(Case {
+        twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
+        measured,
+    })
+}
+
+/// A log of a nine-axis unit with its optical reference smoothed at these corners [Hz], of attitude and position; samples the reference did not see are
+/// left out.
+pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Option<[f64; 2]>) -> Option<Case> {
+    let folder = shared(&format!("practice/{name}"))?;
+    let unit = UnitDescription::open(&folder.join("unit.toml")).unwrap();
+    let recorded = Recorded::open(&folder.join("motion.csv.gz")).unwrap();
+    let motion = corners_hz.map_or(recorded.clone(), |[attitude, position]| {
+        recorded.smoothed(attitude, position)
+    });
+    let environment = Environment {
+        gravity,
+        latitude: 52.51_f64.to_radians(),
+        field_n_ut: field_n_ut.into(),
+        temperature_c: 25.0,
+    };
+    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
+    let table = Table::open(&folder.join("measured.csv.gz"), &names).unwrap();
+    let starts_s: Vec<f64> = table.series([names[0]]).unwrap().series.t_s().to_vec();
+    // Half a second beside a gap the spline still bends towards it.
+    let lost = [(f64::MIN, recorded.span_s().0), (recorded.span_s().1, f64::MAX)]
+        .into_iter()
+        .chain(recorded.lost_s());
+    let lost: Vec<(f64, f64)> = lost.map(|(from_s, to_s)| (from_s - 0.5, to_s + 0.5)).collect();
+    let seen = |t_s: f64| !lost.iter().any(|(from_s, to_s)| *from_s < t_s && t_s < *to_s);
+    let channel = |name: &&str| {
+        let series = table.series([*name]).unwrap().series;
+        starts_s
+            .iter()
+            .map(|t_s| if seen(*t_s) { series.linear(*t_s).x } else { f64::NAN })
+            .collect()
+    };
+    let measured = names.iter().map(channel).collect();
+    let (from_s, to_s) = motion.span_s();
+    let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
     Some(Case {
         twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
         measured,
@@ -90,6 +131,8 @@ pub struct Fit {
     /// Root mean square of the standardised residual of the channels looked at, before and after.
     pub before: f64,
     pub after: f64,
+    /// What the fit makes of each of these channels' samples; NaN where there is none.
+    pub explained: Vec<Vec<f64>>,
 }
 
 /// Gauss-Newton from zero on the effects and the calibration of these channels, each held by its prior.
@@ -98,7 +141,7 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
     let mut active = active.to_vec();
     let calibration: Vec<Column> = channels.iter().flat_map(|&channel| twin.calibration(channel)).collect();
     let mut psi = DVector::zeros(calibration.len());
-    let (mut before, mut after, mut sigma) = (0.0, 0.0, Vec::new());
+    let (mut before, mut after, mut sigma, mut explained) = (0.0, 0.0, Vec::new(), Vec::new());
     for step in 0..3 {
         let own: Vec<Column> = (0..active.len()).flat_map(|of| twin.jacobian(&active, of)).collect();
         let columns: Vec<&Column> = calibration.iter().chain(&own).collect();
@@ -112,6 +155,7 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
             DVector::zeros(columns.len()),
         );
         let (mut energy, mut count) = (0.0, 0.0);
+        explained.clear();
         for &channel in channels {
             let weight = 1.0 / twin.unit().channels[channel].sigma();
             let mut residual = twin.channel(channel, &active).into_owned();
@@ -128,6 +172,8 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
                     *residual -= psi[i] * value;
                 }
             }
+            let pairs = case.measured[channel].iter().zip(&residual);
+            explained.push(pairs.map(|(measured, residual)| measured - residual).collect());
             let present: Vec<usize> = (0..residual.len()).filter(|&k| residual[k].is_finite()).collect();
             energy += present.iter().map(|&k| (residual[k] * weight).powi(2)).sum::<f64>();
             count += present.len() as f64;
@@ -149,11 +195,14 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
         let covariance: DMatrix<f64> = normal.try_inverse().unwrap();
         let moved: DVector<f64> = &covariance * score;
         psi += moved.rows(0, psi.len());
-        let mut i = psi.len();
-        sigma = (i..columns.len()).map(|i| covariance[(i, i)].sqrt()).collect();
-        for theta in active.iter_mut().flat_map(|a| &mut a.theta) {
-            *theta += moved[i];
-            i += 1;
+        let open = psi.len();
+        sigma = (open..columns.len()).map(|i| covariance[(i, i)].sqrt()).collect();
+        for (theta, moved) in active
+            .iter_mut()
+            .flat_map(|a| &mut a.theta)
+            .zip(moved.iter().skip(open))
+        {
+            *theta += moved;
         }
     }
     Fit {
@@ -161,5 +210,6 @@ pub fn fit(case: &Case, active: &[Active], channels: &[usize]) -> Fit {
         sigma,
         before,
         after,
+        explained,
     }
 }

@@ -1,0 +1,163 @@
+//! The filter on real recordings with optical truth: one table.
+//!
+//! The recordings are of BROAD (D. Laidig, M. Caruso, A. Cereatti, T. Seel, "BROAD, A Benchmark for Robust Inertial
+//! Orientation Estimation", Data 6(7), 2021, doi 10.3390/data6070072, CC-BY 4.0), 285.7 rows a second, about three
+//! minutes each. One set of parameters for all; it was chosen on [`TUNE`], and [`REPORT`] says what it is worth.
+
+use std::path::{Path, PathBuf};
+
+use emems::kalman::{Delays, Params};
+use nalgebra::Vector3;
+
+use crate::{
+    recording::{self, RecordingError, Row},
+    replay::{Noise, Replay},
+    score::{Rmse, mean},
+};
+
+/// Recordings on which parameters were chosen.
+pub const TUNE: [&str; 7] = ["02", "07", "11", "15", "24", "28", "32"];
+/// Recordings that played no part in it.
+pub const REPORT: [&str; 9] = ["01", "03", "05", "09", "18", "26", "30", "34", "36"];
+
+/// [rad/s] the Earth's rate and [rad] the latitude of Berlin, where the recordings were made.
+const EARTH_RATE: f64 = 7.292_115e-5;
+const LATITUDE_DEG: f64 = 52.5;
+
+/// A way to run the filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// At every row.
+    Full,
+    /// At 5 Hz, on rates integrated within the period.
+    FiveHz,
+    /// At every row, begun 10 s into the motion.
+    FromMotion,
+}
+
+impl Mode {
+    /// All of them.
+    pub const ALL: [Mode; 3] = [Mode::Full, Mode::FiveHz, Mode::FromMotion];
+
+    /// As a table's heading has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Full => "285 Hz",
+            Mode::FiveHz => "5 Hz",
+            Mode::FromMotion => "start in motion",
+        }
+    }
+}
+
+/// Rows of the recordings in a period of 0.2 s.
+const FIVE_HZ: usize = 57;
+
+/// Parameters and noise for these recordings, one set for all.
+pub fn replay(mode: Mode) -> Replay {
+    let latitude = LATITUDE_DEG.to_radians();
+    let earth = Vector3::new(EARTH_RATE * latitude.cos(), 0.0, -EARTH_RATE * latitude.sin());
+    Replay {
+        params: Params {
+            delays: Delays {
+                gyro_s: 0.004,
+                acc_s: 0.004,
+                mag_s: 0.015,
+            },
+            gravity: 9.82,
+            earth_rate_n: earth.cast(),
+            ..Params::ROOM
+        },
+        noise: Noise {
+            angle: 0.0,
+            acc: 2e-4,
+            mag: 0.1,
+        },
+        rows_per_step: if mode == Mode::FiveHz { FIVE_HZ } else { 1 },
+    }
+}
+
+/// Where errors begin to count: for a start in motion, 10 s after it began.
+pub fn scored(rows: &[Row], mode: Mode) -> &[Row] {
+    let moving = rows.iter().position(|row| row.scored).unwrap_or_default();
+    match mode {
+        Mode::FromMotion => {
+            let from = rows[moving].t_s + 10.0;
+            &rows[rows.partition_point(|row| row.t_s < from).min(rows.len() - 1)..]
+        }
+        _ => rows,
+    }
+}
+
+/// The recordings in a folder, by number.
+pub fn files(folder: &Path) -> Result<Vec<(String, PathBuf)>, RecordingError> {
+    let io = |error| RecordingError::Io {
+        file: folder.display().to_string(),
+        error,
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        if name.contains(".csv")
+            && name
+                .get(..2)
+                .is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
+        {
+            files.push((name[..2].to_string(), path));
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Errors on each recording of a folder in each mode of [`Mode::ALL`].
+pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Vec<(String, [Option<Rmse>; 3])>, RecordingError> {
+    let mut table = Vec::new();
+    for (number, path) in files(folder)? {
+        let rows = recording::read(&path)?;
+        let of = |mode| replay(mode).score(scored(&rows, mode));
+        table.push((number.clone(), Mode::ALL.map(of)));
+        done(&number);
+    }
+    Ok(table)
+}
+
+/// The mean over those of `numbers` that are in a table, in the mode at `mode`.
+pub fn mean_of(table: &[(String, [Option<Rmse>; 3])], numbers: &[&str], mode: usize) -> Option<Rmse> {
+    let chosen = table.iter().filter(|(number, _)| numbers.contains(&number.as_str()));
+    let all: Option<Vec<Rmse>> = chosen.map(|(_, modes)| modes[mode]).collect();
+    all.filter(|all| !all.is_empty()).map(|all| mean(&all))
+}
+
+/// The table as text.
+pub fn format(table: &[(String, [Option<Rmse>; 3])]) -> String {
+    let mut text = format!("{:<14}", "RMSE [deg]");
+    for mode in Mode::ALL {
+        text += &format!("{:>24}", mode.name());
+    }
+    text += "\n";
+    let cell = |rmse: Option<Rmse>| match rmse {
+        Some(rmse) => format!(
+            "{:>10.2} ({:>4.2}, {:>4.2})",
+            rmse.total_deg, rmse.heading_deg, rmse.inclination_deg
+        ),
+        None => format!("{:>24}", "no attitude"),
+    };
+    let mut line = |name: &str, modes: [Option<Rmse>; 3]| {
+        text += &format!("{name:<14}");
+        for rmse in modes {
+            text += &format!("{:>24}", cell(rmse));
+        }
+        text += "\n";
+    };
+    for (number, modes) in table {
+        line(number, *modes);
+    }
+    for (name, numbers) in [("mean of tune", &TUNE[..]), ("mean of report", &REPORT[..])] {
+        line(name, [0, 1, 2].map(|mode| mean_of(table, numbers, mode)));
+    }
+    text + "total (heading, inclination)\n"
+}

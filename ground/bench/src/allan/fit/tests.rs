@@ -1,0 +1,151 @@
+use rayon::prelude::*;
+
+use super::{
+    super::{
+        deviation::{octaves, sweep},
+        phase::{Input, Phase},
+        series::Series,
+        simulate::Noise,
+    },
+    *,
+};
+
+const CONFIDENCE: f64 = 0.95;
+const STEP_S: f64 = 0.1;
+
+fn points(noise: &Noise, count: usize, seed: u64) -> Vec<Point> {
+    let series = Series {
+        step_s: STEP_S,
+        values: noise.rate(count, STEP_S, seed),
+        gaps: Vec::new(),
+    };
+    let phase = Phase::new(&series, Input::Rate);
+    sweep(&phase, &octaves(&phase), |_| ())
+}
+
+fn fitted(noise: &Noise, count: usize, seed: u64) -> Fit {
+    fit(&points(noise, count, seed), STEP_S, &Term::POWER_LAWS, CONFIDENCE).expect("enough points")
+}
+
+fn finding(fit: &Fit, term: Term) -> Finding {
+    fit.findings
+        .iter()
+        .find(|(other, _)| *other == term)
+        .expect("asked for")
+        .1
+}
+
+#[test]
+fn intervals_hold_the_truth_in_93_to_97_of_100_records() {
+    let noise = Noise {
+        quantisation: 0.01,
+        arw: 0.03,
+        rrw: 0.01,
+        ..Noise::default()
+    };
+    let covariance = covariance_of(&points(&noise, 8_192, 0), STEP_S, &Term::POWER_LAWS);
+    let fits: Vec<Fit> = (0..1_000)
+        .into_par_iter()
+        .map(|seed| {
+            let points = points(&noise, 8_192, seed);
+            fit_with(&points, &Term::POWER_LAWS, &covariance, CONFIDENCE).expect("enough points")
+        })
+        .collect();
+    for (term, truth) in [
+        (Term::Quantisation, 0.01),
+        (Term::AngleWalk, 0.03),
+        (Term::RateWalk, 0.01),
+    ] {
+        let seen = fits
+            .iter()
+            .map(|fit| finding(fit, term))
+            .filter(|finding| finding.value() > 0.0);
+        let held = fits.iter().filter(|fit| match finding(fit, term) {
+            Finding::Seen { low, high, .. } => low <= truth && truth <= high,
+            Finding::NotSeen { below } => truth <= below,
+        });
+        let (seen, share) = (seen.count(), held.count() as f64 / fits.len() as f64);
+        println!("{}: seen {seen}, held {share}", term.name());
+        assert!((0.93..=0.97).contains(&share), "{}: {share}", term.name());
+    }
+}
+
+#[test]
+fn a_rate_walk_and_a_ramp_the_record_is_too_short_for_are_refused_and_bounded() {
+    let noise = Noise {
+        arw: 0.03,
+        rrw: 1e-5,
+        ramp: 1e-9,
+        ..Noise::default()
+    };
+    let fit = fitted(&noise, 16_384, 5);
+    for (term, truth) in [(Term::RateWalk, 1e-5), (Term::Ramp, 1e-9)] {
+        let Finding::NotSeen { below } = finding(&fit, term) else {
+            panic!("{}", term.name())
+        };
+        assert!(below > truth && below.is_finite());
+    }
+    assert!(matches!(finding(&fit, Term::AngleWalk), Finding::Seen { .. }));
+}
+
+#[test]
+fn a_long_record_shows_its_ramp_and_its_bias_instability() {
+    let ramp = fitted(
+        &Noise {
+            arw: 0.03,
+            ramp: 1e-4,
+            ..Noise::default()
+        },
+        32_768,
+        6,
+    );
+    let Finding::Seen { value, .. } = finding(&ramp, Term::Ramp) else {
+        panic!("ramp")
+    };
+    assert!((value / 1e-4 - 1.0).abs() < 0.05, "{value}");
+
+    let flicker = fitted(
+        &Noise {
+            arw: 0.01,
+            bias_instability: 0.02,
+            ..Noise::default()
+        },
+        65_536,
+        7,
+    );
+    let Finding::Seen { low, high, .. } = finding(&flicker, Term::BiasInstability) else {
+        panic!("bias instability")
+    };
+    assert!(low < 0.02 && 0.02 < high, "{low} {high}");
+}
+
+#[test]
+fn a_record_of_three_octaves_is_not_asked_for_five_coefficients() {
+    let fit = fit(
+        &points(
+            &Noise {
+                arw: 1.0,
+                ..Noise::default()
+            },
+            20,
+            8,
+        ),
+        STEP_S,
+        &Term::POWER_LAWS,
+        CONFIDENCE,
+    );
+    assert!(fit.is_none_or(|fit| fit.findings.iter().filter(|(_, finding)| finding.value() > 0.0).count() <= 2));
+}
+
+#[test]
+fn a_constant_record_has_nothing_to_fit() {
+    assert_eq!(
+        fit(
+            &points(&Noise::default(), 1_000, 9),
+            STEP_S,
+            &Term::POWER_LAWS,
+            CONFIDENCE
+        ),
+        None
+    );
+}

@@ -1,0 +1,182 @@
+//! `ground calibrate`: from a table or a raw log to a calibration set, with a report.
+//!
+//! In: files and flags. Out: a report on standard output, and where asked for a set (`--set`, merged into what is there),
+//! a page (`--page`) or a unit file for the twin. The subcommands do the work; what they share is here.
+
+mod controlled;
+mod ellipsoid;
+mod sets;
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    nominal::Nominal,
+    report::Report,
+    set::{Entry, Set},
+    table::{self, TableError},
+    turntable::{Mount, Site},
+};
+
+/// Calibrates sensors from bench data, compares calibrations, hands them to the twin
+#[derive(Clone, Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Clone, Debug, clap::Subcommand)]
+enum What {
+    RateTable(controlled::RateTable),
+    MultiPosition(controlled::MultiPosition),
+    Ellipsoid(ellipsoid::Arguments),
+    Drift(crate::drift::Arguments),
+    Diff(sets::Diff),
+    Unit(sets::Unit),
+}
+
+/// Why a calibration failed.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// A table cannot be read.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A channel is not determined.
+    #[error(transparent)]
+    Calibration(#[from] crate::controlled::CalibrationError),
+    /// A drift test is not conclusive.
+    #[error(transparent)]
+    Drift(#[from] crate::drift::DriftError),
+    /// It was done, and the report says what is wrong.
+    #[error("not good; what is wrong stands above")]
+    NotGood,
+    /// Anything else, with the file it is about.
+    #[error("{file}: {why}")]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and what to do.
+        why: String,
+    },
+}
+
+impl CalibrateError {
+    fn of(file: &Path) -> impl Fn(String) -> CalibrateError {
+        move |why| CalibrateError::File { file: file.into(), why }
+    }
+}
+
+/// Runs `ground calibrate`.
+///
+/// # Errors
+/// When files cannot be read or written, or do not determine what is asked for; and when the result is not good, so that
+/// a script does not take it for one.
+pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
+    let good = match &arguments.what {
+        What::RateTable(arguments) => controlled::rate_table(arguments),
+        What::MultiPosition(arguments) => controlled::multi_position(arguments),
+        What::Ellipsoid(arguments) => ellipsoid::run(arguments),
+        What::Drift(arguments) => Ok(crate::drift::run(arguments).map(|()| true)?),
+        What::Diff(arguments) => sets::diff(arguments),
+        What::Unit(arguments) => sets::unit(arguments).map(|()| true),
+    }?;
+    if good { Ok(()) } else { Err(CalibrateError::NotGood) }
+}
+
+/// Where the results go.
+#[derive(Clone, Debug, clap::Args)]
+struct Output {
+    /// Put the channels into this calibration set, new or there
+    #[arg(long, value_name = "FILE")]
+    set: Option<PathBuf>,
+    /// Write a page with residuals to this file
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    /// Part and serial number, kept in the set
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    part: String,
+}
+
+impl Output {
+    /// Prints, and writes what was asked for.
+    fn finish(&self, report: &Report, entries: Vec<Entry>, files: &[(&Path, &[u8])]) -> Result<bool, CalibrateError> {
+        print!("{}", report.text());
+        if let Some(path) = &self.set {
+            let fail = CalibrateError::of(path);
+            let mut set = if path.exists() {
+                read_set(path)?
+            } else {
+                Set::new("unit")
+            };
+            for (file, bytes) in files {
+                set.from_file(file, bytes);
+            }
+            set.merge(entries);
+            let text = set.text().map_err(|error| fail(error.to_string()))?;
+            std::fs::write(path, text).map_err(|error| fail(format!("cannot be written: {error}")))?;
+            println!("{}", path.display());
+        }
+        if let Some(path) = &self.page {
+            let names: Vec<_> = files.iter().map(|(file, _)| file.display().to_string()).collect();
+            report
+                .write(path, &names.join(", "))
+                .map_err(CalibrateError::of(path))?;
+            println!("{}", path.display());
+        }
+        Ok(report.wrong.is_empty())
+    }
+}
+
+/// The table the unit stood on.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Place {
+    /// How the unit sits on the table: axes at zero angles
+    #[arg(long, value_enum, default_value = "emems")]
+    mount: MountName,
+    /// Gravity at the site [m/s2]
+    #[arg(long, default_value_t = 9.80665)]
+    gravity: f64,
+    /// Latitude of the site [deg], north positive
+    #[arg(long, default_value_t = -23.2111, allow_negative_numbers = true)]
+    latitude: f64,
+    /// Azimuth of the table's outer axis [deg]; without it the Earth's rate stays in the bias
+    #[arg(long, allow_negative_numbers = true)]
+    azimuth: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum MountName {
+    /// Inner axis along z down, outer along y (Marinho 2017)
+    Emems,
+    /// Inner axis along x up, middle along y (Siqueira 2014)
+    Siqueira,
+}
+
+impl Place {
+    pub(crate) fn mount(&self) -> Mount {
+        match self.mount {
+            MountName::Emems => Mount::EMEMS,
+            MountName::Siqueira => Mount::SIQUEIRA,
+        }
+    }
+
+    pub(crate) fn site(&self) -> Site {
+        Site {
+            gravity_m_s2: self.gravity,
+            latitude_rad: self.latitude.to_radians(),
+            outer_azimuth_rad: self.azimuth.map(f64::to_radians),
+        }
+    }
+}
+
+/// Reads a unit file.
+pub(crate) fn read_nominal(path: &Path) -> Result<Nominal, CalibrateError> {
+    Nominal::parse(&read_text(path)?).map_err(CalibrateError::of(path))
+}
+
+fn read_set(path: &Path) -> Result<Set, CalibrateError> {
+    Set::parse(&read_text(path)?).map_err(|error| CalibrateError::of(path)(error.to_string()))
+}
+
+fn read_text(path: &Path) -> Result<String, CalibrateError> {
+    String::from_utf8(table::bytes(path)?).map_err(|error| CalibrateError::of(path)(error.to_string()))
+}

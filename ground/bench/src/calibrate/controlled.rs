@@ -1,0 +1,331 @@
+//! `ground calibrate rate-table` and `multi-position`: controlled inputs, from a table or from a raw log's stretches at
+//! rest.
+
+use std::path::{Path, PathBuf};
+
+use super::{CalibrateError, Output, Place, read_nominal};
+use crate::{
+    controlled::{self, Calibration, Contradicted, Options},
+    experiment::{Experiment, Kind, Layout},
+    lean, log,
+    nominal::{Nominal, NominalChannel},
+    report::{self, Leftover, Report},
+    response::Orders,
+    set::Entry,
+    stretches::{self, Stretch},
+    table::{self, Table},
+    wiring::surely_inverted,
+};
+
+/// A left-out error this many times the scatter says that the calibration does not carry over.
+const CARRIES_OVER: f64 = 3.0;
+
+/// Gyros, from runs on a rate table
+///
+/// One row a run: rates in b (wx_rad_s wy_rad_s wz_rad_s, or wx_deg_s ..) or angles (inner_deg outer_deg turning
+/// rate_deg_s) or both, then a mean a channel. Finds rows that contradict the data, exchanged and inverted channels.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RateTable {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Accelerometers, from many positions
+///
+/// One row a position: specific force in b (fx_m_s2 .., or fx_g ..) or table angles (inner_deg outer_deg), then a mean a
+/// channel; or, with --log, the angles alone, in the order in which the log holds them.
+#[derive(Clone, Debug, clap::Args)]
+pub struct MultiPosition {
+    #[command(flatten)]
+    common: Common,
+    /// Raw log (packets, or a table of samples) whose stretches at rest are the rows; needs --channels
+    #[arg(long, value_name = "FILE", requires = "channels")]
+    log: Option<PathBuf>,
+    /// Samples a stretch at rest has at least
+    #[arg(long, default_value_t = 50)]
+    shortest: usize,
+}
+
+#[derive(Clone, Debug, clap::Args)]
+struct Common {
+    /// Table: CSV, tab-separated or LabVIEW, decimal points or commas
+    file: PathBuf,
+    /// Channels, separated by commas; without it all columns that have NAME_sigma or NAME_n beside them
+    #[arg(long, value_delimiter = ',')]
+    channels: Vec<String>,
+    /// Nominal unit (unit.toml): axes to tell wiring errors by, ranges to tell saturation by
+    #[arg(long, value_name = "FILE")]
+    unit: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
+    /// Degree of the bias in temperature
+    #[arg(long, default_value_t = 0)]
+    bias_order: usize,
+    /// Degree of the scale in temperature
+    #[arg(long, default_value_t = 0)]
+    scale_order: usize,
+    /// What to do with rows that contradict the data
+    #[arg(long, value_enum, default_value = "leave-out")]
+    contradicted: Contradicted,
+    #[command(flatten)]
+    output: Output,
+}
+
+pub fn rate_table(arguments: &RateTable) -> Result<bool, CalibrateError> {
+    let common = &arguments.common;
+    let (bytes, nominal) = common.read()?;
+    let table = Table::parse(&common.file, &bytes)?;
+    let experiment = common.layout(Kind::Rate, nominal.as_ref(), |layout| Experiment::read(&table, layout))?;
+    common.calibrate(&experiment, nominal.as_ref(), Vec::new(), &[(&common.file, &bytes)])
+}
+
+pub fn multi_position(arguments: &MultiPosition) -> Result<bool, CalibrateError> {
+    let common = &arguments.common;
+    let (bytes, nominal) = common.read()?;
+    let table = Table::parse(&common.file, &bytes)?;
+    let mut sources: Vec<(&Path, &[u8])> = vec![(&common.file, &bytes)];
+    let logged;
+    let experiment = match &arguments.log {
+        None => common.layout(Kind::Force, nominal.as_ref(), |layout| Experiment::read(&table, layout))?,
+        Some(path) => {
+            let samples;
+            (samples, logged) = log::samples(path, &common.channels)?;
+            sources.push((path, &logged));
+            let found = stretches::still(&samples, arguments.shortest);
+            if found.len() != table.rows.len() {
+                return Err(CalibrateError::of(path)(count_differs(&found, table.rows.len())));
+            }
+            let mean = |number: usize, _: &table::Row| Ok(found[number].mean.iter().map(|mean| Some(*mean)).collect());
+            let channels = common.channels.clone();
+            common.layout(Kind::Force, nominal.as_ref(), |layout| {
+                Experiment::assemble(&table, layout, channels, &mean)
+            })?
+        }
+    };
+    let (mount, site) = (common.place.mount(), common.place.site());
+    match lean::lean(&experiment, &mount, &site) {
+        Some(lean) => {
+            let [a, b] = lean.lean_rad.map(f64::to_degrees);
+            let [sa, sb] = lean.sigma_rad.map(f64::to_degrees);
+            let remark = format!(
+                "the table's outer axis leans by {a:.4} ± {sa:.4} deg, its zero is off by {b:.4} ± {sb:.4} deg (1 sigma); taken out"
+            );
+            let experiment = lean::leaning(&experiment, &mount, &site, lean.lean_rad);
+            common.calibrate(&experiment, nominal.as_ref(), vec![remark], &sources)
+        }
+        None => {
+            let remark =
+                "how much the table leans is not seen: that needs table angles, and positions at several inner angles";
+            common.calibrate(&experiment, nominal.as_ref(), vec![remark.into()], &sources)
+        }
+    }
+}
+
+fn count_differs(found: &[Stretch], rows: usize) -> String {
+    let ends: Vec<String> = found
+        .iter()
+        .take(100)
+        .map(|one| format!("{}..{}", one.from, one.to))
+        .collect();
+    format!(
+        "stands still {} times, and the table of positions has {rows} rows; samples at rest: {}. Change --shortest, or \
+         the table",
+        found.len(),
+        ends.join(" ")
+    )
+}
+
+impl Common {
+    fn read(&self) -> Result<(Vec<u8>, Option<Nominal>), CalibrateError> {
+        let nominal = self.unit.as_deref().map(read_nominal).transpose()?;
+        Ok((table::bytes(&self.file)?, nominal))
+    }
+
+    fn layout<T>(&self, kind: Kind, nominal: Option<&Nominal>, read: impl FnOnce(&Layout) -> T) -> T {
+        let limit = |name: &str| {
+            let channel = nominal.and_then(|nominal| nominal.channel(name));
+            channel.map_or(f64::INFINITY, NominalChannel::limit_counts)
+        };
+        read(&Layout {
+            kind,
+            mount: self.place.mount(),
+            site: self.place.site(),
+            channels: &self.channels,
+            limit: &limit,
+        })
+    }
+
+    fn calibrate(
+        &self,
+        experiment: &Experiment,
+        nominal: Option<&Nominal>,
+        remarks: Vec<String>,
+        files: &[(&Path, &[u8])],
+    ) -> Result<bool, CalibrateError> {
+        let fail = CalibrateError::of(&self.file);
+        let axes = nominal.map(|nominal| nominal.axes_b(&experiment.channels)).transpose();
+        let options = Options {
+            orders: Orders {
+                bias: self.bias_order,
+                scale: self.scale_order,
+            },
+            contradicted: self.contradicted,
+            nominal_b: axes
+                .map_err(|name| fail(format!("the unit file has no axis for {name}")))?
+                .unwrap_or_default(),
+        };
+        let found = controlled::calibrate(experiment, &options)?;
+        let mut report = describe(experiment, &found, self.contradicted);
+        report.remarks.extend(remarks);
+        let entries = Entry::controlled(&found, experiment.kind, &self.output.part);
+        self.output.finish(&report, entries, files)
+    }
+}
+
+fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradicted) -> Report {
+    let (title, unit) = match experiment.kind {
+        Kind::Rate => ("Rate table", "rad/s"),
+        Kind::Force => ("Multi-position", "m/s²"),
+    };
+    let columns = [
+        "channel",
+        "counts per unit",
+        "± rel.",
+        "axis b",
+        "± rad",
+        "bias",
+        "±",
+        "scatter",
+        "left out",
+        "rows",
+    ];
+    let mut report = Report {
+        title: format!("{title} calibration, {unit}"),
+        columns: columns.map(String::from).to_vec(),
+        remarks: experiment.remarks.clone(),
+        ..Report::default()
+    };
+    let label = |row: usize| {
+        format!(
+            "row {} (line {})",
+            experiment.trials[row].label, experiment.trials[row].line
+        )
+    };
+    for one in &found.consensus.contradictions {
+        let claimed = experiment.trials[one.row].excitation_b;
+        let vector = |v: nalgebra::Vector3<f64>| format!("({:.5}, {:.5}, {:.5})", v.x, v.y, v.z);
+        let mut line = format!(
+            "{} contradicts the data: it claims {} {unit}",
+            label(one.row),
+            vector(claimed)
+        );
+        if let Some(found_b) = one.found_b {
+            line += &format!(", the channels say {}", vector(found_b));
+        }
+        if let Some(reading) = one.reading {
+            line += &format!(", which is {} of what it claims", reading.words());
+        }
+        line += match (contradicted, one.reading) {
+            (Contradicted::Correct, Some(_)) => "; corrected",
+            (Contradicted::Keep, _) => "; kept",
+            _ => "; left out",
+        };
+        report.wrong.push(line);
+    }
+    for rows in &found.consensus.alternatives {
+        let rows: Vec<String> = rows.iter().map(|&row| label(row)).collect();
+        report.wrong.push(format!(
+            "the data would as well blame {}; only the table's angles can tell",
+            rows.join(", ")
+        ));
+    }
+    for &row in &found.disagree {
+        let claimed = experiment.trials[row].claimed_b.unwrap_or_default();
+        let real = experiment.trials[row].excitation_b;
+        let text = format!("{}: written is {claimed:.4?}, its angles give {real:.4?}", label(row));
+        report.wrong.push(text.replace('\n', " "));
+    }
+    if let Some(wiring) = found.wirings.first().filter(|wiring| !wiring.honest()) {
+        let names = &experiment.channels;
+        let sure = surely_inverted(&found.wirings);
+        for k in &sure {
+            report.wrong.push(format!("{} is inverted", names[*k]));
+        }
+        let ways: Vec<String> = found.wirings.iter().map(|wiring| wiring.words(names)).collect();
+        report.wrong.push(format!(
+            "the channels are not wired as drawn (misfit {:.3}); as good as each other are: {}",
+            wiring.misfit,
+            ways.join("; or ")
+        ));
+        report
+            .next
+            .push("check the plugs and the outputs' polarity, then the signs of the table's axes".into());
+    }
+    for &(row, earlier) in &found.repeated {
+        report.remarks.push(format!(
+            "{} repeats {}: it adds no direction",
+            label(row),
+            label(earlier)
+        ));
+    }
+    if experiment.kind == Kind::Rate {
+        let paired = 2 * found.pairs.len();
+        let used = found.excitation_b.iter().flatten().count();
+        if paired < used {
+            report.remarks.push(format!(
+                "{} of {used} runs have no antagonist: drift stays in their scale",
+                used - paired
+            ));
+        }
+    }
+    let mut pictures = Vec::new();
+    for channel in &found.channels {
+        let fit = &channel.response;
+        let (axis, left_out) = (fit.axis_b(), Calibration::held_out_rms(channel));
+        report.rows.push(vec![
+            channel.name.clone(),
+            format!("{:.6}", fit.counts_per_unit()),
+            format!("{:.1e}", fit.scale_sigma()),
+            format!("{:+.5} {:+.5} {:+.5}", axis.x, axis.y, axis.z),
+            format!("{:.1e}", fit.axis_sigma_rad()),
+            format!("{:.6}", fit.bias[0]),
+            format!("{:.1e}", fit.bias_sigma()),
+            format!("{:.2e}", fit.scatter),
+            format!("{left_out:.2e}"),
+            channel.rows.len().to_string(),
+        ]);
+        if fit.freedom == 0 {
+            report.wrong.push(format!(
+                "{}: as many rows as parameters, nothing checks them",
+                channel.name
+            ));
+        } else if left_out.is_nan() || left_out > CARRIES_OVER * fit.scatter + f64::EPSILON * fit.counts_per_unit() {
+            let text = "rows left out are predicted far worse than rows in the fit: add positions";
+            report.wrong.push(format!("{}: {text}", channel.name));
+        }
+        let points = |values: &[f64]| {
+            channel
+                .rows
+                .iter()
+                .zip(values)
+                .map(|(&row, value)| (row as f64 + 1.0, *value))
+                .collect()
+        };
+        pictures.push(Leftover {
+            channel: channel.name.clone(),
+            fitted: points(&fit.residuals),
+            left_out: points(&channel.held_out),
+        });
+    }
+    report.picture(report::residuals("Residuals", "counts", &pictures));
+    if !found.consensus.contradictions.is_empty() {
+        report
+            .next
+            .push("put right the rows named above, and run again; until then do not load this set".into());
+    } else if report.wrong.is_empty() {
+        report
+            .next
+            .push("compare with the last set: ground calibrate diff".into());
+    }
+    report
+}

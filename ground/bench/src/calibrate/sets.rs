@@ -1,0 +1,103 @@
+//! `ground calibrate diff` and `unit`: what two sets say differently, and a set as the twin's nominal unit.
+
+use std::path::PathBuf;
+
+use super::{CalibrateError, read_set, read_text};
+use crate::{
+    report::Report,
+    set::{diff, unit},
+};
+
+/// Changes beyond this many sigmas are no chance: one in 370 is.
+const SIGNIFICANT: f64 = 3.0;
+
+/// What two calibration sets say differently, in sigma
+#[derive(Clone, Debug, clap::Args)]
+pub struct Diff {
+    /// Earlier set
+    earlier: PathBuf,
+    /// Later set
+    later: PathBuf,
+}
+
+/// A calibration set as the twin's nominal unit
+#[derive(Clone, Debug, clap::Args)]
+pub struct Unit {
+    /// Calibration set
+    set: PathBuf,
+    /// Unit file it refines
+    #[arg(long, value_name = "FILE")]
+    unit: PathBuf,
+    /// Where to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Temperature the twin's parameters hold at [degC]; without it each channel's reference
+    #[arg(long, allow_negative_numbers = true)]
+    temperature: Option<f64>,
+}
+
+pub fn diff(arguments: &Diff) -> Result<bool, CalibrateError> {
+    let found = diff::diff(&read_set(&arguments.earlier)?, &read_set(&arguments.later)?);
+    let mut report = Report {
+        title: "Calibration sets".into(),
+        columns: [
+            "channel", "scale %", "sigma", "bias", "sigma", "axis deg", "sigma", "distance",
+        ]
+        .map(String::from)
+        .to_vec(),
+        ..Report::default()
+    };
+    for moved in &found.moved {
+        let cell = |change: diff::Change, factor: f64| {
+            [
+                format!("{:+.5}", change.change * factor),
+                format!("{:+.1}", change.sigmas()),
+            ]
+        };
+        let mut row = vec![moved.channel.clone()];
+        row.extend(cell(moved.scale, 100.0));
+        row.extend(cell(moved.bias, 1.0));
+        row.extend(cell(moved.axis_rad, 1_f64.to_degrees()));
+        row.push(
+            moved
+                .distance
+                .map_or("-".into(), |(distance, of)| format!("{distance:.1} of {of}")),
+        );
+        report.rows.push(row);
+        for (what, change) in [("scale", moved.scale), ("bias", moved.bias), ("axis", moved.axis_rad)] {
+            if change.sigmas().abs() > SIGNIFICANT {
+                report.wrong.push(format!(
+                    "{}: {what} moved by {:+.1} sigma",
+                    moved.channel,
+                    change.sigmas()
+                ));
+            }
+        }
+    }
+    report.wrong.extend(
+        found
+            .gone
+            .iter()
+            .map(|name| format!("{name} is in the earlier set only")),
+    );
+    report
+        .remarks
+        .extend(found.come.iter().map(|name| format!("{name} is in the later set only")));
+    if !report.wrong.is_empty() {
+        report
+            .next
+            .push("find out what happened between the two: turn-on, temperature, a blow, another part".into());
+    }
+    print!("{}", report.text());
+    Ok(report.wrong.is_empty())
+}
+
+pub fn unit(arguments: &Unit) -> Result<(), CalibrateError> {
+    let set = read_set(&arguments.set)?;
+    let fail = CalibrateError::of(&arguments.out);
+    let refined = unit::refine(&read_text(&arguments.unit)?, &set, arguments.temperature);
+    let refined = refined.map_err(|error| CalibrateError::of(&arguments.unit)(error.to_string()))?;
+    std::fs::write(&arguments.out, refined).map_err(|error| fail(format!("cannot be written: {error}")))?;
+    println!("{}", arguments.out.display());
+    Ok(())
+}

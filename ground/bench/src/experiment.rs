@@ -1,0 +1,282 @@
+//! A campaign on the table: what the unit was made to feel, row by row, and what its channels put out.
+//!
+//! In: a table with one row a position or run. Its excitation stands in the row as components in b
+//! (`wx_rad_s wy_rad_s wz_rad_s` or `wx_deg_s ..` for gyros, `fx_m_s2 fy_m_s2 fz_m_s2` or `fx_g ..` for accelerometers), as
+//! table angles (`inner_deg outer_deg`, for gyros with `turning` (inner or outer) and `rate_deg_s`), or as both, which are
+//! then held against each other. `temperature_c` and a label in `seq` are optional. Every other column with a
+//! `NAME_sigma` or `NAME_n` beside it is a channel, or those named by the caller. Out: an [`Experiment`].
+//!
+//! Left out, and said: cells that are empty, and cells at the limit of the channel's code. Refused, with file, line and
+//! column: half an excitation, channels that never change, and unknown units.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+
+use crate::{
+    table::{Row, Table, TableError},
+    turntable::{Mount, Pose, Site, Turning},
+};
+
+/// What excites the channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Gyros, excited by rate [rad/s].
+    Rate,
+    /// Accelerometers, excited by specific force [m/s2].
+    Force,
+}
+
+/// One position or run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// Its label: column `seq`, or its number.
+    pub label: String,
+    /// Its line in the file; 0 if it came from a raw log.
+    pub line: usize,
+    /// Excitation written in the row.
+    pub claimed_b: Option<Vector3<f64>>,
+    /// Table angles, and the axis that turned.
+    pub pose: Option<(Pose, Option<Turning>)>,
+    /// Excitation in b that is used: of the angles if there are any, else as claimed.
+    pub excitation_b: Vector3<f64>,
+    /// Temperature [degC]; `NaN` if nobody measured it.
+    pub temperature_c: f64,
+    /// Mean output of each channel [counts]; `None` where it was not read.
+    pub values: Vec<Option<f64>>,
+}
+
+/// A campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Where it came from.
+    pub file: PathBuf,
+    /// What excites the channels.
+    pub kind: Kind,
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Its rows.
+    pub trials: Vec<Trial>,
+    /// What was left out of it, and why.
+    pub remarks: Vec<String>,
+}
+
+/// How to read a table.
+#[derive(Clone)]
+pub struct Layout<'a> {
+    /// What excites the channels.
+    pub kind: Kind,
+    /// How the unit sat on the table.
+    pub mount: Mount,
+    /// Where the table stands.
+    pub site: Site,
+    /// Channels; empty for all columns with a sigma or a count beside them.
+    pub channels: &'a [String],
+    /// Code limit of each channel [counts]: beyond it, or at it, the sensor saturates.
+    pub limit: &'a dyn Fn(&str) -> f64,
+}
+
+/// Row number and row to the value of every channel.
+pub type Outputs<'a> = dyn Fn(usize, &Row) -> Result<Vec<Option<f64>>, TableError> + 'a;
+
+impl Experiment {
+    /// Reads a table that holds both excitations and outputs.
+    ///
+    /// # Errors
+    /// When its meaning is not certain.
+    pub fn read(table: &Table, layout: &Layout) -> Result<Self, TableError> {
+        let columns = channels(table, layout.channels)?;
+        let names: Vec<String> = columns.iter().map(|&column| table.columns[column].clone()).collect();
+        let outputs = |_: usize, row: &Row| columns.iter().map(|&column| table.number(row, column)).collect();
+        let experiment = Self::assemble(table, layout, names, &outputs)?;
+        for (k, &column) in columns.iter().enumerate() {
+            let mut values = experiment.trials.iter().filter_map(|trial| trial.values[k]);
+            let first = values.next();
+            if values.clone().next().is_some() && values.all(|value| Some(value) == first) {
+                let why = "never changes: is the channel connected, is the column the right one?";
+                return Err(table.error(0, column, why));
+            }
+        }
+        Ok(experiment)
+    }
+
+    /// Excitations from a table, outputs from elsewhere: row number and row to the value of every named channel.
+    ///
+    /// # Errors
+    /// When the table's meaning is not certain.
+    pub fn assemble(
+        table: &Table,
+        layout: &Layout,
+        channels: Vec<String>,
+        outputs: &Outputs,
+    ) -> Result<Self, TableError> {
+        let source = Source::of(table, layout.kind)?;
+        let mut remarks = Vec::new();
+        let mut trials = Vec::new();
+        for (number, row) in table.rows.iter().enumerate() {
+            let mut values = outputs(number, row)?;
+            for (value, name) in values.iter_mut().zip(&channels) {
+                let why = match *value {
+                    None => "empty, left out".to_string(),
+                    Some(code) if code.abs() >= (layout.limit)(name) => {
+                        format!("{code} is at the end of its range, left out")
+                    }
+                    Some(_) => continue,
+                };
+                remarks.push(format!("line {}, {name}: {why}", row.line));
+                *value = None;
+            }
+            let (claimed_b, pose, rate_rad_s) = source.of_row(table, row)?;
+            let of_angles = pose.map(|(pose, turning)| match turning {
+                Some(turning) => layout.mount.rate_b(pose, turning, rate_rad_s, &layout.site),
+                None => layout.mount.force_b(pose, &layout.site, [0.0; 2]),
+            });
+            let seq = table.column("seq").and_then(|column| row.cells.get(column)).cloned();
+            let temperature = table
+                .column("temperature_c")
+                .map(|column| table.number(row, column))
+                .transpose()?;
+            trials.push(Trial {
+                label: seq
+                    .filter(|seq| !seq.is_empty())
+                    .unwrap_or_else(|| (number + 1).to_string()),
+                line: row.line,
+                claimed_b,
+                pose,
+                // A source has components or angles, so there is one.
+                excitation_b: of_angles.or(claimed_b).unwrap_or_default(),
+                temperature_c: temperature.flatten().unwrap_or(f64::NAN),
+                values,
+            });
+        }
+        Ok(Experiment {
+            file: table.file.clone(),
+            kind: layout.kind,
+            channels,
+            trials,
+            remarks,
+        })
+    }
+}
+
+fn channels(table: &Table, asked: &[String]) -> Result<Vec<usize>, TableError> {
+    let beside = |name: &str| {
+        let has = |end: &str| table.column(&format!("{name}{end}")).is_some();
+        has("_sigma") || has("_n")
+    };
+    let found: Option<Vec<usize>> = if asked.is_empty() {
+        let names = table.columns.iter().enumerate();
+        Some(
+            names
+                .filter(|(_, name)| beside(name))
+                .map(|(column, _)| column)
+                .collect(),
+        )
+    } else {
+        asked.iter().map(|name| table.column(name)).collect()
+    };
+    found.filter(|found| !found.is_empty()).ok_or_else(|| TableError {
+        file: table.file.clone(),
+        line: 0,
+        column: String::new(),
+        why: format!(
+            "which columns are channels? Name them with --channels; the file has {}",
+            table.columns.join(", ")
+        ),
+    })
+}
+
+/// Columns that hold the excitation.
+struct Source {
+    components: Option<([usize; 3], f64)>,
+    angles: Option<[usize; 2]>,
+    run: Option<[usize; 2]>,
+}
+
+/// Excitation as claimed, pose and turning axis, rate.
+type Excited = (Option<Vector3<f64>>, Option<(Pose, Option<Turning>)>, f64);
+
+impl Source {
+    fn of(table: &Table, kind: Kind) -> Result<Self, TableError> {
+        let triple =
+            |unit: &str, letter: char| ["x", "y", "z"].map(|axis| table.column(&format!("{letter}{axis}_{unit}")));
+        let units: &[(&str, f64)] = match kind {
+            Kind::Rate => &[("rad_s", 1.0), ("deg_s", std::f64::consts::PI / 180.0)],
+            Kind::Force => &[("m_s2", 1.0), ("g", 9.806_65)],
+        };
+        let letter = if kind == Kind::Rate { 'w' } else { 'f' };
+        let missing = |why: String| TableError {
+            file: table.file.clone(),
+            line: 0,
+            column: String::new(),
+            why,
+        };
+        let mut components = None;
+        for &(unit, factor) in units {
+            match triple(unit, letter) {
+                [Some(x), Some(y), Some(z)] => components = Some(([x, y, z], factor)),
+                [None, None, None] => {}
+                _ => {
+                    return Err(missing(format!(
+                        "has not all of {letter}x_{unit}, {letter}y_{unit}, {letter}z_{unit}"
+                    )));
+                }
+            }
+        }
+        let pair = |a: &str, b: &str| Some([table.column(a)?, table.column(b)?]);
+        let (angles, run) = (pair("inner_deg", "outer_deg"), pair("turning", "rate_deg_s"));
+        if components.is_none() && (angles.is_none() || kind == Kind::Rate && run.is_none()) {
+            let wanted = match kind {
+                Kind::Rate => "wx_rad_s, wy_rad_s, wz_rad_s or inner_deg, outer_deg, turning, rate_deg_s",
+                Kind::Force => "fx_m_s2, fy_m_s2, fz_m_s2 or inner_deg, outer_deg",
+            };
+            return Err(missing(format!(
+                "does not say what the unit felt: it needs columns {wanted}"
+            )));
+        }
+        let angles = if kind == Kind::Rate && run.is_none() {
+            None
+        } else {
+            angles
+        };
+        Ok(Source {
+            components,
+            angles,
+            run: if kind == Kind::Rate { run } else { None },
+        })
+    }
+
+    fn of_row(&self, table: &Table, row: &Row) -> Result<Excited, TableError> {
+        let mut claimed_b = None;
+        if let Some((columns, factor)) = self.components {
+            let mut components = [0.0; 3];
+            for (component, column) in components.iter_mut().zip(columns) {
+                *component = table.required(row, column)? * factor;
+            }
+            claimed_b = Some(Vector3::from(components));
+        }
+        let Some([inner, outer]) = self.angles else {
+            return Ok((claimed_b, None, 0.0));
+        };
+        let pose = Pose {
+            inner_rad: table.required(row, inner)?.to_radians(),
+            outer_rad: table.required(row, outer)?.to_radians(),
+        };
+        let Some([turning, rate]) = self.run else {
+            return Ok((claimed_b, Some((pose, None)), 0.0));
+        };
+        let axis = match row.cells.get(turning).map(|cell| cell.to_ascii_lowercase()).as_deref() {
+            Some("inner" | "interno" | "1") => Turning::Inner,
+            Some("outer" | "middle" | "2" | "intermediário") => Turning::Outer,
+            _ => return Err(table.error(row.line, turning, "names no axis: write inner or outer")),
+        };
+        Ok((
+            claimed_b,
+            Some((pose, Some(axis))),
+            table.required(row, rate)?.to_radians(),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests;

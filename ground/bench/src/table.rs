@@ -1,0 +1,302 @@
+//! Tables of numbers as laboratories write them.
+//!
+//! In: the bytes of a CSV, tab-separated or LabVIEW measurement (.lvm) file, in UTF-8 or Latin-1, with decimal points or
+//! decimal commas, packed (.gz) or not. Out: a [`Table`], named columns of text cells that know their line, read as
+//! numbers on demand.
+//!
+//! The separator is the one the line of column names is split by: tab before semicolon before comma. A comma is a
+//! decimal comma only where it cannot be anything else: it does not separate, and no other cell of the file has a
+//! decimal point. A LabVIEW header says both itself.
+//!
+//! Refused, with file, line and column: rows with more or fewer cells than there are names (what a decimal comma does
+//! to a comma-separated file), cells that are no number, `1.234,5` and files that mix both decimal marks, repeated
+//! column names, and files beyond [`LARGEST`].
+
+mod number;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use flate2::read::MultiGzDecoder;
+pub use number::Decimal;
+
+/// [bytes] largest table that is read, unpacked: a day of the unit's packets is 67 MB.
+pub const LARGEST: u64 = 1 << 30;
+
+/// Where a file's meaning is not certain, and why.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}{}{}: {why}", file.display(), at("line", *line), of_column(column))]
+pub struct TableError {
+    /// The file.
+    pub file: PathBuf,
+    /// Its line, from 1; 0 where the whole file is meant.
+    pub line: usize,
+    /// The column's name; empty where the whole line is meant.
+    pub column: String,
+    /// What is wrong, and what to do.
+    pub why: String,
+}
+
+fn at(what: &str, number: usize) -> String {
+    if number == 0 {
+        String::new()
+    } else {
+        format!(", {what} {number}")
+    }
+}
+
+fn of_column(name: &str) -> String {
+    if name.is_empty() {
+        String::new()
+    } else {
+        format!(", column {name}")
+    }
+}
+
+/// Named columns of cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// The file it came from.
+    pub file: PathBuf,
+    /// Column names, without surrounding blanks.
+    pub columns: Vec<String>,
+    /// Rows, in the order of the file.
+    pub rows: Vec<Row>,
+    decimal: Decimal,
+}
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Its line in the file, from 1.
+    pub line: usize,
+    /// Its cells, as many as there are columns.
+    pub cells: Vec<String>,
+}
+
+impl Table {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// When it cannot be read, or its meaning is not certain.
+    pub fn open(file: &Path) -> Result<Self, TableError> {
+        Self::parse(file, &bytes(file)?)
+    }
+
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// When their meaning is not certain.
+    pub fn parse(file: &Path, bytes: &[u8]) -> Result<Self, TableError> {
+        let fail = |line, why: &str| TableError {
+            file: file.into(),
+            line,
+            column: String::new(),
+            why: why.into(),
+        };
+        let text = decode(bytes);
+        let lines: Vec<(usize, &str)> = text.lines().enumerate().map(|(k, line)| (k + 1, line)).collect();
+        let header_ends = lines.iter().rposition(|(_, line)| line.contains("***End_of_Header***"));
+        let (header, body) = lines.split_at(header_ends.map_or(0, |k| k + 1));
+        let said = Said::by(header);
+        let mut body = body
+            .iter()
+            .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+        let &(names_line, names) = body.next().ok_or_else(|| fail(0, "has no line of column names"))?;
+        let separator = said.separator.unwrap_or_else(|| separator(names));
+        let columns: Vec<String> = split(names, separator);
+        if let Some(name) = repeated(&columns) {
+            return Err(fail(names_line, &format!("two columns are called \"{name}\"")));
+        }
+        if !columns.is_empty()
+            && columns
+                .iter()
+                .all(|name| number::parse(name, Decimal::Either).is_some())
+        {
+            return Err(fail(
+                names_line,
+                "the first line holds numbers; it must name the columns",
+            ));
+        }
+        let mut rows = Vec::new();
+        for &(line, text) in body {
+            let mut cells = split(text, separator);
+            // LabVIEW ends lines with an empty comment column.
+            while cells.len() > columns.len() && cells.last().is_some_and(String::is_empty) {
+                cells.pop();
+            }
+            if header_ends.is_some() && cells.len() < columns.len() {
+                cells.resize(columns.len(), String::new());
+            }
+            if cells.len() != columns.len() {
+                let mut why = format!("has {} cells, the line of names has {}", cells.len(), columns.len());
+                if separator == ',' && cells.len() > columns.len() {
+                    why += "; if these are decimal commas, separate the columns by semicolons or tabs";
+                }
+                return Err(fail(line, &why));
+            }
+            rows.push(Row { line, cells });
+        }
+        let mut table = Table {
+            file: file.into(),
+            columns,
+            rows,
+            decimal: Decimal::Point,
+        };
+        table.decimal = match said.decimal {
+            Some(decimal) => decimal,
+            None if separator == ',' => Decimal::Point,
+            None => table.seen_decimal()?,
+        };
+        Ok(table)
+    }
+
+    /// The position of a column, whatever its letters' case.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.eq_ignore_ascii_case(name))
+    }
+
+    /// The number in a cell; `None` for an empty one, `-`, or `NaN`.
+    ///
+    /// # Errors
+    /// When it is something else.
+    pub fn number(&self, row: &Row, column: usize) -> Result<Option<f64>, TableError> {
+        let cell = row.cells.get(column).map_or("", String::as_str);
+        if cell.is_empty() || cell == "-" || cell.eq_ignore_ascii_case("nan") {
+            return Ok(None);
+        }
+        let value = number::parse(cell, self.decimal).filter(|value| value.is_finite());
+        value.map(Some).ok_or_else(|| {
+            let why = format!("\"{cell}\" is no number with a decimal {}", self.decimal.name());
+            self.error(row.line, column, &why)
+        })
+    }
+
+    /// The number in a cell that must have one.
+    ///
+    /// # Errors
+    /// When the cell is empty or no number.
+    pub fn required(&self, row: &Row, column: usize) -> Result<f64, TableError> {
+        self.number(row, column)?
+            .ok_or_else(|| self.error(row.line, column, "is empty, and needed"))
+    }
+
+    /// An error about a cell of this table; line 0 for the whole column.
+    pub fn error(&self, line: usize, column: usize, why: &str) -> TableError {
+        TableError {
+            file: self.file.clone(),
+            line,
+            column: self.columns.get(column).cloned().unwrap_or_default(),
+            why: why.into(),
+        }
+    }
+
+    /// What the cells say about the decimal mark; the first cell of each kind speaks.
+    fn seen_decimal(&self) -> Result<Decimal, TableError> {
+        let mut seen: Option<(Decimal, usize, usize)> = None;
+        for row in &self.rows {
+            for (column, cell) in row.cells.iter().enumerate() {
+                if number::parse(cell, Decimal::Either).is_none() {
+                    continue;
+                }
+                let Some(decimal) = number::marked(cell) else { continue };
+                match seen {
+                    Some((before, line, _)) if before != decimal => {
+                        let why = format!(
+                            "\"{cell}\" has a decimal {}, line {line} a decimal {}: write all numbers alike",
+                            decimal.name(),
+                            before.name()
+                        );
+                        return Err(self.error(row.line, column, &why));
+                    }
+                    Some(_) => {}
+                    None => seen = Some((decimal, row.line, column)),
+                }
+            }
+        }
+        Ok(seen.map_or(Decimal::Point, |(decimal, ..)| decimal))
+    }
+}
+
+/// The bytes of a file, unpacked if its name ends in .gz.
+///
+/// # Errors
+/// When it cannot be read, or is beyond [`LARGEST`].
+pub fn bytes(file: &Path) -> Result<Vec<u8>, TableError> {
+    let fail = |why: String| TableError {
+        file: file.into(),
+        line: 0,
+        column: String::new(),
+        why,
+    };
+    let source = File::open(file).map_err(|error| fail(format!("cannot be read: {error}")))?;
+    let mut source: Box<dyn Read> = if file.extension().is_some_and(|extension| extension == "gz") {
+        Box::new(MultiGzDecoder::new(source))
+    } else {
+        Box::new(source)
+    };
+    let mut bytes = Vec::new();
+    let read = source.by_ref().take(LARGEST + 1).read_to_end(&mut bytes);
+    read.map_err(|error| fail(format!("cannot be read: {error}")))?;
+    if bytes.len() as u64 > LARGEST {
+        return Err(fail(format!("is larger than {LARGEST} bytes; cut it into parts")));
+    }
+    Ok(bytes)
+}
+
+/// UTF-8 where it is, Latin-1 (whose bytes are the first 256 code points) where not.
+fn decode(bytes: &[u8]) -> String {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    }
+}
+
+/// What a LabVIEW header says of the columns.
+#[derive(Default)]
+struct Said {
+    separator: Option<char>,
+    decimal: Option<Decimal>,
+}
+
+impl Said {
+    fn by(header: &[(usize, &str)]) -> Self {
+        let mut said = Said::default();
+        for (_, line) in header {
+            if let Some(value) = line.strip_prefix("Separator") {
+                said.separator = Some(if value.contains("Comma") { ',' } else { '\t' });
+            } else if let Some(value) = line.strip_prefix("Decimal_Separator") {
+                let comma = value.trim_start_matches(['\t', ',']).is_empty() && value.ends_with(',');
+                said.decimal = Some(if comma { Decimal::Comma } else { Decimal::Point });
+            }
+        }
+        said
+    }
+}
+
+fn separator(names: &str) -> char {
+    ['\t', ';']
+        .into_iter()
+        .find(|&mark| names.contains(mark))
+        .unwrap_or(',')
+}
+
+fn split(line: &str, separator: char) -> Vec<String> {
+    line.split(separator)
+        .map(|cell| cell.trim().trim_matches('"').trim().to_string())
+        .collect()
+}
+
+fn repeated(columns: &[String]) -> Option<&String> {
+    let earlier = |k: usize| columns.iter().take(k);
+    let mut named = columns.iter().enumerate().filter(|(_, name)| !name.is_empty());
+    named
+        .find(|(k, name)| earlier(*k).any(|other| other.eq_ignore_ascii_case(name)))
+        .map(|(_, name)| name)
+}

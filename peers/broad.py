@@ -1,0 +1,137 @@
+"""Attitude filters of others on the recordings of BROAD, each from its own package with its defaults.
+
+In: a folder of recordings. Out, on standard output: CSV `filter,recording,mode,total,heading,inclination` in degrees,
+scored as attitude/src/score.rs scores ours. Modes: full (285.7 Hz), five (5 Hz, rates averaged within the period,
+single samples of the rest) and motion (begun 10 s into the motion).
+Packages: `python3 -m venv peers/.venv && peers/.venv/bin/pip install -r peers/requirements.txt`.
+"""
+
+import gzip
+import pathlib
+import sys
+
+try:
+    import ahrs
+    import imufusion
+    import numpy as np
+    import vqf
+except ImportError as missing:
+    print(f"no peers: {missing}; see peers/requirements.txt", file=sys.stderr)
+    sys.exit(3)
+
+G = 9.81
+FIVE_HZ = 57
+
+
+def multiply(a, b):
+    aw, ax, ay, az = a.T
+    bw, bx, by, bz = b.T
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=1,
+    )
+
+
+def run_vqf(kind, dt, gyr, acc, mag):
+    found = kind(dt).updateBatch(*(np.ascontiguousarray(x) for x in (gyr, acc, mag)))
+    return found["quat9D"]
+
+
+def run_imufusion(dt, gyr, acc, mag):
+    fusion = imufusion.Ahrs()
+    settings = imufusion.AhrsSettings()
+    # The constructor passes over the convention.
+    settings.convention = imufusion.CONVENTION_ENU
+    settings.sample_rate = 1 / dt
+    fusion.set_settings(settings)
+    out = np.empty((len(gyr), 4))
+    for k, (w, f, m) in enumerate(zip(np.degrees(gyr), acc / G, mag)):
+        fusion.update(w, f, m)
+        out[k] = np.asarray(fusion.get_quaternion(), dtype=float).ravel()
+    return out
+
+
+# From north-west-up, whose x is magnetic north, to east-north-up.
+NORTH_WEST_UP = np.array([[np.sqrt(0.5), 0, 0, np.sqrt(0.5)]])
+
+
+def start(acc, mag):
+    """TRIAD to north-west-up from the first sample."""
+    up = acc / np.linalg.norm(acc)
+    west = np.cross(up, mag)
+    west /= np.linalg.norm(west)
+    matrix = np.stack([np.cross(west, up), west, up])
+    return ahrs.Quaternion(dcm=matrix).to_array()
+
+
+def run_ahrs(kind, dt, gyr, acc, mag):
+    filter_ = kind(Dt=dt)
+    q = start(acc[0], mag[0])
+    out = np.empty((len(gyr), 4))
+    for k in range(len(gyr)):
+        q = filter_.updateMARG(q, gyr[k], acc[k], mag[k], dt=dt)
+        out[k] = q
+    return multiply(np.repeat(NORTH_WEST_UP, len(out), axis=0), out)
+
+
+def run_triad(dt, gyr, acc, mag):
+    up = acc / np.linalg.norm(acc, axis=1, keepdims=True)
+    east = np.cross(mag, up)
+    east /= np.linalg.norm(east, axis=1, keepdims=True)
+    matrices = np.stack([east, np.cross(up, east), up], axis=1)
+    return np.array([ahrs.Quaternion(dcm=m).to_array() for m in matrices])
+
+
+FILTERS = {
+    "VQF": lambda *data: run_vqf(vqf.VQF, *data),
+    "BasicVQF": lambda *data: run_vqf(vqf.BasicVQF, *data),
+    "Madgwick": lambda *data: run_ahrs(ahrs.filters.Madgwick, *data),
+    "Mahony": lambda *data: run_ahrs(ahrs.filters.Mahony, *data),
+    "xio Fusion": run_imufusion,
+    "TRIAD alone": run_triad,
+}
+
+
+def modes(rows):
+    dt = np.median(np.diff(rows[:, 0]))
+    yield "full", dt, rows
+    count = len(rows) // FIVE_HZ
+    five = rows[: count * FIVE_HZ].reshape(count, FIVE_HZ, -1)
+    last = five[:, -1].copy()
+    last[:, 1:4] = five[:, :, 1:4].mean(axis=1)
+    yield "five", dt * FIVE_HZ, last
+    moving = np.argmax(rows[:, 17] > 0)
+    yield "motion", dt, rows[np.searchsorted(rows[:, 0], rows[moving, 0] + 10) :]
+
+
+def rmse(found, rows):
+    scored = (rows[:, 17] > 0) & ~np.isnan(rows[:, 10])
+    e = multiply(found, rows[:, 10:14] * [1, -1, -1, -1])[scored]
+    w, x, y, z = np.abs(e.T)
+    angles = (
+        2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w),
+        2 * np.arctan2(z, w),
+        2 * np.arctan2(np.hypot(x, y), np.hypot(w, z)),
+    )
+    return [np.degrees(np.sqrt(np.mean(angle**2))) for angle in angles]
+
+
+def main():
+    print("filter,recording,mode,total,heading,inclination")
+    for path in sorted(pathlib.Path(sys.argv[1]).glob("[0-9][0-9]*.csv.gz")):
+        with gzip.open(path, "rt") as text:
+            rows = np.genfromtxt(text, delimiter=",", skip_header=1)
+        for mode, dt, part in modes(rows):
+            for name, run in FILTERS.items():
+                found = run(dt, part[:, 1:4], part[:, 4:7], part[:, 7:10])
+                errors = ",".join(f"{error:.4f}" for error in rmse(found, part))
+                print(f"{name},{path.name[:2]},{mode},{errors}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,276 @@
+//! Four gyros: detection by their one parity, and who it was.
+//!
+//! In, each cycle: what the gyros measured, and what the vectors say of which is at fault ([`vector_rate`]). Out: the rate,
+//! and what is held of each gyro.
+//!
+//! Four axes and three unknowns leave one dimension of parity, `p = n . y` with `n` the unit vector across the columns of
+//! the axes (`n_i` is the signed volume of the other three; nominally `(1, 1, 1, sqrt 0.9) / sqrt 3.9`). It says that a gyro
+//! is off by `p / n_i`, not which `i`. That is said by
+//!
+//! - the gyro itself, if it was not read, saturated or frozen;
+//! - the rate before: when the parity leaps, the rate without the faulty gyro goes on as it was and the three others leap;
+//! - the vectors: acceleration and field turned by the rate without each gyro in turn ([`vector_rate`]).
+//!
+//! Until one of them does, all four are used with the covariance widened, and the gyros are said not to be isolable. With a
+//! gyro out the other three are not checked; the excluded one is, and comes back.
+//!
+//! [`vector_rate`]: super::vector_rate
+
+use nalgebra::{ComplexField, Vector3};
+
+use super::{
+    health::Verdict,
+    trace::Limits,
+    watch::{QUIET, Watch},
+};
+use crate::{
+    calibration::{Axis, Uncertainty},
+    geometry::PLATES,
+    redundancy::{Known, Solution, solve},
+};
+
+/// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a
+/// gyro's fault shows by half in the parity.
+const LIMITS: Limits = Limits {
+    short: 5.2,
+    long: 4.8,
+    squares: 90.0,
+};
+/// Standard deviations of a leap of the parity in one cycle.
+const LEAP: f32 = 8.0;
+/// A gyro has leapt if without it the rate changed so many times less than without any other.
+const FAR: f32 = 3.0;
+const ALL: u16 = 0b1111;
+/// Quiet cycles after which a suspicion is dropped.
+const QUIET_CYCLES: u8 = 52;
+
+/// One cycle.
+pub(super) struct Cycle<'a> {
+    pub(super) values: &'a [f32; PLATES],
+    pub(super) present: u16,
+    pub(super) frozen: u16,
+    pub(super) dt_s: Option<f32>,
+}
+
+/// Four gyros under watch.
+#[derive(Clone, Debug)]
+pub(super) struct Gyros {
+    axes_b: [Vector3<f32>; PLATES],
+    noise: [f32; PLATES],
+    uncertainty: Uncertainty,
+    /// [s] by how much the sampling instants are unsure.
+    timing_s: f32,
+    parity: Watch,
+    watches: [Watch; PLATES],
+    /// [rad/s] rate of the cycle before.
+    course_b: Option<Vector3<f32>>,
+    usual_b: Option<Vector3<f32>>,
+    cycles: f32,
+    quiet_for: u8,
+    /// Parity of the cycle before, in standard deviations of the noise.
+    last_sigmas: f32,
+    leaping: Option<usize>,
+    /// The parity is off and it is not known by whom.
+    pub(super) suspect: bool,
+}
+
+impl Gyros {
+    pub(super) fn new(axes: &[Axis; PLATES], uncertainty: Uncertainty, timing_s: f32) -> Self {
+        let allowed = uncertainty.bias * uncertainty.bias;
+        Gyros {
+            axes_b: core::array::from_fn(|k| axes[k].axis_b),
+            noise: core::array::from_fn(|k| axes[k].noise),
+            uncertainty,
+            timing_s,
+            parity: Watch::new(allowed),
+            watches: [Watch::new(allowed); PLATES],
+            course_b: None,
+            usual_b: None,
+            cycles: 0.0,
+            quiet_for: 0,
+            last_sigmas: 0.0,
+            leaping: None,
+            suspect: false,
+        }
+    }
+
+    /// Gyros that are not believed.
+    pub(super) fn excluded(&self) -> u16 {
+        let each = self.watches.iter().enumerate();
+        each.fold(0, |axes, (k, watch)| axes | u16::from(watch.excluded()) << k)
+    }
+
+    /// What is held of a gyro.
+    pub(super) fn verdict(&self, plate: usize) -> Verdict {
+        self.watches[plate].verdict
+    }
+
+    /// Takes a cycle.
+    pub(super) fn step(&mut self, cycle: &Cycle) -> Solution {
+        for k in (0..PLATES).filter(|k| cycle.frozen >> k & 1 == 1) {
+            self.blame(k, Verdict::Frozen);
+        }
+        let candidates = cycle.present & !self.excluded();
+        let systematic = self.systematic(cycle, candidates);
+        let variances = core::array::from_fn(|k| self.noise[k] * self.noise[k] + systematic);
+        let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
+        if candidates == ALL {
+            solution = self.check(cycle, &variances, systematic, solution);
+        } else {
+            self.suspect = false;
+        }
+        if solution.known == Known::All {
+            self.reconsider(cycle, &variances, systematic, &solution);
+            self.remember(&solution);
+        } else {
+            self.course_b = None;
+        }
+        solution
+    }
+
+    /// [rad2/s2] what does not average out: scale and direction away from where the parity was learned, and angular
+    /// acceleration within the uncertainty of the sampling instants.
+    fn systematic(&self, cycle: &Cycle, candidates: u16) -> f32 {
+        let rough_b = solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates).vector_b;
+        let Uncertainty { scale, direction, .. } = self.uncertainty;
+        let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
+        let acceleration = match (self.course_b, cycle.dt_s) {
+            (Some(course_b), Some(dt_s)) => {
+                // While one gyro leaps the others say how the unit turns.
+                let change = match self.leaping {
+                    Some(leaping) => {
+                        solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates & !(1 << leaping)).vector_b
+                    }
+                    None => rough_b,
+                } - course_b;
+                change.norm_squared() / (dt_s * dt_s)
+            }
+            _ => 0.0,
+        };
+        (scale * scale + direction * direction) * from_usual + self.timing_s * self.timing_s * acceleration
+    }
+
+    /// The parity of all four; the rate of those left.
+    fn check(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
+        let across = self.across();
+        let sum = |part: &dyn Fn(usize) -> f32| (0..PLATES).map(part).sum::<f32>();
+        let parity = sum(&|k| across[k] * cycle.values[k]) - self.parity.offset;
+        let noise = ComplexField::sqrt(sum(&|k| across[k] * across[k] * self.noise[k] * self.noise[k]));
+        let variance = noise * noise + systematic + self.parity.offset_variance;
+        if let Some(leapt) = self.leap(cycle, variances, parity / noise) {
+            self.watches[leapt].strike(true);
+            if self.watches[leapt].alarm(LIMITS) >= 1.0 {
+                self.blame(leapt, Verdict::Disagreeing);
+            }
+            return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
+        }
+        if self.leaping.is_none() {
+            self.watches.iter_mut().for_each(|watch| watch.strike(false));
+        }
+        self.parity.note(parity, noise, systematic);
+        self.parity.learn(parity, variance, noise, LIMITS);
+        let alarm = self.parity.alarm(LIMITS);
+        self.quiet_for = if alarm < QUIET {
+            self.quiet_for.saturating_add(1)
+        } else {
+            0
+        };
+        self.suspect = alarm > 1.0 || (self.suspect && self.quiet_for < QUIET_CYCLES);
+        let widened = if self.suspect {
+            1.0 + parity * parity / variance
+        } else {
+            1.0
+        };
+        Solution {
+            covariance_b: all.covariance_b * widened,
+            ..all
+        }
+    }
+
+    /// Unit vector of the parity: across the three columns of the axes.
+    fn across(&self) -> [f32; PLATES] {
+        let [a, b, c, d] = &self.axes_b;
+        let volume = |x: &Vector3<f32>, y: &Vector3<f32>, z: &Vector3<f32>| x.dot(&y.cross(z));
+        let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
+        let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
+        across.map(|part| part / length)
+    }
+
+    /// The gyro that has leapt in this cycle or goes on leaping, if the parity is `sigmas` and it is one only.
+    fn leap(&mut self, cycle: &Cycle, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
+        let before = core::mem::replace(&mut self.last_sigmas, sigmas.abs());
+        if sigmas.abs() < LEAP {
+            self.leaping = None;
+            return None;
+        }
+        if before > LEAP / 2.0 && self.leaping.is_none() {
+            return None;
+        }
+        let leapt = self
+            .alone(cycle, variances)
+            .filter(|k| self.leaping.is_none_or(|before| before == *k));
+        self.leaping = self.leaping.or(leapt);
+        leapt
+    }
+
+    /// The one gyro without which the rate changed far less than without any other, if there is one.
+    fn alone(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
+        let course_b = self.course_b?;
+        let changes: [f32; PLATES] = core::array::from_fn(|k| {
+            let without = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << k));
+            (without.vector_b - course_b).norm()
+        });
+        let least = (0..PLATES).fold(0, |least, k| if changes[k] < changes[least] { k } else { least });
+        let clear = |k: usize| k == least || changes[k] > FAR * changes[least];
+        (0..PLATES).all(clear).then_some(least)
+    }
+
+    /// Excludes a gyro. One that is frozen explains what others were accused of on the parity's word.
+    pub(super) fn blame(&mut self, plate: usize, verdict: Verdict) {
+        // What it disagreed by before is what the parity has learned, over its part in the parity.
+        let part = self.across()[plate];
+        let watch = &mut self.watches[plate];
+        watch.exclude(verdict);
+        watch.offset = self.parity.offset / part;
+        watch.offset_variance = self.parity.offset_variance / (part * part);
+        if verdict == Verdict::Frozen {
+            for watch in self.watches.iter_mut().filter(|watch| watch.verdict.is_unnamed()) {
+                watch.verdict = Verdict::Sound;
+                watch.restart();
+            }
+        }
+        self.leaping = None;
+        self.parity.restart();
+        self.suspect = false;
+    }
+
+    /// Watches the excluded gyro, if it is the only one that is missing.
+    fn reconsider(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, solution: &Solution) {
+        let watched = cycle.present & self.excluded();
+        for k in (0..PLATES).filter(|k| watched >> k & 1 == 1) {
+            let (expected, variance) = solution.along(&self.axes_b[k]);
+            let share = (variances[k] + variance) / variances[k];
+            let watch = &mut self.watches[k];
+            let noise = self.noise[k] * ComplexField::sqrt(share);
+            watch.note(cycle.values[k] - watch.offset - expected, noise, systematic * share);
+            watch.reconsider();
+        }
+    }
+
+    fn remember(&mut self, solution: &Solution) {
+        let rate_b = solution.vector_b;
+        self.course_b = Some(rate_b);
+        self.cycles = (self.cycles + 1.0).min(super::watch::MEMORY);
+        let usual_b = self.usual_b.get_or_insert(rate_b);
+        *usual_b += (rate_b - *usual_b) / self.cycles;
+    }
+
+    /// The rate without each gyro in turn; `None` unless all four are used. The parity's learned offset is taken out across
+    /// all four, which leaves the rate of all as it is and gives each of these the same bias.
+    pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
+        let across = self.across();
+        let values: [f32; PLATES] = core::array::from_fn(|k| values[k] - across[k] * self.parity.offset);
+        let without = |k: usize| solve(&self.axes_b, &values, &[1.0; PLATES], ALL & !(1 << k)).vector_b;
+        (used == ALL).then(|| core::array::from_fn(without))
+    }
+}

@@ -1,0 +1,147 @@
+//! One axis under watch: what it disagrees by, how that has been, and whether it is believed.
+//!
+//! In, each cycle: the disagreement of the axis with what the others say of it, with its standard deviation in two parts,
+//! noise (which averages out) and systematic (which does not). Out: how near it is to an alarm, and whether an excluded axis
+//! may come back.
+//!
+//! A constant disagreement within the calibration's uncertainty is no fault. It is learned as an offset by a scalar Kalman
+//! filter that starts with the uncertainty of the biases and remembers some [`MEMORY`] cycles; alarms are raised by what
+//! departs from it. So a step is seen at the noise's level, not at the calibration's. What creeps in slowly is learned too,
+//! until the offset is more than the calibration can be off by: that is an alarm of its own.
+
+use nalgebra::ComplexField;
+
+use super::{
+    health::Verdict,
+    trace::{LONG, Limits, Trace, WILD},
+};
+
+/// Cycles the learned offset goes back: 200 s at 5 Hz. Large: steps are seen sharper. Small: drifts are followed.
+pub(super) const MEMORY: f32 = 1000.0;
+/// Standard deviations of the calibration's uncertainty that an offset may reach.
+const OFFSET_LIMIT: f32 = 6.0;
+/// Nothing is learned from a window that is this near to an alarm.
+pub(super) const QUIET: f32 = 0.75;
+/// Cycles in a row beyond the gate that make a fault.
+const STRIKES: u8 = 3;
+/// An excluded axis comes back below these.
+const SOUND: Limits = Limits {
+    short: 3.0,
+    long: 3.0,
+    squares: 52.0,
+};
+/// Variance about its mean, in those of the noise, beyond which a fault is called noise and not bias.
+const NOISY: f32 = 4.0;
+
+/// One axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Watch {
+    trace: Trace,
+    /// [unit] learned disagreement.
+    pub(super) offset: f32,
+    /// [unit2] of the offset.
+    pub(super) offset_variance: f32,
+    /// [unit2] what the calibration allows the offset to be.
+    allowed: f32,
+    strikes: u8,
+    sound_for: u16,
+    relapses: u8,
+    pub(super) verdict: Verdict,
+}
+
+impl Watch {
+    /// An axis not seen yet, whose offset may have this variance.
+    pub(super) fn new(allowed: f32) -> Self {
+        Watch {
+            trace: Trace::EMPTY,
+            offset: 0.0,
+            offset_variance: allowed,
+            allowed,
+            strikes: 0,
+            sound_for: 0,
+            relapses: 0,
+            verdict: Verdict::Sound,
+        }
+    }
+
+    /// Whether the axis is not to be used.
+    pub(super) fn excluded(&self) -> bool {
+        self.verdict != Verdict::Sound
+    }
+
+    /// Whether it has been watched for a full window since it was last restarted.
+    pub(super) fn seen_long(&self) -> bool {
+        self.trace.full()
+    }
+
+    /// Takes a cycle's disagreement beyond the offset, with the standard deviation of its noise and the variance of what is
+    /// systematic in it.
+    pub(super) fn note(&mut self, disagreement: f32, noise: f32, systematic: f32) {
+        let systematic = ComplexField::sqrt(systematic + self.offset_variance) / noise;
+        // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
+        let most = WILD * ComplexField::sqrt(1.0 + systematic * systematic);
+        self.trace.push((disagreement / noise).clamp(-most, most), systematic);
+    }
+
+    /// Notes that the axis was beyond the gate in this cycle, or not.
+    pub(super) fn strike(&mut self, gated: bool) {
+        self.strikes = if gated { self.strikes.saturating_add(1) } else { 0 };
+    }
+
+    /// How near it is to an alarm; above 1 there is one.
+    pub(super) fn alarm(&self, limits: Limits) -> f32 {
+        let over = self.trace.over(limits);
+        let crept = self.offset.abs() / (OFFSET_LIMIT * ComplexField::sqrt(self.allowed));
+        let struck = f32::from(self.strikes) / f32::from(STRIKES);
+        // At the third strike the alarm is as loud as the disagreement, so that the worst of several goes first.
+        let struck = if struck >= 1.0 { struck + over } else { 0.0 };
+        over.max(crept).max(struck)
+    }
+
+    /// Learns from a disagreement of this variance in all, unless something may be wrong.
+    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, noise: f32, limits: Limits) {
+        if self.alarm(limits) > QUIET && self.trace.full() {
+            return;
+        }
+        let gain = self.offset_variance / variance;
+        self.offset += gain * disagreement;
+        let forgotten = noise / MEMORY;
+        self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten * forgotten).min(self.allowed);
+    }
+
+    /// Begins its window anew, as after a change of what it is compared with.
+    pub(super) fn restart(&mut self) {
+        self.trace = Trace::EMPTY;
+        self.sound_for = 0;
+        self.strikes = 0;
+    }
+
+    /// Is no longer believed. A learned offset that has crept beyond what is allowed is given up with it.
+    pub(super) fn exclude(&mut self, verdict: Verdict) {
+        if !self.excluded() {
+            self.relapses = (self.relapses + 1).min(6);
+            let most = OFFSET_LIMIT * ComplexField::sqrt(self.allowed);
+            self.offset = if self.offset.abs() < most { self.offset } else { 0.0 };
+        }
+        self.verdict = verdict;
+        self.restart();
+    }
+
+    /// Looks at an excluded axis after a cycle was noted: it comes back after a full window of agreement, and after each
+    /// relapse only after twice as many.
+    pub(super) fn reconsider(&mut self) {
+        let agrees = self.trace.over(SOUND) < 1.0;
+        self.sound_for = if agrees { self.sound_for.saturating_add(1) } else { 0 };
+        if self.sound_for >= (LONG as u16) << self.relapses.saturating_sub(1) {
+            self.verdict = Verdict::Sound;
+            self.strikes = 0;
+        } else if self.trace.full() && self.verdict.is_unnamed() && !agrees {
+            let (variance, expected) = self.trace.variance();
+            self.verdict = if variance > NOISY * expected {
+                Verdict::Noisy
+            } else {
+                Verdict::Biased
+            };
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The field that is expected, and the mean field of a window against it.
+//!
+//! In: norm, dip and declination, given or learnt, and a window's mean field in n. Out: two scalars across the field in
+//! parts of its norm `n0`, with what they see of the attitude. With `m0 = (cos dip, 0, sin dip)` in magnetic axes, an
+//! attitude error `a` turns the mean field found to `m = m0 - a x m0`:
+//!
+//! * east: `-m_E/n0 = cos(dip) a_D - sin(dip) a_N`, the residual taken as an angle, `-cos(dip) atan2(m_E, m_N)`, so that
+//!   it grows up to half a turn;
+//! * meridian: `dip0 - dip = -a_E`.
+//!
+//! The variance of each is that of the reference plus what is seen of a disturbance: `(|m|/n0 - 1)^2 + (dip - dip0)^2`
+//! holds two of its three components, and the third is as large on average.
+
+use nalgebra::{ComplexField, Matrix3, RealField, Vector3};
+
+use super::{
+    Params, Quantity, square,
+    window::{FieldSums, MeanField},
+};
+
+/// The expected field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// [uT] norm.
+    pub norm_ut: f32,
+    /// [rad] below the horizontal.
+    pub dip: f32,
+    /// [rad] magnetic north, east of north.
+    pub declination: f32,
+    learnt_s: f32,
+    /// [uT] mean in n while it was learnt, hard iron included.
+    raw_n: Vector3<f32>,
+    /// Mean attitude meanwhile.
+    turned: Matrix3<f32>,
+}
+
+/// A scalar of the field.
+pub struct Scalar {
+    pub quantity: Quantity,
+    pub residual: f32,
+    /// What it sees of the attitude error, in n.
+    pub row_n: Vector3<f32>,
+    pub variance: f32,
+}
+
+/// The field of a window.
+pub struct Compared {
+    pub scalars: [Scalar; 2],
+    /// [1] what norm and dip show of a disturbance.
+    pub disturbance: f32,
+}
+
+impl Reference {
+    /// The field of a site: norm \[uT\], dip and declination \[rad\].
+    pub const fn known(norm_ut: f32, dip: f32, declination: f32) -> Self {
+        Reference {
+            norm_ut,
+            dip,
+            declination,
+            learnt_s: f32::INFINITY,
+            raw_n: Vector3::new(0.0, 0.0, 0.0),
+            turned: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        }
+    }
+
+    /// One to be learnt; north is magnetic.
+    pub const fn unknown() -> Self {
+        Reference {
+            learnt_s: 0.0,
+            ..Reference::known(0.0, 0.0, 0.0)
+        }
+    }
+
+    /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
+    /// heading.
+    pub(super) fn compare(&self, params: &Params, mean: &MeanField) -> Option<Compared> {
+        let (north, east) = self.magnetic(&mean.mag_n);
+        let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
+        let dip = RealField::atan2(mean.mag_n.z, horizontal);
+        if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
+            return None;
+        }
+        let (sin, cos) = ComplexField::sin_cos(self.dip);
+        let disturbance = self.deviation(norm, dip);
+        let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
+        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
+        let (sin_d, cos_d) = ComplexField::sin_cos(self.declination);
+        Some(Compared {
+            scalars: [
+                Scalar {
+                    quantity: Quantity::FieldEast,
+                    residual: -cos * RealField::atan2(east, north),
+                    row_n: Vector3::new(-sin * cos_d, -sin * sin_d, cos),
+                    variance: square(params.heading_sd * cos) + seen,
+                },
+                Scalar {
+                    quantity: Quantity::FieldMeridian,
+                    residual: self.dip - dip,
+                    row_n: Vector3::new(sin_d, -cos_d, 0.0),
+                    variance: square(params.dip_sd) + seen,
+                },
+            ],
+            disturbance: ComplexField::sqrt(disturbance),
+        })
+    }
+
+    /// Where the field lies as seen from above, in n.
+    pub(super) fn heading_n(&self) -> Vector3<f32> {
+        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        Vector3::new(cos, sin, 0.0)
+    }
+
+    /// [1] square of what norm and dip of a mean field show of a disturbance, the vertical being where mean specific
+    /// force has it; zero before anything is known of the field.
+    pub(super) fn disturbance(&self, mag_n: &Vector3<f32>, acc_n: &Vector3<f32>) -> f32 {
+        if self.learnt_s == 0.0 {
+            return 0.0;
+        }
+        let down = -acc_n / acc_n.norm();
+        let dip = RealField::atan2(mag_n.dot(&down), mag_n.cross(&down).norm());
+        self.deviation(mag_n.norm(), dip)
+    }
+
+    fn deviation(&self, norm_ut: f32, dip: f32) -> f32 {
+        square(norm_ut / self.norm_ut - 1.0) + square(dip - self.dip)
+    }
+
+    /// Components along magnetic north and magnetic east.
+    fn magnetic(&self, v_n: &Vector3<f32>) -> (f32, f32) {
+        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
+    }
+
+    /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
+    pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
+        if self.learnt_s.is_infinite() {
+            return;
+        }
+        if self.learnt_s < params.learn_s {
+            self.learnt_s += duration_s;
+            let part = duration_s / self.learnt_s;
+            self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
+            self.turned += (sums.turned / sums.count - self.turned) * part;
+        }
+        let field_n = self.raw_n - self.turned * iron_b;
+        self.norm_ut = field_n.norm();
+        self.dip = RealField::atan2(field_n.z, ComplexField::sqrt(field_n.xy().norm_squared()));
+    }
+}
+
+/// Horizontal part of the field that still tells a heading.
+const LEAST_HORIZONTAL: f32 = 1e-3;

@@ -1,0 +1,86 @@
+//! How the filter finds its attitude, afresh when it must, and how it gives it up.
+//!
+//! In: a window's means. Out: attitude and covariance by TRIAD, bias and gyro matrix kept.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::{Filter, Window, square, window::Means};
+use crate::{
+    attitude::{dcm_nb, renormalised},
+    triad::{Sighting, triad},
+};
+
+/// [rad^2] more than any attitude's variance: whatever TRIAD finds is better than nothing.
+pub(super) const UNKNOWN: f32 = 1e3;
+
+/// A window that begins afresh throws the history away: only for a variance this many times smaller.
+const MUCH_BETTER: f32 = 0.1;
+
+impl Filter {
+    /// Counts rejections that say something of the attitude, and finds it afresh where it must be. Whether it did.
+    pub(super) fn recover(&mut self, means: &Means, bounded: bool, accepted: [Option<bool>; 2]) -> bool {
+        for (rejected_s, accepted) in self.rejected_s.iter_mut().zip(accepted) {
+            match accepted {
+                Some(false) => *rejected_s += means.duration_s,
+                Some(true) => *rejected_s = 0.0,
+                None => {}
+            }
+        }
+        let worst = self.covariance.attitude().diagonal().max();
+        if !bounded
+            || self
+                .rejected_s
+                .into_iter()
+                .any(|rejected_s| rejected_s >= self.params.recovery_s)
+        {
+            return self.align(means, UNKNOWN);
+        }
+        worst > square(self.params.lost_sd) && self.align(means, MUCH_BETTER * worst)
+    }
+
+    /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could, with no
+    /// variance above `most` \[rad^2\].
+    pub(super) fn align(&mut self, means: &Means, most: f32) -> bool {
+        let (Some(sums), true) = (means.field, means.near_one_g) else {
+            return false;
+        };
+        let mean = sums.mean(&self.iron.iron_b);
+        let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
+        let down = Sighting {
+            seen_b: -means.acc_n,
+            known_n: Vector3::z(),
+            seen_sd: means.tilt_sd,
+            known_sd: 0.0,
+        };
+        let field = Sighting {
+            seen_b: mean.mag_n,
+            known_n: self.reference.heading_n(),
+            seen_sd: mean.direction_sd(&self.params, disturbance),
+            known_sd: 0.0,
+        };
+        let Ok(found) = triad(&down, &field) else {
+            return false;
+        };
+        if found.covariance_b.diagonal().max() > most {
+            return false;
+        }
+        self.q_nb = renormalised(found.q_nb * self.q_nb);
+        let dcm = dcm_nb(&found.q_nb);
+        self.covariance.align(&(dcm * found.covariance_b * dcm.transpose()));
+        self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
+        self.velocity_n = Vector2::zeros();
+        self.rejected_s = [0.0; 2];
+        self.aligned = true;
+        true
+    }
+
+    /// The attitude is not known any more; bias and matrix have aged.
+    pub(super) fn lose(&mut self, since_s: f32) {
+        self.silent_s = 0.0;
+        self.window = Window::default();
+        self.aligned = false;
+        self.rate_b = Vector3::zeros();
+        self.velocity_n = Vector2::zeros();
+        self.covariance.age(&self.params, since_s);
+    }
+}

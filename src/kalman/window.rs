@@ -1,0 +1,264 @@
+//! What a window gathers, and what it says when it closes.
+//!
+//! In: each step's attitude, increment and samples in n. Out: how gyro errors turned into attitude error (`drive`), and
+//! [`Means`]: velocity gained, mean specific force and field in n, their spreads, and whether the unit was at rest.
+
+use nalgebra::{ComplexField, Matrix3, SMatrix, Vector2, Vector3};
+
+use super::{Params, covariance::BIAS, square};
+
+/// Gyro error states that drive the attitude: bias 3, matrix 9.
+pub const DRIVERS: usize = 12;
+
+/// Running sums.
+#[derive(Clone, Debug, Default)]
+pub struct Window {
+    /// [s] so far, gaps included.
+    pub duration_s: f32,
+    /// Attitude error by bias \[s\] and matrix \[rad\]: `-integral dcm_nb (1, gyro)`.
+    pub drive: SMatrix<f32, 3, DRIVERS>,
+    /// Its mean over the window: what a mean over the window saw of it.
+    pub mean_drive: SMatrix<f32, 3, DRIVERS>,
+    /// [rad^2] white variance of the attitude about each axis.
+    pub angle_variance: f32,
+    covered_s: f32,
+    angle_b: Vector3<f32>,
+    rate_square: f32,
+    acc: Sum,
+    far_from_one_g: bool,
+    mag: FieldSums,
+}
+
+/// Sums of the field's samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FieldSums {
+    /// Samples.
+    pub count: f32,
+    /// [uT] in n.
+    pub total_n: Vector3<f32>,
+    /// [uT] in b.
+    pub total_b: Vector3<f32>,
+    /// Attitude matrices that took b to n.
+    pub turned: Matrix3<f32>,
+    squares: f32,
+    variance: f32,
+}
+
+/// The mean field of a window without hard iron.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanField {
+    /// [uT] in n.
+    pub mag_n: Vector3<f32>,
+    /// [uT^2] mean square distance of the samples from it.
+    pub spread: f32,
+    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise.
+    pub white: f32,
+}
+
+impl FieldSums {
+    /// Without `iron_b` \[uT\]; there must be samples.
+    pub fn mean(&self, iron_b: &Vector3<f32>) -> MeanField {
+        let mag_n = (self.total_n - self.turned * iron_b) / self.count;
+        let squares = (self.squares - 2.0 * iron_b.dot(&self.total_b)) / self.count + iron_b.norm_squared();
+        let noise = self.variance / self.count;
+        let spread = (squares - mag_n.norm_squared() - 3.0 * noise).max(0.0);
+        MeanField {
+            mag_n,
+            spread,
+            white: (spread + noise) / self.count,
+        }
+    }
+}
+
+/// Sum of a vector's samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    count: f32,
+    total_n: Vector3<f32>,
+    squares: f32,
+    variance: f32,
+}
+
+impl Sum {
+    fn take(&mut self, sample_n: &Vector3<f32>, variance: f32) {
+        self.count += 1.0;
+        self.total_n += sample_n;
+        self.squares += sample_n.norm_squared();
+        self.variance += variance;
+    }
+
+    fn mean(&self) -> Vector3<f32> {
+        self.total_n / self.count
+    }
+
+    /// Mean white variance of a component.
+    fn noise(&self) -> f32 {
+        self.variance / self.count
+    }
+
+    /// Mean square distance from the mean, all axes, without the samples' own noise.
+    fn spread(&self) -> f32 {
+        (self.squares / self.count - self.mean().norm_squared() - 3.0 * self.noise()).max(0.0)
+    }
+}
+
+/// What a window measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Means {
+    /// [s] it lasted.
+    pub duration_s: f32,
+    /// [rad/s] mean of the gyros, in b.
+    pub rate_b: Vector3<f32>,
+    /// The unit was at rest.
+    pub rest: bool,
+    /// [m/s2] mean specific force, in n.
+    pub acc_n: Vector3<f32>,
+    /// Mean specific force is near one g.
+    pub near_one_g: bool,
+    /// Specific force may be used for the vertical.
+    pub vertical: bool,
+    /// [s] for which it tells velocity: zero unless `vertical`.
+    pub vertical_s: f32,
+    /// [m/s] velocity gained, north and east.
+    pub velocity_change_n: Vector2<f32>,
+    /// [m2/s2] its variance.
+    pub velocity_change_variance: f32,
+    /// [m2/s2] how far from zero the velocity itself may be.
+    pub velocity_variance: f32,
+    /// [rad] of the direction of mean specific force as the vertical.
+    pub tilt_sd: f32,
+    acc_spread: f32,
+    /// The field, if it was sampled.
+    pub field: Option<FieldSums>,
+}
+
+/// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
+/// stays within it, a climb or a fall does not.
+const MEAN_NEAR_ONE_G: f32 = 0.2;
+
+/// After lift-off every sample must be within this part of one g.
+const SAMPLE_NEAR_ONE_G: f32 = 0.1;
+
+/// [rad] error of the first vertical found: half a degree of accelerometer bias and as much of everything else.
+const START_TILT_SD: f32 = 0.0175;
+
+/// Part of the spread of specific force that its mean over the first window may still hold.
+const START_SPREAD: f32 = 0.2;
+
+impl Window {
+    /// A step: mean attitude over it, what the gyros saw, and the variance it adds.
+    pub fn turn(&mut self, dcm_nb: &Matrix3<f32>, gyro_b: &Vector3<f32>, covered_s: f32, gap_s: f32, variance: f32) {
+        self.duration_s += covered_s + gap_s;
+        self.covered_s += covered_s;
+        self.angle_variance += variance;
+        self.angle_b += gyro_b;
+        if covered_s > 0.0 {
+            self.rate_square += gyro_b.norm_squared() / covered_s;
+        }
+        for axis in 0..3 {
+            let column = dcm_nb.column(axis);
+            for row in 0..3 {
+                self.drive[(row, axis)] -= column[row] * covered_s;
+                for about in 0..3 {
+                    self.drive[(row, 3 + 3 * axis + about)] -= column[row] * gyro_b[about];
+                }
+            }
+        }
+        // A running mean, weighted by time; samples are taken at the ends of steps.
+        let part = (covered_s + gap_s) / self.duration_s.max(f32::MIN_POSITIVE);
+        self.mean_drive += (self.drive - self.mean_drive) * part;
+    }
+
+    /// A sample of specific force.
+    pub fn take_acc(&mut self, acc_n: &Vector3<f32>, variance: f32, gravity: f32) {
+        self.far_from_one_g |= !is_near(acc_n.norm(), gravity, SAMPLE_NEAR_ONE_G);
+        self.acc.take(acc_n, variance);
+    }
+
+    /// A sample of the field.
+    pub fn take_mag(&mut self, mag_b: &Vector3<f32>, dcm_nb: &Matrix3<f32>, variance: f32) {
+        let sums = &mut self.mag;
+        sums.count += 1.0;
+        sums.total_n += dcm_nb * mag_b;
+        sums.total_b += mag_b;
+        sums.turned += dcm_nb;
+        sums.squares += mag_b.norm_squared();
+        sums.variance += variance;
+    }
+
+    /// What a mean over the window sees of the error state, if at any instant it sees `row_n` of the attitude error: less
+    /// of what the gyros' errors added than there is at its end.
+    pub fn mean_rows(&self, row_n: &Vector3<f32>) -> [(usize, f32); BIAS + DRIVERS] {
+        let missed = (self.mean_drive - self.drive).transpose() * row_n;
+        core::array::from_fn(|index| match index {
+            0..BIAS => (index, row_n[index]),
+            _ => (index, missed[index - BIAS]),
+        })
+    }
+
+    /// What it all says.
+    pub fn means(&self, params: &Params, lift_off: bool) -> Means {
+        let covered_s = self.covered_s.max(f32::MIN_POSITIVE);
+        let rate_b = self.angle_b / covered_s;
+        let rate_spread = self.rate_square / covered_s - rate_b.norm_squared();
+        let sampled = self.acc.count > 0.0;
+        let acc_n = if sampled { self.acc.mean() } else { Vector3::zeros() };
+        let (acc_spread, acc_noise) = if sampled {
+            (self.acc.spread(), self.acc.noise())
+        } else {
+            (0.0, 0.0)
+        };
+        let near_one_g = sampled && is_near(acc_n.norm(), params.gravity, MEAN_NEAR_ONE_G);
+        let vertical = near_one_g && !(lift_off && self.far_from_one_g);
+        let vertical_s = if vertical { self.duration_s } else { 0.0 };
+        let rest = !lift_off
+            && near_one_g
+            && rate_b.norm() < params.rest.rate
+            && rate_spread < square(params.rest.rate_spread)
+            && acc_spread < square(params.rest.acc_spread);
+        // Of the spread, half a part of each sample is lost between the samples.
+        let between = (acc_noise + 0.5 * acc_spread) / self.acc.count.max(1.0);
+        let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
+        let tilt_variance = (START_SPREAD + 1.0 / self.acc.count.max(1.0)) * acc_spread / square(params.gravity);
+        Means {
+            duration_s: self.duration_s,
+            rate_b,
+            rest,
+            acc_n,
+            near_one_g,
+            vertical,
+            vertical_s,
+            velocity_change_n: acc_n.xy() * vertical_s,
+            velocity_change_variance: square(vertical_s) * (square(params.acc_error) + between),
+            velocity_variance: if rest { square(params.velocity_rest_sd) } else { moving },
+            tilt_sd: ComplexField::sqrt(square(START_TILT_SD) + tilt_variance),
+            acc_spread,
+            field: (self.mag.count > 0.0).then_some(self.mag),
+        }
+    }
+}
+
+impl MeanField {
+    /// [uT^2] variance of a component of the mean in a window like others.
+    pub fn unrest(&self, params: &Params) -> f32 {
+        square(params.field_spread) * self.spread + self.white
+    }
+
+    /// [rad] of its direction at the start, `disturbance` being the square of what is seen of one.
+    pub fn direction_sd(&self, params: &Params, disturbance: f32) -> f32 {
+        let unrest = (START_SPREAD * self.spread + self.white) / self.mag_n.norm_squared().max(f32::MIN_POSITIVE);
+        let disturbed = square(params.disturbance) * disturbance;
+        ComplexField::sqrt(square(params.start_field_sd) + disturbed + unrest)
+    }
+}
+
+impl Means {
+    /// [m/s] velocity at the start.
+    pub fn start_velocity_sd(&self, params: &Params) -> f32 {
+        ComplexField::sqrt(square(params.velocity_sd) + 0.1 * self.acc_spread)
+    }
+}
+
+fn is_near(norm: f32, gravity: f32, part: f32) -> bool {
+    ComplexField::abs(norm - gravity) < part * gravity
+}
