@@ -14,6 +14,7 @@
 
 pub mod attribute;
 pub mod case;
+pub mod cause;
 pub mod command;
 pub mod confusion;
 pub mod diagnose;

@@ -119,7 +119,7 @@ impl Verdict {
     }
 }
 
-fn of_cause(subject: &Subject, cause: &crate::diagnose::Cause) -> Cause {
+fn of_cause(subject: &Subject, cause: &crate::cause::Cause) -> Cause {
     let parameters = cause.parameters.iter().map(|sized| {
         let parameter = Parameter {
             value: sized.value,
