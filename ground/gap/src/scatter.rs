@@ -43,6 +43,21 @@ fn is_odd(view: &View) -> bool {
         || alike.abs() * root > ODD
 }
 
+/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
+/// would otherwise swallow any effect the library does not have, and be believed.
+const COLOURED: f64 = 0.2;
+
+/// Effects that stand for white noise.
+const WHITE: [&str; 1] = ["noise-level"];
+
+/// Whether neighbouring residuals are alike.
+fn is_coloured(view: &View) -> bool {
+    let rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let energy: f64 = rest.iter().map(|value| value * value).sum();
+    let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    alike > COLOURED * energy
+}
+
 /// Every effect on the scatter that gains anything, best first. `predicted` holds every row of the log.
 pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) -> Vec<Scatter> {
     let twin = problem.twin;
@@ -105,6 +120,9 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
             for block in blocks.iter().filter(|block| block.iter().any(|index| odd[*index])) {
                 let views: Vec<View> = block.iter().map(view).collect();
                 let samples: usize = block.iter().map(|index| problem.frames[*index].series.rows.len()).sum();
+                if WHITE.contains(&page.name) && views.iter().any(is_coloured) {
+                    continue;
+                }
                 let (theta, gain) = most_likely(*effect, *variant, &views);
                 let price = 0.5 * (samples.max(1) as f64).ln() * theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
                 if gain > price {
