@@ -22,6 +22,9 @@ use crate::{
 /// [nats] an effect on the scatter must gain.
 const SCATTER_MARGIN: f64 = 3.0;
 
+/// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
+const MOST_CAUSES: usize = 3;
+
 /// Prior probability that a unit has something the library does not.
 const UNKNOWN_PRIOR: f64 = 0.05;
 
@@ -124,7 +127,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut withdrawn = Vec::new();
     let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
-    if has_effect && !is_smaller {
+    let is_patchwork = found.chosen.len() + usize::from(scatter.is_some()) > MOST_CAUSES;
+    if has_effect && (!is_smaller || is_patchwork) {
         withdrawn.extend(
             found
                 .chosen

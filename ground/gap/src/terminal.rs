@@ -140,7 +140,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     if !diagnosis.withdrawn.is_empty() {
         writeln!(
             text,
-            "        withdrawn, since the held-out gap does not shrink with it: {}",
+            "        withdrawn (no shrink on held-out data, or too many at once): {}",
             diagnosis.withdrawn.join(", ")
         )?;
     }
