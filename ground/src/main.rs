@@ -14,6 +14,7 @@ enum Command {
     Decode(ground::decode::Arguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
+    Gap(gap::Arguments),
     Size(ground::size::Arguments),
     Attitude(attitude::Arguments),
     Dump(recorder::dump::Arguments),
@@ -39,6 +40,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Sources => print!("{}", ground::fly::source::list()),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
+        Command::Gap(arguments) => gap::run(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
         Command::Attitude(arguments) => attitude::run(&arguments)?,
         Command::Dump(arguments) => recorder::dump::run(&arguments)?,

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     library::Library,
+    onset,
     problem::{Component, Problem},
     refine::{Refined, model_of, refine},
 };
@@ -20,7 +21,10 @@ use crate::{
 const MARGIN: f64 = 3.0;
 
 /// Candidates of a screen that are fitted exactly.
-const CANDIDATES: usize = 6;
+const CANDIDATES: usize = 4;
+
+/// [nats] behind the chosen effect from which a rival is not worth an exact fit.
+const FAR: f64 = 50.0;
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
@@ -93,6 +97,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         match found {
             Some((gain, larger, refined)) if gain > MARGIN => {
                 (set, best) = (larger, refined);
+                (set, best) = bounded(problem, library, set, best);
                 (set, best) = prune(problem, library, set, best);
                 scores = renewed_scores(problem, library, &set, &best);
             }
@@ -156,6 +161,14 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         let mut with = model.clone();
         with.push(hypothesis.component(&DVector::zeros(0)));
         let touched = hypothesis.cause.channels(unit);
+        // No effect takes off more than there is above the noise.
+        let excess: f64 = touched
+            .iter()
+            .map(|channel| before[*channel] - problem.frames[*channel].series.rows.len() as f64)
+            .sum();
+        if 0.5 * excess + hypothesis.log_prior < 0.0 {
+            continue;
+        }
         let fall: f64 = touched
             .iter()
             .map(|channel| before[*channel] - energy(*channel, &with))
@@ -240,6 +253,38 @@ fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refin
     library.products.scores(problem, &residuals)
 }
 
+/// Gives the member added last the stretch of time in which it is on, if it is not always.
+fn bounded(problem: &Problem, library: &mut Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
+    let Some(last) = set
+        .last()
+        .copied()
+        .filter(|last| !library.hypotheses[*last].places.is_empty())
+    else {
+        return (set, best);
+    };
+    let others = model_of(library, &set[..set.len() - 1], &best.thetas[..set.len() - 1]);
+    let own = &library.hypotheses[last];
+    let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
+    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
+    let Some(span) = onset::stretch(problem, &others, slopes, &sigmas) else {
+        return (set, best);
+    };
+    let model = model_of(library, &set, &best.thetas);
+    library.hypotheses[last].span = Some(span);
+    let mut model = model;
+    model[set.len() - 1].span = Some(span);
+    let renewed = problem.slopes(&model, set.len() - 1);
+    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
+        library.products.renew(problem, place, column);
+    }
+    let refined = refine(problem, library, &set, &best.thetas);
+    if refined.log_evidence > best.log_evidence {
+        return (set, refined);
+    }
+    library.hypotheses[last].span = None;
+    (set, best)
+}
+
 /// Drops members the others can do without.
 fn prune(problem: &Problem, library: &Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
     let (mut set, mut best) = (set, best);
@@ -272,15 +317,18 @@ fn compare(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], 
     )];
     let mut linear = gains(library, scores, &others, base);
     linear[own] = f64::NEG_INFINITY;
+    let own_gain = rivals[0].1;
     for rival in leading(&linear, CANDIDATES) {
+        if linear[rival] < own_gain - FAR {
+            rivals.push((rival, linear[rival]));
+            continue;
+        }
         let mut tried = others.clone();
         tried.push(rival);
         let refined = refine(problem, library, &tried, &thetas);
         if is_physical(library, &tried, &refined) {
-            rivals.push((
-                rival,
-                refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior,
-            ));
+            let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
+            rivals.push((rival, gain));
         }
     }
     rivals.sort_by(|one, other| other.1.total_cmp(&one.1));

@@ -7,11 +7,11 @@
 //! size of the fitted calibration itself, without which an unknown effect hides in the calibration.
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
-//! spread over logs simulated from the model: same motion, same holes, calibration drawn from its sigmas, white noise. The
-//! p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
+//! spread over logs simulated from the model: same motion, same holes, calibration drawn from its sigmas, white noise with
+//! the tails of a Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian. The p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use rand_distr::{Distribution, StandardNormal, Uniform};
+use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use crate::joint::{Fitted, Joint};
@@ -33,6 +33,9 @@ const SIMULATIONS: [usize; 2] = [100, 300];
 
 /// Normal numbers drawn in all, so that long logs take bounded time.
 const DRAWS: usize = 100_000_000;
+
+/// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
+const TAILS: f64 = 10.0;
 
 /// Fixed, so that one case gives one verdict.
 const SEED: u64 = 0x5eed_0005;
@@ -68,34 +71,70 @@ pub struct Aspect {
 pub struct Leftover {
     /// Probability of as large a leftover if the model is enough.
     pub p: f64,
+    /// Natural logarithm of that probability continued beyond the last simulated log by a Gumbel law, which is what the
+    /// largest of many follows.
+    pub log_tail: f64,
     /// Aspects above three, largest first.
     pub aspects: Vec<Aspect>,
+    /// Mean and spread of the largest aspect over the simulated logs.
+    pub scale: [f64; 2],
 }
 
-/// Judges the residuals of a model.
-pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
+impl Leftover {
+    /// Probability that something else is needed, from its prior: a p-value speaks against "enough" by at most
+    /// `-1 / (e p ln p)` (Sellke, Bayarri and Berger 2001).
+    pub fn unknown(&self, prior: f64) -> f64 {
+        let log_p = self.log_tail.min(self.p.ln());
+        let bound = if log_p < -1.0 {
+            (1.0 + log_p + (-log_p).ln()).exp()
+        } else {
+            1.0
+        };
+        prior / (prior + (1.0 - prior) * bound)
+    }
+}
+
+/// `ln P(largest >= size)` for a Gumbel law of this mean and spread.
+fn log_tail(size: f64, [mean, spread]: [f64; 2]) -> f64 {
+    let beta = spread * 6f64.sqrt() / std::f64::consts::PI;
+    if beta <= 0.0 {
+        return 0.0;
+    }
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    let y = (size - (mean - EULER * beta)) / beta;
+    // ln(1 - exp(-exp(-y))): for large y simply -y.
+    if y > 30.0 {
+        -y
+    } else {
+        (-(-(-y).exp()).exp_m1()).max(f64::MIN_POSITIVE).ln()
+    }
+}
+
+/// Judges the residuals of a model. Channels in `explained` are not looked at: another effect says how they scatter.
+pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]) -> Leftover {
     let dictionary: Vec<Shapes> = views.iter().map(Shapes::new).collect();
-    let observed = sums(views, &dictionary, fitted);
+    let observed = sums(views, &dictionary, fitted, explained);
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sums(views, &dictionary, &joint.fit(&simulate(joint, &mut random))))
+        .map(|_| sums(views, &dictionary, &joint.fit(&simulate(joint, &mut random)), explained))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
     let observed = roots(&observed);
-    let moments: Vec<(f64, f64)> = (0..observed.len())
+    let spreads: Vec<(f64, f64)> = (0..observed.len())
         .map(|at| moments(simulated.iter().map(|run| run[at])))
         .collect();
     let sizes = |run: &[f64]| -> Vec<f64> {
         run.iter()
-            .zip(&moments)
+            .zip(&spreads)
             .map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 })
             .collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
+    let scale = moments(simulated.iter().map(|run| largest(run)));
     let beyond = simulated.iter().filter(|run| largest(run) >= seen).count();
     let mut aspects: Vec<Aspect> = labels(views)
         .into_iter()
@@ -106,6 +145,8 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted) -> Leftover {
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));
     Leftover {
         p: (1 + beyond) as f64 / (1 + count) as f64,
+        log_tail: log_tail(seen, [scale.0, scale.1]),
+        scale: [scale.0, scale.1],
         aspects,
     }
 }
@@ -118,12 +159,19 @@ fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 }
 
 fn simulate(joint: &Joint, random: &mut Xoshiro256PlusPlus) -> Vec<DVector<f64>> {
-    let mut normal = || -> f64 { StandardNormal.sample(random) };
+    let spread = ChiSquared::new(TAILS);
+    // A Student variable of n degrees has variance n / (n - 2).
+    let unit = (TAILS - 2.0).sqrt();
     joint
         .columns()
         .map(|columns| {
-            let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| normal());
-            let mut residual = DVector::from_fn(columns.nuisance.nrows(), |_, _| normal());
+            let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
+            let mut residual = DVector::from_fn(columns.nuisance.nrows(), |_, _| {
+                let normal: f64 = StandardNormal.sample(&mut *random);
+                spread
+                    .as_ref()
+                    .map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
+            });
             residual.gemv(1.0, &columns.nuisance, &open, 1.0);
             residual
         })
@@ -197,18 +245,21 @@ fn kinds(views: &[View]) -> usize {
 
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
 
+/// What is looked at in each channel, in the order of [`sums`].
+const ASPECTS_OF_CHANNEL: [&str; 5] = [
+    "more energy than noise",
+    "a shape in time or motion",
+    "neighbouring samples alike",
+    "outliers",
+    "a calibration beyond its sigmas",
+];
+
 /// What each entry of [`sums`] is.
 fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
     let mut labels = Vec::new();
     for (index, view) in views.iter().enumerate() {
         let name = &view.name;
-        for what in [
-            "more energy than noise",
-            "a shape in time or motion",
-            "neighbouring samples alike",
-            "outliers",
-            "a calibration beyond its sigmas",
-        ] {
+        for what in ASPECTS_OF_CHANNEL {
             labels.push((format!("{name}: {what}"), Some(index)));
         }
     }
@@ -226,12 +277,16 @@ fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
 }
 
 /// The sums of squares, in the order of [`labels`].
-fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted) -> Vec<f64> {
+fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted, explained: &[usize]) -> Vec<f64> {
     let mut sums = Vec::new();
     let mut nuisance = vec![0.0; kinds(views)];
     let mut common = vec![DMatrix::zeros(BINS, 3); kinds(views)];
     let mut stretches = vec![[0.0; STRETCHES]; kinds(views)];
     for (index, (view, shapes)) in views.iter().zip(shapes).enumerate() {
+        if explained.contains(&index) {
+            sums.extend([0.0; ASPECTS_OF_CHANNEL.len()]);
+            continue;
+        }
         let (rest, open) = (&fitted.rest[index], &fitted.nuisance[index]);
         let binned = shapes.binned(rest);
         let energy = rest.norm_squared();

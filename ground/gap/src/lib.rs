@@ -14,6 +14,10 @@
 
 pub mod attribute;
 pub mod case;
+pub mod cause;
+pub mod command;
+pub mod confusion;
+pub mod diagnose;
 pub mod evidence;
 pub mod gram;
 pub mod held;
@@ -21,7 +25,18 @@ pub mod joint;
 pub mod leftover;
 pub mod library;
 pub mod log;
+pub mod model;
+pub mod next;
+pub mod onset;
+pub mod page;
 pub mod problem;
 pub mod products;
 pub mod refine;
+pub mod regime;
+pub mod scatter;
+pub mod sight;
+pub mod terminal;
+pub mod verdict;
 pub mod windows;
+
+pub use command::{Arguments, GapError, run};

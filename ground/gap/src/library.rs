@@ -12,6 +12,7 @@ use crate::{
     evidence::Screen,
     problem::{Component, Problem},
     products::Products,
+    windows::Span,
 };
 
 /// An effect at a place.
@@ -25,6 +26,8 @@ pub struct Hypothesis {
     pub places: Vec<usize>,
     /// Logarithm of its prior odds against nothing.
     pub log_prior: f64,
+    /// When it is on; `None` for always.
+    pub span: Option<Span>,
 }
 
 impl Hypothesis {
@@ -41,11 +44,11 @@ impl Hypothesis {
         }
     }
 
-    /// It, for the whole log.
+    /// It, when it is on.
     pub fn component(&self, theta: &DVector<f64>) -> Component {
         Component {
             active: self.active(theta),
-            span: None,
+            span: self.span,
         }
     }
 }
@@ -135,6 +138,7 @@ impl Library {
                             parameters,
                             places,
                             log_prior,
+                            span: None,
                         });
                     }
                 }

@@ -51,13 +51,18 @@ pub struct Frame {
 impl Frame {
     /// `L^-1 N'x`: what the calibration can imitate of a column.
     pub fn open_part(&self, column: &DVector<f64>) -> DVector<f64> {
-        let mut open = self.nuisance.tr_mul(column);
+        let mut open = DMatrix::from_columns(&[self.nuisance.tr_mul(column)]);
+        self.solve_open(&mut open);
+        open.column(0).into_owned()
+    }
+
+    /// `N'x` to `L^-1 N'x`, in place.
+    pub fn solve_open(&self, open: &mut DMatrix<f64>) {
         match &self.factor {
             Some(factor) => {
-                factor.l_dirty().solve_lower_triangular_mut(&mut open);
-                open
+                factor.l_dirty().solve_lower_triangular_mut(open);
             }
-            None => open.map(|_| 0.0),
+            None => open.fill(0.0),
         }
     }
 

@@ -16,7 +16,14 @@ use crate::{
 const STEPS: usize = 8;
 
 /// [nats] that are not worth another step.
-const CONVERGED: f64 = 0.02;
+const CONVERGED: f64 = 0.05;
+
+/// [nats] above which the slopes are worth renewing.
+const CURVED: f64 = 1.0;
+
+/// Part of what a set explains that is not worth a step, or new slopes: where effects explain a hundred thousand nats, no
+/// model is right to one.
+const NEGLIGIBLE: [f64; 2] = [1e-5, 1e-4];
 
 /// A set of hypotheses fitted exactly.
 #[derive(Clone, Debug)]
@@ -65,7 +72,8 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
             thetas = thetas.iter().zip(&old).map(|(new, old)| (new + old) * 0.5).collect();
             continue;
         }
-        let is_done = point.to_gain < CONVERGED;
+        let explained = 0.5 * point.estimate.energy_explained;
+        let is_done = point.to_gain < CONVERGED + NEGLIGIBLE[0] * explained;
         let mut next = Vec::new();
         let mut from = library.reference;
         for hypothesis in set {
@@ -83,7 +91,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         if is_done {
             break;
         }
-        if step > 0 {
+        if step > 0 && point.to_gain > CURVED + NEGLIGIBLE[1] * explained {
             slopes.truncate(library.reference);
             let model = model_of(library, set, &thetas);
             slopes.extend((0..set.len()).flat_map(|index| problem.slopes(&model, index)));

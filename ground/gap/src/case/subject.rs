@@ -27,6 +27,9 @@ const MAGNETOMETER_OVERFLOW: i16 = -4096;
 /// late, but a motion that ends early belongs to another log.
 const LEAST_SEEN: f64 = 0.9;
 
+/// Rows that are kept at most: 40 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
+const MOST_ROWS: usize = 12_000;
+
 /// A case ready to be diagnosed.
 pub struct Subject {
     /// Its file.
@@ -45,6 +48,8 @@ pub struct Subject {
     pub stream: Stream,
     /// Samples left out because the reference had lost sight.
     pub unseen: usize,
+    /// One row in so many was kept.
+    pub thinned: usize,
 }
 
 impl Subject {
@@ -63,6 +68,8 @@ impl Subject {
         let motion = Recorded::open(&file)?;
         let (from_s, to_s) = motion.span_s();
         log = within_windows(log, &opened);
+        let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
+        log = keep_rows(log, |row, _| row % thinned == 0);
         let overlap_s = seen_share(&log, (from_s, to_s));
         if overlap_s < LEAST_SEEN {
             let problem = format!(
@@ -112,6 +119,7 @@ impl Subject {
             masked,
             stream,
             unseen,
+            thinned,
         })
     }
 
@@ -204,15 +212,16 @@ fn within_windows(log: Log, opened: &Opened) -> Log {
         .chain(opened.windows.hold())
         .copied()
         .collect();
-    keep_rows(log, |start_s| spans.iter().any(|span| span.contains(start_s)))
+    keep_rows(log, |_, start_s| spans.iter().any(|span| span.contains(start_s)))
 }
 
-fn keep_rows(mut log: Log, wanted: impl Fn(f64) -> bool) -> Log {
+fn keep_rows(mut log: Log, wanted: impl Fn(usize, f64) -> bool) -> Log {
     let mut new_row = Vec::with_capacity(log.start_s.len());
     let mut kept = 0u32;
-    for start_s in &log.start_s {
-        new_row.push(wanted(*start_s).then_some(kept));
-        kept += u32::from(wanted(*start_s));
+    for (row, start_s) in log.start_s.iter().enumerate() {
+        let is_wanted = wanted(row, *start_s);
+        new_row.push(is_wanted.then_some(kept));
+        kept += u32::from(is_wanted);
     }
     for series in &mut log.channels {
         *series = series.only(|row| new_row[row].is_some());
@@ -221,7 +230,8 @@ fn keep_rows(mut log: Log, wanted: impl Fn(f64) -> bool) -> Log {
             .iter_mut()
             .for_each(|row| *row = new_row[*row as usize].unwrap_or(*row));
     }
-    log.start_s.retain(|start_s| wanted(*start_s));
+    let mut is_kept = new_row.iter().map(Option::is_some);
+    log.start_s.retain(|_| is_kept.next().unwrap_or(false));
     log
 }
 
