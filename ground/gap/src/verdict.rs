@@ -126,8 +126,8 @@ fn gross_causes(subject: &Subject) -> impl Iterator<Item = Cause> {
     let gross = &subject.gross;
     let everything = 0..subject.twin.unit().channels.len();
     let commands = gross.contradicted.iter().map(|one| {
-        let kept = |axis: usize| one.reading.map_or(0.0, |reading| f64::from(reading.sign[axis]));
-        let parameter = |(axis, name): (usize, &str)| {
+        let kept = move |axis: usize| one.reading.map_or(0.0, |reading| f64::from(reading.sign[axis]));
+        let parameter = move |(axis, name): (usize, &str)| {
             let value = kept(axis);
             (format!("row {} {name}", one.seq), Parameter { value, sigma: 0.0, unit: "1" })
         };
