@@ -49,7 +49,7 @@ fn residuals(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
 /// Excess energy by channel and stretch of time, before and after.
 fn map(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
     Figure::map(
-        "Root mean square residual by channel and time, before: 0 for noise alone, 1 for three sigma and more",
+        "Root mean square residual by channel and time, before, in percent of the way from noise alone (0) to three sigma (100)",
         &Map {
             rows: diagnosis.cells.iter().map(|(name, _)| name.clone()).collect(),
             columns: (1..=diagnosis.cells.first().map_or(0, |(_, cells)| cells.len()))
