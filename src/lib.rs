@@ -4,7 +4,8 @@
 //!
 //! ```text
 //! bytes --sensor--> counts --unit::acquire--> Sample --packet--> 156 bytes -> telemetry, umbilical, recorder
-//!                   gyro counts --increments--> rotation increments --derived--> derived frame
+//!                   gyro counts --increments--> rotation increments
+//! Sample, increments --estimate--> vectors, health, attitude --derived--> derived frame
 //! umbilical bytes --command--> Command --mode--> Mode, Task
 //! ```
 //!
@@ -28,6 +29,7 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod estimate;
 pub mod faults;
 pub mod geometry;
 pub mod increments;
