@@ -174,18 +174,18 @@ impl Estimator {
         if solution.known != Known::All {
             return None;
         }
-        let (mut slots_us, mut sensors) = (0, 0);
+        let (mut slots_us, mut sensors) = (0_u64, 0_u64);
         for (sensor, slot_us) in SENSORS.iter().zip(sample.slots_us) {
             let used = sensor.kind == kind && solution.used >> (3 * sensor.plate) & 0b111 != 0;
             if used && slot_us != NO_SLOT {
-                slots_us += slot_us;
+                slots_us += u64::from(slot_us);
                 sensors += 1;
             }
         }
         Some(Sampled {
             value_b: solution.vector_b,
             variance: white(self.set.axes(kind), solution.used),
-            at_us: sample.start_us + u64::from(slots_us.checked_div(sensors).unwrap_or_default()),
+            at_us: sample.start_us.saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
         })
     }
 
