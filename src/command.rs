@@ -41,7 +41,7 @@ pub enum Command {
     Dump,
     /// Read a part of the recorder.
     DumpRange {
-        /// Number of the first record.
+        /// Number of the first page of the log.
         first: u32,
         /// How many.
         count: u32,
@@ -89,7 +89,7 @@ pub const COMMANDS: [Entry; 15] = [
     entry(
         b"G_LR",
         Command::DumpRange { first: 0, count: 0 },
-        "WAIT: read records, G_LRffffffcccccc (hex first, count)",
+        "WAIT: read pages, G_LRffffffcccccc (hex first, count)",
     ),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets"),

@@ -26,8 +26,10 @@ use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 pub use site::Site;
 
 use crate::{
+    attitude::{self, dcm_bn},
     calibration::{Axis, Ranges, Set, Temperatures},
     faults::{Monitor, SensorHealth, Vectors},
+    flight_log::record,
     increments::Increments,
     kalman::{Filter, Outcome, Sampled, Step},
     redundancy::{Known, Solution},
@@ -73,6 +75,23 @@ impl Estimate {
         bias_b: [0.0; 3],
         bias_sd: [0.0; 3],
     };
+
+    /// What the flight log keeps of it; `None` without an attitude.
+    pub fn kept(&self) -> Option<record::Estimate> {
+        let q_nb = self.q_nb?;
+        let [nn, ne, nd, ee, ed, dd] = self.covariance_n;
+        let covariance_n = Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd);
+        let dcm = dcm_bn(&attitude::from_parts(q_nb)?);
+        let covariance_b = dcm * covariance_n * dcm.transpose();
+        let [x, y, z] = [0, 1, 2].map(|axis| ComplexField::sqrt(covariance_b[(axis, axis)].max(0.0)));
+        let [bias_x, bias_y, bias_z] = self.bias_sd;
+        Some(record::Estimate {
+            q_nb,
+            bias_b: self.bias_b,
+            sigma: [x, y, z, bias_x, bias_y, bias_z],
+            sensors: self.sensors,
+        })
+    }
 }
 
 /// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.

@@ -51,6 +51,10 @@ pub struct Settings {
     pub rate: adis16265::Range,
     /// Where the unit is.
     pub site: Site,
+    /// Which unit this is, at most 16 letters: every boot in the log begins with it.
+    pub unit: &'static str,
+    /// Which set of calibration parameters belongs to it, at most 16 letters; empty for none.
+    pub calibration: &'static str,
 }
 
 impl Settings {
@@ -62,6 +66,11 @@ impl Settings {
         field: hmc5883l::Gain::PerGauss1090,
         rate: adis16265::Range::DegPerS320,
         site: Site::LABORATORY,
+        unit: match option_env!("EMEMS_UNIT") {
+            Some(unit) => unit,
+            None => "EM",
+        },
+        calibration: "",
     };
 
     /// The accelerometers': as many samples a second as cycles, or 50.
@@ -121,7 +130,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
         acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.retained),
         gyros::run::<B>(&shared, &votes, &gyros),
         estimate::run(&shared, &votes, &mut estimator),
-        record::run::<B>(&shared, &votes, parts.recorder),
+        record::run::<B>(&shared, &votes, parts.nand),
     );
     let care = join::join(
         self_test::run::<B>(&shared, &switch, &gyros),

@@ -15,10 +15,10 @@ use crate::{
     board::{Oscillator, ResetCause, StackUse},
     crash::CrashRecord,
     derived::{Derived, Health},
+    flight_log::{self, LogError, record::RecordBytes},
     increments::{Increments, Integrator},
     mode::State,
     packet::PACKET_BYTES,
-    recorder::RecorderStatus,
     resume::Resume,
     sample::{Errors, Sample},
 };
@@ -42,18 +42,18 @@ pub struct Cycle {
 const QUEUED: usize = 2;
 
 type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
-type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 2, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A reader of the cycles.
 pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
 /// A reader of the derived frames.
-pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>;
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A line for the console, without its end.
 pub type Line = String<128>;
 
-/// A packet on its way from the recorder's part to the umbilical's.
-pub type DumpedPacket = [u8; PACKET_BYTES];
+/// A record on its way from the recorder's part to the umbilical's, and the page it came from.
+pub type Dumped = (u32, RecordBytes);
 
 /// What the board says of this start.
 pub struct Start {
@@ -91,7 +91,9 @@ pub struct Shared {
     /// Debounced lift-off and micro-g.
     pub discretes: Cell<(bool, bool)>,
     /// The recorder, as of its last action.
-    pub recorder: Cell<RecorderStatus>,
+    pub recorder: Cell<flight_log::Status>,
+    /// Why it cannot be used.
+    pub recorder_error: Cell<Option<LogError>>,
     /// The recorder refused the last packet.
     pub recorder_refused: Cell<bool>,
     /// An erase was ordered and has not begun.
@@ -108,8 +110,8 @@ pub struct Shared {
     derived: DerivedFrames,
     /// Lines for the console.
     pub replies: Channel<NoopRawMutex, Line, 8>,
-    /// Packets read from the recorder for the umbilical.
-    pub dumped: Channel<NoopRawMutex, DumpedPacket, 1>,
+    /// Records read from the recorder for the umbilical: as many as a page holds.
+    pub dumped: Channel<NoopRawMutex, Dumped, 2>,
 }
 
 impl Shared {
@@ -123,6 +125,7 @@ impl Shared {
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
             discretes: Cell::default(),
             recorder: Cell::default(),
+            recorder_error: Cell::default(),
             recorder_refused: Cell::default(),
             erase_ordered: Cell::default(),
             self_test_ordered: Signal::new(),
