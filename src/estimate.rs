@@ -204,7 +204,9 @@ impl Estimator {
         Some(Sampled {
             value_b: solution.vector_b,
             variance: white(self.set.axes(kind), solution.used),
-            at_us: sample.start_us.saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
+            at_us: sample
+                .start_us
+                .saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
         })
     }
 

@@ -16,9 +16,8 @@ const PERIOD_US: u64 = 200_000;
 fn resting(counter: u16) -> (Sample, Increments) {
     let (force_b, field_b) = (Vector3::new(0.0, 0.0, -9.7864), Vector3::new(18.35, 0.0, -14.2));
     let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
-    let counts = |axis: &Axis, vector_b: &Vector3<f32>| {
-        ComplexField::round(axis.axis_b.dot(vector_b) / axis.scale) as i16
-    };
+    let counts =
+        |axis: &Axis, vector_b: &Vector3<f32>| ComplexField::round(axis.axis_b.dot(vector_b) / axis.scale) as i16;
     let triads = |axes: &[Axis; 12], vector_b: &Vector3<f32>| -> [[i16; 3]; 4] {
         let flicker = |k: usize| (usize::from(counter) * (k + 1)) as i16 % 3 - 1;
         core::array::from_fn(|plate| {
@@ -88,8 +87,14 @@ fn a_plate_that_was_not_read_is_in_the_health_and_has_no_part_in_the_slot_times(
     let estimate = estimator.clone().step(&sample, &increments);
     assert_eq!(estimate.sensors, SensorHealth(0b111));
     let measured = estimator.set.apply(&sample.reading, &estimator.temperatures);
-    let force_b = estimator.monitor.clone().step(&estimator.set, &sample.reading, &measured, 0.2).force_b;
-    let sampled = estimator.sampled(&sample, Kind::Accelerometer, &force_b).expect("three plates");
+    let force_b = estimator
+        .monitor
+        .clone()
+        .step(&estimator.set, &sample.reading, &measured, 0.2)
+        .force_b;
+    let sampled = estimator
+        .sampled(&sample, Kind::Accelerometer, &force_b)
+        .expect("three plates");
     // Slots 1, 2 and 3 at 250, 500 and 750 us.
     assert_eq!(sampled.at_us, sample.start_us + 500);
     // 0.045 m/s2 of one axis over the root of three plates.
@@ -105,7 +110,13 @@ fn in_free_fall_triad_has_no_vertical() {
 }
 
 fn is_finite(estimate: &Estimate) -> bool {
-    let vectors = [estimate.force_b, estimate.field_b_ut, estimate.rate_b, estimate.bias_b, estimate.bias_sd];
+    let vectors = [
+        estimate.force_b,
+        estimate.field_b_ut,
+        estimate.rate_b,
+        estimate.bias_b,
+        estimate.bias_sd,
+    ];
     let attitudes = [estimate.triad_nb.unwrap_or_default(), estimate.q_nb.unwrap_or_default()];
     let mut all = vectors
         .as_flattened()

@@ -70,7 +70,11 @@ pub(super) fn turn(set: &Set, temperatures: &Temperatures, increments: &Incremen
             saturated,
         };
     }
-    let beyond = if sound == seen { beyond_integrals(set, increments, used) } else { Vector3::zeros() };
+    let beyond = if sound == seen {
+        beyond_integrals(set, increments, used)
+    } else {
+        Vector3::zeros()
+    };
     let noise = set.gyro.iter().map(|axis| axis.noise * axis.noise).sum::<f32>() / PLATES as f32;
     let sampled_s = covered_s / f32::from(samples);
     Turn {
@@ -187,7 +191,9 @@ mod tests {
     #[test]
     fn a_missed_sample_costs_the_rotation_nothing() {
         let rate_b = Vector3::new(0.5, -1.0, 2.0);
-        let counts = nominal().gyro.map(|axis| (axis.axis_b.dot(&rate_b) / axis.scale) as i16);
+        let counts = nominal()
+            .gyro
+            .map(|axis| (axis.axis_b.dot(&rate_b) / axis.scale) as i16);
         let mut integrator = Integrator::new(nominal().ranges.nominal_scale(Kind::Gyro));
         for sample in 0..=20 {
             let mut counts = counts;
@@ -209,7 +215,10 @@ mod tests {
         // Gyro 4 looks along z: six radians a second are beyond its 5.6. Gyros 1 to 3 see a third of it.
         let spin_b = Vector3::new(0.1, 0.0, 6.0);
         let one = turned(&nominal(), &increments(&nominal(), spin_b), ALL);
-        assert!((one.angle_b - spin_b * 0.2).norm() < ROUNDING && !one.saturated, "{one:?}");
+        assert!(
+            (one.angle_b - spin_b * 0.2).norm() < ROUNDING && !one.saturated,
+            "{one:?}"
+        );
         let fast_b = Vector3::new(9.0, 0.0, 9.0);
         let two = turned(&nominal(), &increments(&nominal(), fast_b), ALL);
         assert!(two.saturated && two.covered_s > 0.0, "{two:?}");
@@ -220,7 +229,11 @@ mod tests {
     fn the_noise_of_an_increment_is_that_of_twenty_samples() {
         let set = nominal();
         let gyro_axes_b = gyro_axes_b();
-        let each = (gyro_axes_b.transpose() * gyro_axes_b).try_inverse().expect("they span space").trace() / 3.0;
+        let each = (gyro_axes_b.transpose() * gyro_axes_b)
+            .try_inverse()
+            .expect("they span space")
+            .trace()
+            / 3.0;
         let turn = turned(&set, &increments(&set, Vector3::zeros()), ALL);
         // 21 samples of 0.00344 rad/s, 0.2 s together.
         let expected = each * 0.00344 * 0.00344 * 0.2 * 0.2 / 21.0;
