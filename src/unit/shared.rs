@@ -42,12 +42,12 @@ pub struct Cycle {
 const QUEUED: usize = 2;
 
 type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
-type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 2, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A reader of the cycles.
 pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
 /// A reader of the derived frames.
-pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>;
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A line for the console, without its end.
 pub type Line = String<128>;
