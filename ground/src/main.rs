@@ -17,6 +17,7 @@ enum Command {
     Size(ground::size::Arguments),
     Allan(bench::allan::Arguments),
     Calibrate(bench::calibrate::Arguments),
+    Calibration(bench::calibration::Arguments),
     Design(bench::design::command::Arguments),
 }
 
@@ -39,6 +40,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Size(arguments) => ground::size::size(&arguments)?,
         Command::Allan(arguments) => bench::allan::run(&arguments)?,
         Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
+        Command::Calibration(arguments) => bench::calibration::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
     }
     Ok(())

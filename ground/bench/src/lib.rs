@@ -2,6 +2,7 @@
 
 pub mod allan;
 pub mod calibrate;
+pub mod calibration;
 pub mod consensus;
 pub mod controlled;
 pub mod coverage;
