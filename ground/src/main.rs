@@ -19,6 +19,7 @@ enum Command {
     Calibrate(bench::calibrate::Arguments),
     Calibration(bench::calibration::Arguments),
     Design(bench::design::command::Arguments),
+    Report(bench::reproduction::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -42,6 +43,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
         Command::Calibration(arguments) => bench::calibration::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
+        Command::Report(arguments) => bench::reproduction::run(&arguments)?,
     }
     Ok(())
 }

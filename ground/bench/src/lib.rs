@@ -15,6 +15,7 @@ pub mod least_squares;
 pub mod log;
 pub mod nominal;
 pub mod report;
+pub mod reproduction;
 pub mod response;
 pub mod set;
 pub mod spectrum;
