@@ -81,10 +81,21 @@ fn probe(motion: &str, seconds: u64) {
     let second = RotationTest::second();
     for (n, frame) in flown.derived.iter().enumerate() {
         let c = frame.increments.gyro.map(|g| g.count);
-        if frame.increments.covered_us < 195_000 || c != [20; 4] { println!("GAP {} {} {c:?}  {:08X} {:08X}", frame.counter, frame.increments.covered_us, frame.estimate.sensors.0, frame.health.0); }
+        if frame.increments.covered_us < 195_000 || c != [20; 4] {
+            println!(
+                "GAP {} {} {c:?}  {:08X} {:08X}",
+                frame.counter, frame.increments.covered_us, frame.estimate.sensors.0, frame.health.0
+            );
+        }
         if n % 1000 == 0 {
             let t_s = (frame.increments.end_us as f64 * 1e3 + BOOT as f64) * 1e-9;
-            let q = if motion == "rotation-1" { truth.at(t_s) } else { second.at(t_s) }.attitude.q_nb;
+            let q = if motion == "rotation-1" {
+                truth.at(t_s)
+            } else {
+                second.at(t_s)
+            }
+            .attitude
+            .q_nb;
             let err = |p: Option<[f32; 4]>| p.map(|p| (q.inverse() * attitude(p)).scaled_axis().map(f64::to_degrees));
             println!(
                 "{t_s:7.3} triad {:?} kalman {:?} sd {:?} bias {:?} health {:08X}",

@@ -69,7 +69,9 @@ pub fn put_right(positions: &mut Vec<Position>, channels: &mut [Channel]) -> Gro
         if !own.is_empty() {
             commands(positions, sensor, &own, &mut gross);
             plugs(positions, sensor, &own, channels, &mut gross);
-            gross.repeats.extend(own.iter().filter_map(|channel| repeat(positions, sensor, *channel)));
+            gross
+                .repeats
+                .extend(own.iter().filter_map(|channel| repeat(positions, sensor, *channel)));
         }
     }
     gross
@@ -90,7 +92,10 @@ fn commands(positions: &mut Vec<Position>, sensor: Kind, own: &[usize], gross: &
         .iter()
         .map(|row| Claim {
             excitation_b: excitation_b(&positions[*row], sensor),
-            values: own.iter().filter_map(|channel| positions[*row].values[*channel]).collect(),
+            values: own
+                .iter()
+                .filter_map(|channel| positions[*row].values[*channel])
+                .collect(),
         })
         .collect();
     let found = contradictions(&claims);
@@ -137,7 +142,9 @@ fn plugs(positions: &[Position], sensor: Kind, own: &[usize], channels: &mut [Ch
         return;
     };
     let names: Vec<String> = own.iter().map(|channel| channels[*channel].name.clone()).collect();
-    gross.inverted.extend(surely_inverted(&list).into_iter().map(|k| own[k]));
+    gross
+        .inverted
+        .extend(surely_inverted(&list).into_iter().map(|k| own[k]));
     gross.wiring = simplest.words(&names);
     gross.as_good = list.len() - 1;
     for (k, channel) in own.iter().enumerate() {

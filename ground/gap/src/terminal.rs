@@ -90,7 +90,11 @@ fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fm
     }
     for rows in &gross.otherwise {
         let rows: Vec<String> = rows.iter().map(f64::to_string).collect();
-        writeln!(text, "        or, as well supported, these are wrong: {}", rows.join(", "))?;
+        writeln!(
+            text,
+            "        or, as well supported, these are wrong: {}",
+            rows.join(", ")
+        )?;
     }
     if !gross.wiring.is_empty() {
         writeln!(text, "WIRING  {}", gross.wiring)?;

@@ -129,7 +129,14 @@ fn gross_causes(subject: &Subject) -> impl Iterator<Item = Cause> {
         let kept = move |axis: usize| one.reading.map_or(0.0, |reading| f64::from(reading.sign[axis]));
         let parameter = move |(axis, name): (usize, &str)| {
             let value = kept(axis);
-            (format!("row {} {name}", one.seq), Parameter { value, sigma: 0.0, unit: "1" })
+            (
+                format!("row {} {name}", one.seq),
+                Parameter {
+                    value,
+                    sigma: 0.0,
+                    unit: "1",
+                },
+            )
         };
         ["x", "y", "z"].into_iter().enumerate().map(parameter)
     });

@@ -54,11 +54,19 @@ pub fn read_table(file: &Path, channels: &[Channel]) -> Result<Vec<Position>, Ca
     for (sensor, names) in [(Kind::Gyro, RATE), (Kind::Accelerometer, FORCE)] {
         let is_needed = channels.iter().any(|channel| channel.sensor == sensor);
         if is_needed && names.iter().all(|name| place_of(name).is_none()) {
-            return Err(CaseError::key(file, names[0], "is absent; the unit's sensors need the command"));
+            return Err(CaseError::key(
+                file,
+                names[0],
+                "is absent; the unit's sensors need the command",
+            ));
         }
     }
     if let Some(channel) = channels.iter().find(|channel| channel.sensor == Kind::Magnetometer) {
-        return Err(CaseError::key(file, &channel.name, "is a magnetometer; a table commands rate and force"));
+        return Err(CaseError::key(
+            file,
+            &channel.name,
+            "is a magnetometer; a table commands rate and force",
+        ));
     }
     let is_known = |name: &str| {
         let own = |channel: &Channel| {
@@ -79,7 +87,11 @@ pub fn read_table(file: &Path, channels: &[Channel]) -> Result<Vec<Position>, Ca
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
             if value.is_none() && !cell.is_empty() {
                 let name = header.get(place).unwrap_or_default();
-                return Err(CaseError::key(file, line(), format!("{name} is {cell:?}, not a finite number")));
+                return Err(CaseError::key(
+                    file,
+                    line(),
+                    format!("{name} is {cell:?}, not a finite number"),
+                ));
             }
             Ok(value)
         };
@@ -98,17 +110,29 @@ pub fn read_table(file: &Path, channels: &[Channel]) -> Result<Vec<Position>, Ca
         }
         let seq = number(seq)?.ok_or_else(|| CaseError::key(file, line(), "seq is empty"))?;
         if positions.last().is_some_and(|last| seq <= last.seq) {
-            return Err(CaseError::key(file, line(), format!("seq {seq} does not come after the line before")));
+            return Err(CaseError::key(
+                file,
+                line(),
+                format!("seq {seq} does not come after the line before"),
+            ));
         }
         if positions.len() == MOST_ROWS {
-            return Err(CaseError::key(file, line(), format!("is beyond the {MOST_ROWS} positions a table may have")));
+            return Err(CaseError::key(
+                file,
+                line(),
+                format!("is beyond the {MOST_ROWS} positions a table may have"),
+            ));
         }
         let physical = |(place, channel): (&usize, &Channel)| Ok(number(*place)?.map(|mean| mean * channel.lsb));
         positions.push(Position {
             seq,
             rate_b: command(RATE)?,
             force_b: command(FORCE)?,
-            values: values.iter().zip(channels).map(physical).collect::<Result<_, CaseError>>()?,
+            values: values
+                .iter()
+                .zip(channels)
+                .map(physical)
+                .collect::<Result<_, CaseError>>()?,
         });
     }
     Ok(positions)
