@@ -2,18 +2,16 @@
 
 use emems::{
     derived::{self, Derived},
-    estimate::{Estimate, Estimator},
-    packet,
+    estimate::Estimator,
     sample::{Reading, Sample},
     unit::Settings,
 };
 use host_tests::{Flight, Flown, MS, S, world};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion};
 use twin::{
     host::timing::BOOT,
     motion::{Motion, RotationTest},
     plant::Plant,
-    run::Fault,
 };
 
 /// A nominal unit with noise and biases, its derived frames on from the first.
