@@ -45,7 +45,12 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate_and_it_costs_what_it_may(
             estimate: estimator.step(&sample, &frame.increments),
             ..*frame
         };
-        assert_eq!(derived::encode(frame), derived::encode(&again), "cycle {}", frame.counter);
+        assert_eq!(
+            derived::encode(frame),
+            derived::encode(&again),
+            "cycle {}",
+            frame.counter
+        );
         costs.push(frame.estimate_us * PER_US);
     }
     costs.sort_unstable();
