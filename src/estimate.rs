@@ -214,7 +214,8 @@ impl Estimator {
         let gravity = self.filter.params.gravity;
         let off = ComplexField::abs(vectors.force_b.vector_b.norm() - gravity);
         // A comparison with NaN is false.
-        if !(off < NEAR_ONE_G * gravity) {
+        let near = off < NEAR_ONE_G * gravity;
+        if !near {
             return None;
         }
         let (sin, cos) = ComplexField::sin_cos(self.filter.reference.declination);

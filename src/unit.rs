@@ -11,6 +11,7 @@
 //! They share one state, which lives in this future; nothing is global.
 
 mod acquire;
+mod calibration;
 mod clock;
 mod estimate;
 mod gyros;

@@ -13,6 +13,7 @@ use heapless::String;
 use super::{Settings, clock::Clock};
 use crate::{
     board::{Oscillator, ResetCause, StackUse},
+    calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
     derived::{DERIVED_BYTES, Derived, Health},
     flight_log::{self, LogError, record::RecordBytes},
@@ -110,6 +111,10 @@ pub struct Shared {
     pub errors: Cell<Errors>,
     /// Bytes lost or passed over on the umbilical.
     pub umbilical_noise: Cell<u32>,
+    /// The calibration set in use.
+    pub calibration: RefCell<Set>,
+    /// The one that is being sent.
+    pub arriving: RefCell<Arriving>,
     cycles: Cycles,
     derived: DerivedFrames,
     /// Lines for the console.
@@ -136,6 +141,8 @@ impl Shared {
             testing: Cell::default(),
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
+            calibration: RefCell::new(Set::nominal(Ranges::of(&settings))),
+            arriving: RefCell::default(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
             replies: Channel::new(),

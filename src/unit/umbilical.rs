@@ -6,6 +6,7 @@ use embassy_futures::select::{Either4, select4};
 use embedded_io_async::Read;
 
 use super::{
+    calibration,
     clock::now,
     shared::Shared,
     telemetry::write,
@@ -121,6 +122,7 @@ async fn answer(shared: &Shared, heard: Heard) {
                 "{word} ok: sixteen sensors, about 5 s; keep the unit still"
             ));
         }
+        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, command).await,
         Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));

@@ -10,6 +10,7 @@
 
 mod measured;
 mod subject;
+mod table;
 mod text;
 
 use std::{
@@ -26,6 +27,7 @@ use crate::{
 
 pub use measured::read_measured;
 pub use subject::Subject;
+pub use table::{Position, read_table};
 pub use text::read_bytes;
 
 /// Why a case cannot be judged.

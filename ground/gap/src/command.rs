@@ -118,6 +118,23 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     Ok(())
 }
 
+/// Judges a case as [`run`] does and leaves verdict.json in its folder, silently: the analyst's part in a challenge.
+///
+/// # Errors
+/// When the case cannot be judged or the file not written.
+pub fn write_verdict(case: &Path) -> Result<(), GapError> {
+    let subject = Subject::open(case)?;
+    let diagnosis = diagnose(&subject, &[], &|_, _| ());
+    let advice = next::advice(&subject, &diagnosis);
+    let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice))?;
+    put(case, "verdict.json", &verdict)
+}
+
+fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {
+    let file = folder.join(name);
+    std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
+}
+
 fn write_folder(
     folder: &Path,
     subject: &Subject,
@@ -125,19 +142,15 @@ fn write_folder(
     advice: &str,
     verdict: &str,
 ) -> Result<(), GapError> {
-    let put = |name: &str, text: &str| {
-        let file = folder.join(name);
-        std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
-    };
     std::fs::create_dir_all(folder).map_err(|source| GapError::Write {
         file: folder.to_path_buf(),
         source,
     })?;
-    put("verdict.json", verdict)?;
-    put("index.html", &page::html(subject, diagnosis, advice)?)?;
+    put(folder, "verdict.json", verdict)?;
+    put(folder, "index.html", &page::html(subject, diagnosis, advice)?)?;
     let mut unit = subject.twin.unit().clone();
     unit.effects.extend(diagnosis.known.iter().cloned());
-    put("unit.toml", &unit.text())?;
+    put(folder, "unit.toml", &unit.text())?;
     println!("{}", folder.join("index.html").display());
     Ok(())
 }

@@ -20,6 +20,7 @@ pub mod confusion;
 pub mod diagnose;
 pub mod evidence;
 pub mod gram;
+pub mod gross;
 pub mod held;
 pub mod joint;
 pub mod leftover;
@@ -39,4 +40,4 @@ pub mod terminal;
 pub mod verdict;
 pub mod windows;
 
-pub use command::{Arguments, GapError, run};
+pub use command::{Arguments, GapError, run, write_verdict};

@@ -96,7 +96,9 @@ impl Verdict {
                 units: "sigma",
             },
             places,
-            causes: diagnosis.causes.iter().map(|cause| of_cause(subject, cause)).collect(),
+            causes: gross_causes(subject)
+                .chain(diagnosis.causes.iter().map(|cause| of_cause(subject, cause)))
+                .collect(),
             alternatives: diagnosis
                 .alternatives
                 .iter()
@@ -117,6 +119,35 @@ impl Verdict {
             },
         }
     }
+}
+
+/// What was put right in a table. Contradictions of others that are as well supported share the probability.
+fn gross_causes(subject: &Subject) -> impl Iterator<Item = Cause> {
+    let gross = &subject.gross;
+    let everything = 0..subject.twin.unit().channels.len();
+    let commands = gross.contradicted.iter().map(|one| {
+        let kept = move |axis: usize| one.reading.map_or(0.0, |reading| f64::from(reading.sign[axis]));
+        let parameter = move |(axis, name): (usize, &str)| {
+            let value = kept(axis);
+            (
+                format!("row {} {name}", one.seq),
+                Parameter {
+                    value,
+                    sigma: 0.0,
+                    unit: "1",
+                },
+            )
+        };
+        ["x", "y", "z"].into_iter().enumerate().map(parameter)
+    });
+    let parameters: BTreeMap<String, Parameter> = commands.flatten().collect();
+    let commands = (!parameters.is_empty()).then(|| Cause {
+        effect: "reference-sign",
+        channels: subject.names(everything),
+        probability: rounded(1.0 / (1.0 + gross.otherwise.len() as f64), 4),
+        parameters,
+    });
+    commands.into_iter()
 }
 
 fn of_cause(subject: &Subject, cause: &crate::cause::Cause) -> Cause {

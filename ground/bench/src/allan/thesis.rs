@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use super::{bounds::bounds, report::digits};
-use crate::table::Table;
+use crate::{
+    reproduction::allan::{factor, flicker_angle, white_rate},
+    table::Table,
+};
 
 /// Half a unit of the fifth digit printed, twice for a ratio.
 const PRINTED: f64 = 5e-5;
@@ -31,22 +34,6 @@ fn printed(name: &str) -> Option<Vec<[f64; 7]>> {
             .map(|row| columns.map(|column| table.required(row, column).expect("a number")))
             .collect(),
     )
-}
-
-/// The averaging factor behind a printed time: 0.8 s was entered for a sampling interval of 0.05 s.
-fn factor(printed_tau_s: f64) -> f64 {
-    (printed_tau_s / 0.8).log2().round().exp2()
-}
-
-/// Degrees of freedom of NIST SP 1065, table 5.
-fn white_rate(count: f64, m: f64) -> f64 {
-    (3.0 * (count - 1.0) / (2.0 * m) - 2.0 * (count - 2.0) / count) * 4.0 * m * m / (4.0 * m * m + 5.0)
-}
-
-fn flicker_angle(count: f64, m: f64) -> f64 {
-    (((count - 1.0) / (2.0 * m)).ln() * ((2.0 * m + 1.0) * (count - 1.0) / 4.0).ln())
-        .sqrt()
-        .exp()
 }
 
 #[test]

@@ -5,16 +5,17 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use twin::{
     effect::Active,
     environment::Environment,
     motion::Recorded,
-    predict::{Accuracy, Channel, Kind, Scene, Twin, UnitDescription},
+    predict::{Accuracy, Channel, Feel, Kind, Scene, Twin, UnitDescription},
 };
 
-use super::{CaseError, Opened};
+use super::{CaseError, Opened, Position, read_table};
 use crate::{
+    gross::{Gross, put_right},
     held::Held,
     log::{Column, Log, Masked, Stream},
     windows::{Fit, Span},
@@ -50,6 +51,8 @@ pub struct Subject {
     pub unseen: usize,
     /// One row in so many was kept.
     pub thinned: usize,
+    /// What was grossly wrong and is put right; in tables only.
+    pub gross: Gross,
 }
 
 impl Subject {
@@ -60,6 +63,9 @@ impl Subject {
     pub fn open(path: &Path) -> Result<Self, CaseError> {
         let opened = Opened::open(path)?;
         let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
+        if opened.text.kind == super::Kind::Table {
+            return Subject::of_table(opened, unit);
+        }
         let environment = environment(&opened, &unit)?;
         let columns: Vec<Column> = unit.channels.iter().map(column).collect();
         let mut log = opened.log(&columns, unit.cycle_s)?;
@@ -83,27 +89,9 @@ impl Subject {
         lost_s.push((to_s, f64::INFINITY));
         let unseen = drop_unseen(&mut log, &lost_s, &unit);
         let (fit, held) = opened.windows.part(&log);
-        if fit.channels.iter().all(|series| series.rows.len() < 2) {
-            return Err(CaseError::key(
-                &opened.file,
-                "windows.fit",
-                "holds no sample of the log",
-            ));
-        }
-        if held.counts().iter().all(|count| *count < 2) {
-            return Err(CaseError::key(
-                &opened.file,
-                "windows.hold",
-                "holds no sample of the log",
-            ));
-        }
+        check_windows(&opened, &fit, &held)?;
         let step_s = motion.step_s();
         let scene = Scene::new(&motion, &environment, from_s, to_s, step_s);
-        let accuracy = Accuracy {
-            attitude_sigma_rad: opened.text.reference.attitude_sigma_rad,
-            position_sigma_m: opened.text.reference.position_sigma_m,
-            field_sigma_ut: opened.text.environment.field_sigma_ut,
-        };
         let Log {
             start_s,
             masked,
@@ -112,14 +100,60 @@ impl Subject {
         } = log;
         Ok(Subject {
             twin: Twin::new(unit, environment, scene, start_s)?,
+            accuracy: accuracy(&opened),
             opened,
-            accuracy,
             fit,
             held,
             masked,
             stream,
             unseen,
             thinned,
+            gross: Gross::default(),
+        })
+    }
+
+    /// Of a table: gross errors are put right first, then its positions are instants a second apart.
+    fn of_table(opened: Opened, mut unit: UnitDescription) -> Result<Self, CaseError> {
+        let file = opened.path(&opened.text.measured);
+        if let Some(channel) = unit
+            .channels
+            .iter()
+            .find(|channel| channel.bandwidth_hz.is_some() || channel.slot_s != 0.0)
+        {
+            let problem = "has a bandwidth or a slot; the rows of a table are means at rest and have neither";
+            return Err(CaseError::key(&file, &channel.name, problem));
+        }
+        let environment = environment(&opened, &unit)?;
+        let mut positions = read_table(&file, &unit.channels)?;
+        let gross = put_right(&mut positions, &mut unit.channels);
+        let columns: Vec<Column> = unit.channels.iter().map(column).collect();
+        let mut log = Log::empty(columns.len());
+        for position in &positions {
+            log.begin_row(position.seq);
+            for (index, (column, value)) in columns.iter().zip(&position.values).enumerate() {
+                log.put(index, column, *value);
+            }
+        }
+        log = within_windows(log, &opened);
+        let (fit, held) = opened.windows.part(&log);
+        check_windows(&opened, &fit, &held)?;
+        let used: Vec<Feel> = positions
+            .iter()
+            .filter(|position| log.start_s.contains(&position.seq))
+            .map(|position| steady(position, environment.temperature_c))
+            .collect();
+        let starts_s = (0..used.len()).map(|row| row as f64).collect();
+        Ok(Subject {
+            twin: Twin::new(unit, environment, Scene::table(&used), starts_s)?,
+            accuracy: accuracy(&opened),
+            opened,
+            fit,
+            held,
+            masked: log.masked,
+            stream: log.stream,
+            unseen: 0,
+            thinned: 1,
+            gross,
         })
     }
 
@@ -132,6 +166,40 @@ impl Subject {
     /// Names of the channels an effect touches.
     pub fn touched(&self, active: &Active) -> Vec<String> {
         self.names(active.cause.channels(self.twin.unit()))
+    }
+}
+
+fn accuracy(opened: &Opened) -> Accuracy {
+    Accuracy {
+        attitude_sigma_rad: opened.text.reference.attitude_sigma_rad,
+        position_sigma_m: opened.text.reference.position_sigma_m,
+        field_sigma_ut: opened.text.environment.field_sigma_ut,
+    }
+}
+
+fn check_windows(opened: &Opened, fit: &Fit, held: &Held) -> Result<(), CaseError> {
+    let absent = |key: &str| Err(CaseError::key(&opened.file, key, "holds no sample of the log"));
+    if fit.channels.iter().all(|series| series.rows.len() < 2) {
+        return absent("windows.fit");
+    }
+    if held.counts().iter().all(|count| *count < 2) {
+        return absent("windows.hold");
+    }
+    Ok(())
+}
+
+/// What a position feels like: the command, and nothing changes.
+fn steady(position: &Position, temperature_c: f64) -> Feel {
+    Feel {
+        t_s: 0.0,
+        rate_b: position.rate_b,
+        rate_dot_b: Vector3::zeros(),
+        force_b: position.force_b,
+        field_b_ut: Vector3::zeros(),
+        temperature_c,
+        temperature_rate: 0.0,
+        q_nb: UnitQuaternion::identity(),
+        position_n: Vector3::zeros(),
     }
 }
 
