@@ -14,6 +14,8 @@ use twin::plant::Plant;
 
 /// Instructions in a microsecond: the emulator executes 168 million a second.
 const PER_US: u32 = 168;
+/// Instructions that half of the steps stay below: what they took when this was written, and a sixth more. 20,000 is wanted.
+const MEDIAN_CEILING: u32 = 100_000;
 
 /// Thirty seconds of tumbling from power-on, derived frames on.
 fn tumbled() -> Tape {
@@ -27,7 +29,7 @@ fn tumbled() -> Tape {
 }
 
 #[test]
-fn a_host_reproduces_every_bit_of_the_image_s_estimate_and_it_costs_what_it_may() {
+fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
     let tape = tumbled();
     let (packets, frames) = (tape.packets(), tape.derived());
     assert!(frames.len() > 145, "{} frames", frames.len());
@@ -60,4 +62,5 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate_and_it_costs_what_it_may(
         costs[costs.len() / 2],
         costs[costs.len() - 1]
     );
+    assert!(costs[costs.len() / 2] < MEDIAN_CEILING);
 }
