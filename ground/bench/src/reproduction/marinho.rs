@@ -20,7 +20,7 @@ const STANDARD_GRAVITY: f64 = 9.80665;
 /// When one cannot be read.
 pub fn tables(sources: &Sources<'_>) -> Result<Vec<Reproduced>, ReproductionError> {
     Ok(vec![
-        scale_factors(sources)?,
+        scale_factors(),
         gyro_positions(sources)?,
         gyro_raw(sources)?,
         gyro_errors(sources, "Table 4.3 (Marinho)", "002_table4_3_gyro_errors.csv", 2)?,
@@ -39,8 +39,8 @@ fn e_of_b(b: Vector3<f64>) -> [f64; 3] {
     [b.z, b.y, b.x]
 }
 
-fn scale_factors(sources: &Sources<'_>) -> Result<Reproduced, ReproductionError> {
-    let printed = sources.numbers("002_table3_1_scale_factors.csv", ["printed_value"])?;
+fn scale_factors() -> Reproduced {
+    let printed = [3.0, 0.8299, 0.07326];
     let ours = [
         f64::from(FullScale::G6.mg_per_count()),
         1e3 / f64::from(Gain::PerGauss1090.counts_per_gauss()),
@@ -52,13 +52,13 @@ fn scale_factors(sources: &Sources<'_>) -> Result<Reproduced, ReproductionError>
         ("gyro [deg/s/count]", 5e-6),
     ];
     let line =
-        |((name, within), (printed, ours)): ((&str, f64), (&[f64; 1], f64))| Line::new(name, printed, &[ours], within);
-    Ok(Reproduced {
+        |((name, within), (printed, ours)): ((&str, f64), (f64, f64))| Line::new(name, &[printed], &[ours], within);
+    Reproduced {
         table: "Table 3.1 (Marinho)",
-        lines: names.into_iter().zip(printed.iter().zip(ours)).map(line).collect(),
+        lines: names.into_iter().zip(printed.into_iter().zip(ours)).map(line).collect(),
         why: "Datasheet values of the parts at their nominal ranges. The magnetometer's is 1205 counts per gauss, which is \
               none of the HMC5883L's eight gains; its default, 1090, is taken here.",
-    })
+    }
 }
 
 fn gyro_positions(sources: &Sources<'_>) -> Result<Reproduced, ReproductionError> {
@@ -213,8 +213,8 @@ fn accelerometer_raw(sources: &Sources<'_>) -> Result<Reproduced, ReproductionEr
         table: "Table 4.7 (Marinho)",
         lines: model.iter().enumerate().map(line).collect(),
         why: "Means of the ten raw rows against what the printed calibration (Eqs 4.39 and 4.40, read as reciprocals) \
-              predicts at rest. They are of another day than the calibration: up to 4.9 counts, 14 mg, lie between them, \
-              more than noise. The angles of the unit on the table that day are not in the thesis.",
+              predicts at rest. They are of another day than the calibration: up to 4.9 counts, 14 mg, lie between them on \
+              plate 3, more than noise. The angles of the unit on the table that day are not in the thesis.",
     })
 }
 

@@ -11,7 +11,7 @@ const KNOWN: [(&str, usize, usize); 27] = [
     ("Table 4.4", 0, 12),
     ("Table 4.5", 0, 12),
     ("Table 4.6", 0, 6),
-    ("Table 4.7", 6, 12),
+    ("Table 4.7", 2, 12),
     ("Table 6.1", 0, 9),
     ("Table 6.2", 0, 4),
     ("Table 6.3", 0, 2),
