@@ -26,7 +26,11 @@ enum Command {
     Report(bench::reproduction::Arguments),
 }
 
-/// `ground gap CASE`, and the challenge that hides causes from it.
+/// Finds what the twin of a unit lacks
+///
+/// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
+/// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
+/// `blind` checks it on cases whose cause is withheld.
 #[derive(clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Gap {

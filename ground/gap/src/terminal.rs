@@ -10,6 +10,9 @@ const PRINTED: usize = 4;
 /// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
 const REMAINS: f64 = 2.5;
 
+/// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
+const HELPED: f64 = 0.8;
+
 /// Detection limits that are printed.
 const LIMITS: usize = 4;
 
@@ -118,11 +121,12 @@ fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fm
     Ok(())
 }
 
-/// Channels of a table that no cause touches and whose held-out gap remains, with the change between repeats.
+/// Channels of a table whose held-out gap remains and that no cause helps beyond recalibration, with the change between
+/// repeats.
 fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
     let is_left = |channel: usize| {
-        let is_touched = diagnosis.causes.iter().any(|cause| cause.channels.contains(&channel));
-        !is_touched && diagnosis.shrink.channels[channel].after > REMAINS
+        let own = &diagnosis.shrink.channels[channel];
+        own.after > REMAINS && own.after > HELPED * own.recalibrated
     };
     let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
     repeats.map(|repeat| (repeat.channel, repeat.change)).collect()

@@ -45,3 +45,24 @@ fn low_bits_cut_off_are_named() {
 fn a_healthy_unit_is_given_no_cause() {
     check("P12", None);
 }
+
+/// Sixteen sequences on a rate table, as printed (thesis 000, tables 7.3 and 7.4).
+#[test]
+fn a_printed_table_yields_its_wrong_commands_its_inverted_gyro_and_the_sagnac_sine() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases/siqueira-table-7-4");
+    if !folder.join("case.toml").is_file() {
+        println!("skipped: {} is not here", folder.display());
+        return;
+    }
+    let subject = Subject::open(&folder).expect("opens");
+    let wrong: Vec<f64> = subject.gross.contradicted.iter().map(|one| one.seq).collect();
+    assert_eq!(wrong, [7.0, 8.0, 11.0, 12.0, 15.0]);
+    assert_eq!(subject.names(subject.gross.inverted.iter().copied()), ["sd04"]);
+    let diagnosis = diagnose(&subject, &[], &|_, _| {});
+    assert_eq!(
+        diagnosis.causes.first().map(|cause| cause.effect),
+        Some("gyro-sine-response")
+    );
+    let screen = gap::terminal::screen(&subject, &diagnosis, "");
+    assert!(screen.contains("lme02: scale drift or none of these"), "{screen}");
+}
