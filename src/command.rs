@@ -17,8 +17,9 @@ pub const WORD_BYTES: usize = 4;
 /// [us] pause after which a half word is forgotten.
 pub const HALF_WORD_TIMEOUT_US: u64 = 2_000_000;
 
-/// Digits after [`Command::DumpRange`]'s word: six for the first record, six for how many.
-const RANGE_DIGITS: usize = 12;
+/// Digits after [`Command::DumpRange`]'s word, six for the first record, six for how many; and after
+/// [`Command::SetWord`]'s, four for the place, eight for the bytes.
+const DIGITS: usize = 12;
 
 /// A word as it stands on the line.
 pub type Word = [u8; WORD_BYTES];
@@ -46,6 +47,17 @@ pub enum Command {
         /// How many.
         count: u32,
     },
+    /// Four bytes of a calibration set.
+    SetWord {
+        /// Which four of it.
+        place: u16,
+        /// The bytes.
+        bytes: [u8; 4],
+    },
+    /// Use the calibration set that was sent.
+    LoadSet,
+    /// Read the calibration set in use.
+    ReadSet,
     /// Stop the running task.
     Stop,
     /// Record packets.
@@ -79,7 +91,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 15] = [
+pub const COMMANDS: [Entry; 18] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(b"G_MT", Command::SendPackets, "WAIT: packets to the umbilical"),
@@ -91,6 +103,13 @@ pub const COMMANDS: [Entry; 15] = [
         Command::DumpRange { first: 0, count: 0 },
         "WAIT: read pages, G_LRffffffcccccc (hex first, count)",
     ),
+    entry(
+        b"G_CW",
+        SET_WORD,
+        "WAIT: calibration, G_CWppppbbbbbbbb (hex place, four bytes)",
+    ),
+    entry(b"G_CL", Command::LoadSet, "WAIT: use the calibration sent"),
+    entry(b"G_CR", Command::ReadSet, "WAIT: read the calibration in use"),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets"),
     entry(b"G_ST", Command::Status, "status"),
@@ -100,6 +119,15 @@ pub const COMMANDS: [Entry; 15] = [
     entry(b"G_DD", Command::DerivedOff, "derived frames off"),
     entry(b"G_AT", Command::SelfTest, "WAIT: self-test of the sensors"),
 ];
+
+const SET_WORD: Command = Command::SetWord {
+    place: 0,
+    bytes: [0; 4],
+};
+
+fn takes_digits(command: Command) -> bool {
+    matches!(command, Command::DumpRange { .. } | Command::SetWord { .. })
+}
 
 /// The word of a command.
 pub fn word_of(command: Command) -> &'static Word {
@@ -129,7 +157,7 @@ pub enum Heard {
 /// The listener on the umbilical.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
-    letters: Vec<u8, { WORD_BYTES + RANGE_DIGITS }>,
+    letters: Vec<u8, { WORD_BYTES + DIGITS }>,
     last_us: u64,
     /// Bytes that belonged to no word, line ends and blanks excepted.
     pub passed_over: u32,
@@ -189,11 +217,7 @@ impl Parser {
     fn whole_word(&mut self) -> Option<Heard> {
         let word = self.word();
         let found = COMMANDS.iter().find(|entry| *entry.word == word);
-        if let Some(Entry {
-            command: Command::DumpRange { .. },
-            ..
-        }) = found
-        {
+        if found.is_some_and(|entry| takes_digits(entry.command)) {
             return None;
         }
         self.letters.clear();
@@ -212,16 +236,23 @@ impl Parser {
             return Some(heard);
         }
         self.take(byte);
-        if self.letters.len() < WORD_BYTES + RANGE_DIGITS {
+        if self.letters.len() < WORD_BYTES + DIGITS {
             return None;
         }
-        let number = |from: usize| {
-            let digits = self.letters.iter().skip(WORD_BYTES + from).take(RANGE_DIGITS / 2);
+        let number = |from: usize, count: usize| {
+            let digits = self.letters.iter().skip(WORD_BYTES + from).take(count);
             digits.fold(0, |value, digit| value << 4 | u32::from(hex_value(*digit).unwrap_or(0)))
         };
-        let command = Command::DumpRange {
-            first: number(0),
-            count: number(RANGE_DIGITS / 2),
+        let command = if self.word() == *word_of(SET_WORD) {
+            Command::SetWord {
+                place: number(0, 4) as u16,
+                bytes: number(4, 8).to_be_bytes(),
+            }
+        } else {
+            Command::DumpRange {
+                first: number(0, 6),
+                count: number(6, 6),
+            }
         };
         self.letters.clear();
         Some(Heard::Command(command))
@@ -250,7 +281,7 @@ mod tests {
     #[test]
     fn every_word_is_its_own_command() {
         for entry in &COMMANDS {
-            if entry.command != (Command::DumpRange { first: 0, count: 0 }) {
+            if !takes_digits(entry.command) {
                 assert_eq!(heard(entry.word), [Heard::Command(entry.command)]);
             }
             assert_eq!(word_of(entry.command), entry.word);
@@ -295,6 +326,18 @@ mod tests {
             found: b'G',
         };
         assert_eq!(heard(b"G_LR000G_ST"), [wrong, Heard::Command(Command::Status)]);
+    }
+
+    #[test]
+    fn four_bytes_of_a_set_keep_their_order() {
+        let (place, bytes) = (0x011B, [0x12, 0x34, 0xAB, 0xCD]);
+        assert_eq!(
+            heard(b"G_CW011B1234ABCDG_CL"),
+            [
+                Heard::Command(Command::SetWord { place, bytes }),
+                Heard::Command(Command::LoadSet)
+            ]
+        );
     }
 
     proptest! {

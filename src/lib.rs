@@ -4,8 +4,9 @@
 //!
 //! ```text
 //! bytes --sensor--> counts --unit::acquire--> Sample --packet--> 156 bytes -> telemetry, umbilical, recorder
-//!                   gyro counts --increments--> rotation increments --derived--> derived frame
-//! packets --flight_log--> pages --nand--> chip
+//!                   gyro counts --increments--> rotation increments
+//! Sample, increments --estimate--> vectors, health, attitude --derived--> derived frame
+//! packets, attitude --flight_log--> pages --nand--> chip
 //! umbilical bytes --command--> Command --mode--> Mode, Task
 //! ```
 //!
@@ -30,6 +31,7 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod estimate;
 pub mod faults;
 pub mod flight_log;
 pub mod geometry;

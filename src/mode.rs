@@ -65,6 +65,8 @@ pub enum Action {
     Report(Command),
     /// Run the sensors' self-test.
     SelfTest,
+    /// Take, use or read a calibration set.
+    Calibration(Command),
 }
 
 /// Why a command was refused.
@@ -163,6 +165,9 @@ impl State {
             }),
             Command::Stop => self.start(Task::Idle),
             Command::SelfTest => self.only_in(Mode::Wait, |_| Verdict::Done(Action::SelfTest)),
+            Command::SetWord { .. } | Command::LoadSet | Command::ReadSet => {
+                self.only_in(Mode::Wait, |_| Verdict::Done(Action::Calibration(command)))
+            }
         }
     }
 
@@ -247,6 +252,7 @@ mod tests {
     fn deeds() -> Vec<Vec<u8>> {
         let once = COMMANDS.iter().map(|entry| match entry.command {
             Command::DumpRange { .. } => b"G_LR000000000010".to_vec(),
+            Command::SetWord { .. } => b"G_CW00040000A040".to_vec(),
             _ => entry.word.to_vec(),
         });
         once.chain([b"G_MVG_MV".to_vec(), b"G_MEG_ME".to_vec(), b"G_MAG_CA".to_vec()])
@@ -376,7 +382,16 @@ mod tests {
             Verdict::Refused(Refusal::Mode(Mode::Flight))
         );
         let mut flying = FLYING;
-        for command in [Command::SendPackets, Command::Dump, Command::Stop, Command::SelfTest] {
+        let place = 0;
+        for command in [
+            Command::SendPackets,
+            Command::Dump,
+            Command::Stop,
+            Command::SelfTest,
+            Command::SetWord { place, bytes: [0; 4] },
+            Command::LoadSet,
+            Command::ReadSet,
+        ] {
             assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
         }
         assert_eq!(flying.command(Command::Record, 0), Verdict::Done(Action::None));

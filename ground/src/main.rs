@@ -21,7 +21,9 @@ enum Command {
     Recover(recorder::recover::Arguments),
     Allan(bench::allan::Arguments),
     Calibrate(bench::calibrate::Arguments),
+    Calibration(bench::calibration::Arguments),
     Design(bench::design::command::Arguments),
+    Report(bench::reproduction::Arguments),
 }
 
 /// Finds what the twin of a unit lacks
@@ -66,7 +68,9 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Recover(arguments) => recorder::recover::run(&arguments)?,
         Command::Allan(arguments) => bench::allan::run(&arguments)?,
         Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
+        Command::Calibration(arguments) => bench::calibration::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
+        Command::Report(arguments) => bench::reproduction::run(&arguments)?,
     }
     Ok(())
 }

@@ -111,3 +111,71 @@ fn every_sensor_passes_its_self_test_and_packets_go_on() {
     assert!(flown.replied("G_AT done: 16 of 16 passed"), "{:#?}", flown.replies());
     assert!(flown.second(11).iter().all(|reading| reading.errors.0 == 0));
 }
+
+/// A calibration set as the words that send it.
+fn words(set: &emems::calibration::Set) -> Vec<u8> {
+    let bytes = set.encode();
+    let word = |(place, bytes): (usize, &[u8; 4])| format!("G_CW{place:04X}{:08X}", u32::from_be_bytes(*bytes));
+    bytes
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .enumerate()
+        .flat_map(|word_at| word(word_at).into_bytes())
+        .collect()
+}
+
+/// The set the unit says it uses.
+fn read_back(flown: &Flown) -> Vec<u8> {
+    let replies = flown.replies();
+    let hex: String = replies
+        .iter()
+        .filter_map(|line| line.strip_prefix("G_CR "))
+        .filter_map(|line| line.split(' ').nth(1))
+        .collect();
+    let byte = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).expect("hexadecimal");
+    (0..hex.len()).step_by(2).map(byte).collect()
+}
+
+#[test]
+fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
+    let settings = emems::unit::Settings::NOMINAL;
+    let nominal = emems::calibration::Set::nominal(emems::calibration::Ranges::of(&settings));
+    let mut own = nominal;
+    own.identity.set = 5;
+    own.gyro[2].bias_counts = -12.5;
+    let sent = words(&own);
+    let good = still().say(S, &sent).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
+    assert!(good.replied("G_CL ok: set 5 of unit 0"), "{:?}", good.replies());
+    assert_eq!(read_back(&good), own.encode());
+    assert_eq!(good.second(5).len(), 5, "packets go on");
+
+    let mut spoilt = sent.clone();
+    spoilt[16 * 40 + 10] ^= 1;
+    let mut foreign = own;
+    foreign.identity.unit = 9;
+    for (words, why) in [
+        (&sent[16..], "G_CL no: 1 words missing, the first at 0000"),
+        (&spoilt[..], "G_CL no: checksum"),
+        (&words(&foreign)[..], "G_CL no: of unit 9, this is unit 0"),
+    ] {
+        let flown = still().say(S, words).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
+        assert!(flown.replied(why), "{why}: {:?}", flown.replies());
+        assert_eq!(read_back(&flown), nominal.encode(), "{why}");
+    }
+
+    let flying = still()
+        .say(S, b"G_MV")
+        .say(S + 100 * MS, b"G_MV")
+        .say(2 * S, &sent)
+        .say(4 * S, b"G_CL")
+        .say(5 * S, b"G_MEG_ME")
+        .say(6 * S, b"G_CLG_CR")
+        .fly(8 * S);
+    assert!(flying.replied("G_CL no: only in WAIT"), "{:?}", flying.replies());
+    assert!(
+        flying.replied("G_CL no: 284 words missing"),
+        "nothing was taken in FLIGHT"
+    );
+    assert_eq!(read_back(&flying), nominal.encode());
+}

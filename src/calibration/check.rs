@@ -96,7 +96,12 @@ impl fmt::Display for Refusal {
             Refusal::Uncertainty => write!(f, "uncertainty or place out of range"),
             Refusal::NotUnit(channel) => write!(f, "{channel}: axis is not of length 1"),
             Refusal::IllConditioned(sensor, condition) => {
-                write!(f, "{sensor}: condition {condition:.0}, its axes do not span space")
+                // As a whole number: formatting f32 costs the image kilobytes.
+                write!(
+                    f,
+                    "{sensor}: condition {}, its axes do not span space",
+                    *condition as u32
+                )
             }
             Refusal::Direction(channel) => write!(f, "{channel}: over 10 deg from nominal: exchanged or reversed?"),
             Refusal::Scale(channel) => write!(f, "{channel}: scale not within half to twice nominal"),

@@ -15,7 +15,7 @@
 //! | 220-231 | 3 x f32: gyro bias in b [rad/s] | words, so that a log is read without this page |
 //! | 232-243 | 6 x upper half of an f32: deviation of attitude [rad] and bias [rad/s] | |
 //! | 244-247 | health | |
-//! | 248-251 | reserved, zero | |
+//! | 248-251 | health of the sensors; zero without an attitude | zero |
 //! | 252-255 | CRC-32 (ISO-HDLC) of bytes 0 to 251 | the same |
 //!
 //! The key is never used twice, so a record that turns up again is the same record. Refuses what the checksum does not
@@ -27,6 +27,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 
 use crate::{
     derived::Health,
+    faults::SensorHealth,
     packet::PACKET_BYTES,
     sample::{NO_SLOT, SENSOR_COUNT},
 };
@@ -42,7 +43,7 @@ pub type RecordBytes = [u8; RECORD_BYTES];
 
 /// What a packet record holds, in words, in every boot header: whoever finds the chip needs no other document.
 pub const DESCRIPTION: &str = "e-MEMS log 1 LE: seq4@4 boot4@8 epoch2@12 flags2@14 us8@16 packet156@24 \
-slots16xu16@180(4us) q4xi16@212/32767 bias3xf32@220 sigma6xbf16@232 health@244 crc32@252";
+slots16xu16@180(4us) q4xi16@212/32767 bias3xf32@220 sigma6xbf16@232 health@244 sensors@248 crc32@252";
 
 const PACKET: u8 = 1;
 const HEADER: u8 = 2;
@@ -69,6 +70,7 @@ mod at {
     pub const BIAS: usize = 220;
     pub const SIGMA: usize = 232;
     pub const HEALTH: usize = 244;
+    pub const SENSORS: usize = 248;
     pub const FIRMWARE: usize = 24;
     pub const UNIT: usize = 40;
     pub const CALIBRATION: usize = 56;
@@ -98,6 +100,8 @@ pub struct Estimate {
     pub bias_b: [f32; 3],
     /// Standard deviations: attitude about b's axes [rad], then bias [rad/s]; kept to 8 bits.
     pub sigma: [f32; 6],
+    /// Which axes were not used, and what is not isolable.
+    pub sensors: SensorHealth,
 }
 
 /// What is kept of one cycle.
@@ -212,6 +216,7 @@ pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
             let upper = (value.to_bits() >> 16) as u16;
             put(&mut bytes, at::SIGMA + 2 * axis, &upper.to_le_bytes());
         }
+        put(&mut bytes, at::SENSORS, &estimate.sensors.0.to_le_bytes());
     }
     put(&mut bytes, at::HEALTH, &entry.health.0.to_le_bytes());
     seal(&mut bytes);
@@ -290,6 +295,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
                 sigma: core::array::from_fn(|axis| {
                     f32::from_bits(u32::from(u16::from_le_bytes(take(bytes, at::SIGMA + 2 * axis))) << 16)
                 }),
+                sensors: SensorHealth(u32::from_le_bytes(take(bytes, at::SENSORS))),
             }),
         }),
         HEADER => Content::Header(BootHeader {

@@ -14,6 +14,7 @@ use super::{
 use crate::{
     board::Board,
     derived::Health,
+    estimate::Estimate,
     flight_log::{
         FlightLog, LogError,
         record::{self, BootHeader, Entry, Key, Name},
@@ -33,7 +34,7 @@ const RETRY_MS: u64 = 2_000;
 
 /// Serves the recorder for ever.
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand) {
-    let Some(mut cycles) = shared.cycle_reader() else {
+    let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         return;
     };
     let mut recorder = Recorder {
@@ -49,9 +50,15 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand) {
         shared.recorder.set(recorder.log.status());
         let next = shared
             .clock
-            .within(Duration::from_millis(wait_ms), cycles.next_message_pure());
-        if let Ok(cycle) = votes.waiting(Voter::Record, next).await {
-            recorder.take(&cycle).await;
+            .within(Duration::from_millis(wait_ms), frames.next_message_pure());
+        let Ok(frame) = votes.waiting(Voter::Record, next).await else {
+            continue;
+        };
+        // A cycle comes before what is derived from it, so it is there unless this part was too late for it.
+        while let Some(cycle) = cycles.try_next_message_pure() {
+            if cycle.sample.start_us == frame.start_us {
+                recorder.take(&cycle, &frame.estimate).await;
+            }
         }
     }
 }
@@ -108,7 +115,7 @@ impl<N: Nand> Recorder<'_, N> {
         }
     }
 
-    async fn take(&mut self, cycle: &Cycle) {
+    async fn take(&mut self, cycle: &Cycle, estimate: &Estimate) {
         let (flight, recording) = {
             let state = self.shared.state.borrow();
             (state.mode == Mode::Flight, state.recording)
@@ -130,7 +137,7 @@ impl<N: Nand> Recorder<'_, N> {
             slots_us: sample.slots_us,
             flight,
             health: cycle.health.with(errors).with(Health::RECORDING),
-            estimate: None,
+            estimate: estimate.kept(),
         };
         match self.log.append(&entry).await {
             Ok(_) => self.shared.recorder_refused.set(false),

@@ -13,8 +13,9 @@ use heapless::String;
 use super::{Settings, clock::Clock};
 use crate::{
     board::{Oscillator, ResetCause, StackUse},
+    calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
-    derived::{Derived, Health},
+    derived::{DERIVED_BYTES, Derived, Health},
     flight_log::{self, LogError, record::RecordBytes},
     increments::{Increments, Integrator},
     mode::State,
@@ -41,13 +42,17 @@ pub struct Cycle {
 /// Two: a reader may be busy with one while the next arrives. A reader that is later than that loses the oldest.
 const QUEUED: usize = 2;
 
+/// Of both lines, 8N1.
+const LINE_BAUD: u64 = 115_200;
+const BITS_PER_BYTE: u64 = 10;
+
 type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
-type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 2, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A reader of the cycles.
 pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
 /// A reader of the derived frames.
-pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>;
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A line for the console, without its end.
 pub type Line = String<128>;
@@ -106,6 +111,10 @@ pub struct Shared {
     pub errors: Cell<Errors>,
     /// Bytes lost or passed over on the umbilical.
     pub umbilical_noise: Cell<u32>,
+    /// The calibration set in use.
+    pub calibration: RefCell<Set>,
+    /// The one that is being sent.
+    pub arriving: RefCell<Arriving>,
     cycles: Cycles,
     derived: DerivedFrames,
     /// Lines for the console.
@@ -132,6 +141,8 @@ impl Shared {
             testing: Cell::default(),
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
+            calibration: RefCell::new(Set::nominal(Ranges::of(&settings))),
+            arriving: RefCell::default(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
             replies: Channel::new(),
@@ -153,6 +164,17 @@ impl Shared {
     pub fn publish_cycle(&self, cycle: Cycle) {
         self.errors.set(cycle.sample.reading.errors);
         self.cycles.immediate_publisher().publish_immediate(cycle);
+    }
+
+    /// Whether a derived frame is to be sent: they are on, and the line has room for it beside the packets. A unit that is
+    /// too fast for all of them sends as many as there is time for; each stands for itself.
+    pub fn is_wanted(&self, frame: &Derived) -> bool {
+        let line_us = |bytes: usize| (bytes as u64 * BITS_PER_BYTE * 1_000_000).div_ceil(LINE_BAUD);
+        let free_us = (self.settings.period_ms * 1000)
+            .saturating_sub(line_us(PACKET_BYTES))
+            .max(1);
+        let every = line_us(DERIVED_BYTES).div_ceil(free_us);
+        self.state.borrow().derived && u64::from(frame.counter).is_multiple_of(every)
     }
 
     /// Gives a derived frame to every reader.

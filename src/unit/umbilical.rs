@@ -6,6 +6,7 @@ use embassy_futures::select::{Either4, select4};
 use embedded_io_async::Read;
 
 use super::{
+    calibration,
     clock::now,
     shared::Shared,
     telemetry::write,
@@ -43,10 +44,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
             frames.next_message_pure(),
         );
         let next = votes.waiting(Voter::UmbilicalSend, next).await;
-        let (sending, derived_on) = {
-            let state = shared.state.borrow();
-            (state.task == Task::SendPackets, state.derived)
-        };
+        let sending = shared.state.borrow().task == Task::SendPackets;
         match next {
             Either4::First(reply) => {
                 write(&shared.clock, &mut line, b">").await;
@@ -60,7 +58,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
                 write(&shared.clock, &mut line, &dump::encode(page, &record)).await;
             }
             Either4::Third(cycle) if sending => write(&shared.clock, &mut line, &cycle.packet).await,
-            Either4::Fourth(frame) if sending && derived_on => {
+            Either4::Fourth(frame) if sending && shared.is_wanted(&frame) => {
                 write(&shared.clock, &mut line, &derived::encode(&frame)).await
             }
             _ => {}
@@ -124,6 +122,7 @@ async fn answer(shared: &Shared, heard: Heard) {
                 "{word} ok: sixteen sensors, about 5 s; keep the unit still"
             ));
         }
+        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, command).await,
         Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));

@@ -79,38 +79,45 @@ fn cuts_at_random_instants_lose_no_record_and_end_in_flight() {
         .ok()
         .and_then(|text| text.parse().ok())
         .unwrap_or(CUTS);
-    let mut cut = 0;
-    for run in 0..cuts.div_ceil(CUTS_A_RUN) {
-        let mut at = 1_200 * MS;
-        let mut faults = Vec::new();
-        for number in 0..CUTS_A_RUN {
-            // A draw from the run's number, so that a failing run is flown again by it.
-            let draw = (run * CUTS_A_RUN + number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
-            at += BETWEEN + draw % (200 * MS);
-            faults.push(Scheduled {
-                at,
-                fault: Fault::PowerCut(draw as usize % 9),
-            });
+    let runs = cuts.div_ceil(CUTS_A_RUN);
+    // A run is minutes of one core: odd and even ones side by side.
+    std::thread::scope(|scope| {
+        for first in 0..2 {
+            scope.spawn(move || (first..runs).step_by(2).for_each(cut_again_and_again));
         }
-        let ends = at + 1_000 * MS;
-        let (tape, logged, chip) = flown(&faults, ends);
-        assert_eq!(chip.breaks, [], "run {run}");
-        let kept: BTreeSet<_> = logged.values().map(|entry| entry.packet).collect();
-        let boots: BTreeSet<u32> = logged.keys().map(|key| key.boot).collect();
-        assert_eq!(
-            boots.len() as u64,
-            CUTS_A_RUN + 1,
-            "run {run}: back in FLIGHT and recording each time"
-        );
-        for (sent, reading) in tape.packets().iter().filter(|(sent, _)| *sent > 1_000 * MS) {
-            let excused = faults.iter().any(|fault| (fault.at..fault.at + BACK).contains(sent));
-            let struck = faults.iter().any(|fault| (*sent..*sent + 5 * MS).contains(&fault.at));
-            assert!(
-                excused || struck || kept.contains(&packet::encode(reading)),
-                "run {run}: sent at {sent}, not kept"
-            );
-        }
-        cut += CUTS_A_RUN;
+    });
+    println!("{} cuts", runs * CUTS_A_RUN);
+}
+
+/// One flight with [`CUTS_A_RUN`] cuts.
+fn cut_again_and_again(run: u64) {
+    let mut at = 1_200 * MS;
+    let mut faults = Vec::new();
+    for number in 0..CUTS_A_RUN {
+        // A draw from the run's number, so that a failing run is flown again by it.
+        let draw = (run * CUTS_A_RUN + number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+        at += BETWEEN + draw % (200 * MS);
+        faults.push(Scheduled {
+            at,
+            fault: Fault::PowerCut(draw as usize % 9),
+        });
     }
-    println!("{cut} cuts");
+    let ends = at + 1_000 * MS;
+    let (tape, logged, chip) = flown(&faults, ends);
+    assert_eq!(chip.breaks, [], "run {run}");
+    let kept: BTreeSet<_> = logged.values().map(|entry| entry.packet).collect();
+    let boots: BTreeSet<u32> = logged.keys().map(|key| key.boot).collect();
+    assert_eq!(
+        boots.len() as u64,
+        CUTS_A_RUN + 1,
+        "run {run}: back in FLIGHT and recording each time"
+    );
+    for (sent, reading) in tape.packets().iter().filter(|(sent, _)| *sent > 1_000 * MS) {
+        let excused = faults.iter().any(|fault| (fault.at..fault.at + BACK).contains(sent));
+        let struck = faults.iter().any(|fault| (*sent..*sent + 5 * MS).contains(&fault.at));
+        assert!(
+            excused || struck || kept.contains(&packet::encode(reading)),
+            "run {run}: sent at {sent}, not kept"
+        );
+    }
 }

@@ -55,7 +55,7 @@ impl Steps {
         match item {
             Item::Derived { derived, .. } => {
                 let of_this = self.packet.is_some_and(|packet| packet.counter == derived.counter);
-                *(if of_this { &mut self.derived } else { &mut self.ahead }) = Some(*derived);
+                *(if of_this { &mut self.derived } else { &mut self.ahead }) = Some(**derived);
                 None
             }
             Item::Packet { reading, .. } => {
@@ -214,6 +214,8 @@ mod tests {
                 covered_us: 190_000,
                 ..Integrator::new(1.0).take()
             },
+            estimate: emems::estimate::Estimate::NOTHING,
+            estimate_us: 0,
         };
         let packet = |counter| Item::Packet {
             offset: 0,
@@ -221,7 +223,7 @@ mod tests {
         };
         let frame = |counter| Item::Derived {
             offset: 0,
-            derived: derived(counter),
+            derived: Box::new(derived(counter)),
         };
         let check = |items: [Item; 4]| {
             let mut steps = Steps::default();

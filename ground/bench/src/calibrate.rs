@@ -1,11 +1,10 @@
 //! `ground calibrate`: from a table or a raw log to a calibration set, with a report.
 //!
 //! In: files and flags. Out: a report on standard output, and where asked for a set (`--set`, merged into what is there),
-//! a page (`--page`) or a unit file for the twin. The subcommands do the work; what they share is here.
+//! or a page (`--page`). The subcommands do the work; what they share is here.
 
 mod controlled;
 mod ellipsoid;
-mod sets;
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +16,7 @@ use crate::{
     turntable::{Mount, Site},
 };
 
-/// Calibrates sensors from bench data, compares calibrations, hands them to the twin
+/// Calibrates sensors from bench data, with uncertainties and what the test could not see
 #[derive(Clone, Debug, clap::Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -30,8 +29,6 @@ enum What {
     MultiPosition(controlled::MultiPosition),
     Ellipsoid(ellipsoid::Arguments),
     Drift(crate::drift::Arguments),
-    Diff(sets::Diff),
-    Unit(sets::Unit),
 }
 
 /// Why a calibration failed.
@@ -60,7 +57,7 @@ pub enum CalibrateError {
 }
 
 impl CalibrateError {
-    fn of(file: &Path) -> impl Fn(String) -> CalibrateError {
+    pub(crate) fn of(file: &Path) -> impl Fn(String) -> CalibrateError {
         move |why| CalibrateError::File { file: file.into(), why }
     }
 }
@@ -75,9 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
         What::RateTable(arguments) => controlled::rate_table(arguments),
         What::MultiPosition(arguments) => controlled::multi_position(arguments),
         What::Ellipsoid(arguments) => ellipsoid::run(arguments),
-        What::Drift(arguments) => Ok(crate::drift::run(arguments).map(|()| true)?),
-        What::Diff(arguments) => sets::diff(arguments),
-        What::Unit(arguments) => sets::unit(arguments).map(|()| true),
+        What::Drift(arguments) => Ok(crate::drift::run(arguments)?),
     }?;
     if good { Ok(()) } else { Err(CalibrateError::NotGood) }
 }
@@ -91,14 +86,28 @@ struct Output {
     /// Write a page with residuals to this file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
-    /// Part and serial number, kept in the set
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    part: String,
+    /// Part and serial number, kept in the set: TEXT for every channel, or CHANNEL=TEXT, as often as needed
+    #[arg(long, value_name = "[CHANNEL=]TEXT")]
+    part: Vec<String>,
+    /// Name of the unit, kept in the set
+    #[arg(long, value_name = "TEXT", requires = "set")]
+    unit_name: Option<String>,
+    /// Serial number of the unit, which refuses sets of others
+    #[arg(long, value_name = "NUMBER", requires = "set")]
+    serial: Option<u32>,
+    /// Number of the set, to be counted up from calibration to calibration
+    #[arg(long, value_name = "NUMBER", requires = "set")]
+    number: Option<u32>,
 }
 
 impl Output {
     /// Prints, and writes what was asked for.
-    fn finish(&self, report: &Report, entries: Vec<Entry>, files: &[(&Path, &[u8])]) -> Result<bool, CalibrateError> {
+    fn finish(
+        &self,
+        report: &Report,
+        mut entries: Vec<Entry>,
+        files: &[(&Path, &[u8])],
+    ) -> Result<bool, CalibrateError> {
         print!("{}", report.text());
         if let Some(path) = &self.set {
             let fail = CalibrateError::of(path);
@@ -107,8 +116,14 @@ impl Output {
             } else {
                 Set::new("unit")
             };
+            set.unit = self.unit_name.clone().unwrap_or(set.unit);
+            set.serial = self.serial.unwrap_or(set.serial);
+            set.number = self.number.unwrap_or(set.number);
             for (file, bytes) in files {
                 set.from_file(file, bytes);
+            }
+            for entry in &mut entries {
+                entry.part = part_of(&self.part, &entry.name);
             }
             set.merge(entries);
             let text = set.text().map_err(|error| fail(error.to_string()))?;
@@ -124,6 +139,15 @@ impl Output {
         }
         Ok(report.wrong.is_empty())
     }
+}
+
+/// What `--part` says of a channel: its own word before that for all.
+fn part_of(parts: &[String], channel: &str) -> String {
+    let own = parts
+        .iter()
+        .find_map(|part| part.strip_prefix(channel)?.strip_prefix('='));
+    let all = parts.iter().find(|part| !part.contains('=')).map(String::as_str);
+    own.or(all).unwrap_or_default().into()
 }
 
 /// The table the unit stood on.
@@ -173,10 +197,12 @@ pub(crate) fn read_nominal(path: &Path) -> Result<Nominal, CalibrateError> {
     Nominal::parse(&read_text(path)?).map_err(CalibrateError::of(path))
 }
 
-fn read_set(path: &Path) -> Result<Set, CalibrateError> {
+/// Reads a calibration set.
+pub(crate) fn read_set(path: &Path) -> Result<Set, CalibrateError> {
     Set::parse(&read_text(path)?).map_err(|error| CalibrateError::of(path)(error.to_string()))
 }
 
-fn read_text(path: &Path) -> Result<String, CalibrateError> {
+/// Reads a file that must be text.
+pub(crate) fn read_text(path: &Path) -> Result<String, CalibrateError> {
     String::from_utf8(table::bytes(path)?).map_err(|error| CalibrateError::of(path)(error.to_string()))
 }

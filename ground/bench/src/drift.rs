@@ -87,11 +87,11 @@ pub enum DriftError {
     },
 }
 
-/// Evaluates the tests given.
+/// Evaluates the tests given; `false` if one says that something is wrong.
 ///
 /// # Errors
 /// When a table cannot be read, a test is not conclusive, or the report not written.
-pub fn run(arguments: &Arguments) -> Result<(), DriftError> {
+pub fn run(arguments: &Arguments) -> Result<bool, DriftError> {
     let mut sections = Vec::new();
     if let (Some(file), Some(latitude_deg)) = (&arguments.positions, arguments.latitude_deg) {
         let rows = columns(file, ["inner_deg", "middle_deg", "output"])?;
@@ -132,6 +132,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DriftError> {
     for section in &sections {
         print!("{}", section.text());
     }
+    let good = !sections.iter().any(Section::is_wrong);
     let blocks: Vec<chart::Block> = sections.into_iter().flat_map(Section::into_blocks).collect();
     let page = arguments.out.join("index.html");
     let written = fs::create_dir_all(&arguments.out).and_then(|()| {
@@ -145,7 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DriftError> {
         error,
     })?;
     println!("{}", page.display());
-    Ok(())
+    Ok(good)
 }
 
 fn rest(file: &Path) -> Result<Section, DriftError> {

@@ -2,6 +2,7 @@
 
 pub mod allan;
 pub mod calibrate;
+pub mod calibration;
 pub mod consensus;
 pub mod controlled;
 pub mod coverage;
@@ -14,6 +15,7 @@ pub mod least_squares;
 pub mod log;
 pub mod nominal;
 pub mod report;
+pub mod reproduction;
 pub mod response;
 pub mod set;
 pub mod spectrum;

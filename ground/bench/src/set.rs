@@ -2,12 +2,14 @@
 //!
 //! TOML, a `[[channel]]` each, so that two sets differ line by line under review: parameters in counts and SI, covariance,
 //! temperatures, part identities, and the SHA-256 of every file it came from. Out of calibrations, merged by channel; in
-//! for [`diff`](crate::set::diff), for the twin's [`unit`] and, in single precision, for the unit itself.
+//! for [`diff`](crate::set::diff), for the twin's [`unit`] and, in single precision, for the unit itself ([`image`]).
 //!
 //! Refused: another format, a covariance that is not square or not positive, an axis without length, two channels with
 //! one name.
 
 pub mod diff;
+pub mod image;
+pub mod send;
 pub mod unit;
 
 use std::path::Path;
@@ -28,6 +30,12 @@ pub struct Set {
     pub format: String,
     /// Which unit.
     pub unit: String,
+    /// Serial number of the unit, which refuses sets of others; 0 is that of a unit that was given none.
+    #[serde(default)]
+    pub serial: u32,
+    /// Number of the set, counted up by whoever calibrates.
+    #[serde(default)]
+    pub number: u32,
     /// Files it came from.
     #[serde(default, rename = "source")]
     pub sources: Vec<Source>,
@@ -106,6 +114,8 @@ impl Set {
         Set {
             format: FORMAT.into(),
             unit: unit.into(),
+            serial: 0,
+            number: 0,
             sources: Vec::new(),
             channels: Vec::new(),
         }
@@ -165,7 +175,7 @@ impl Set {
 
 impl Entry {
     /// Channels of a calibration with controlled inputs.
-    pub fn controlled(calibration: &Calibration, kind: Kind, part: &str) -> Vec<Entry> {
+    pub fn controlled(calibration: &Calibration, kind: Kind) -> Vec<Entry> {
         let (sensor, method) = match kind {
             Kind::Rate => ("gyro", "rate-table"),
             Kind::Force => ("accelerometer", "multi-position"),
@@ -176,7 +186,7 @@ impl Entry {
             Entry {
                 name: channel.name.clone(),
                 sensor: sensor.into(),
-                part: part.into(),
+                part: String::new(),
                 method: method.into(),
                 sensitivity_b: fit.sensitivity_b.into(),
                 bias_counts: fit.bias.clone(),

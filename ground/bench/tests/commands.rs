@@ -6,6 +6,7 @@ use std::path::Path;
 
 use bench::{
     calibrate::{self, CalibrateError},
+    calibration,
     design::command as design,
     set::Set,
 };
@@ -20,6 +21,10 @@ fn parse<T: Args + FromArgMatches>(words: &str) -> T {
 
 fn calibrate(words: &str) -> Result<(), CalibrateError> {
     calibrate::run(&parse(words))
+}
+
+fn calibration(words: &str) -> Result<(), CalibrateError> {
+    calibration::run(&parse(words))
 }
 
 fn write(place: &Path, name: &str, bytes: &[u8]) -> String {
@@ -86,10 +91,10 @@ fn plan_run_calibrate_compare_and_hand_to_the_twin() {
         ("monday.csv", 64)
     );
     // Three counts of bias are many sigmas, so comparing says so; comparing with itself does not.
-    let differs = calibrate(&format!("diff {} {}", path("monday.toml"), path("friday.toml")));
+    let differs = calibration(&format!("diff {} {}", path("monday.toml"), path("friday.toml")));
     assert!(matches!(differs, Err(CalibrateError::NotGood)));
-    calibrate(&format!("diff {0} {0}", path("monday.toml"))).expect("the same");
-    calibrate(&format!(
+    calibration(&format!("diff {0} {0}", path("monday.toml"))).expect("the same");
+    calibration(&format!(
         "unit {} --unit {unit} --out {}",
         path("monday.toml"),
         path("twin.toml")

@@ -1,7 +1,8 @@
-//! Diagnoses the cases given, a few lines each, with the seconds each took: for looking at many at once.
+//! Diagnoses the cases given, a few lines each, with the seconds each took, and leaves a verdict.json in the folder that
+//! `VERDICTS` names, one folder a case: for looking at many at once.
 use std::time::Instant;
 
-use gap::{case::Subject, diagnose::diagnose};
+use gap::{case::Subject, diagnose::diagnose, verdict::Verdict};
 
 fn main() {
     for case in std::env::args().skip(1) {
@@ -14,6 +15,17 @@ fn main() {
             }
         };
         let d = diagnose(&subject, &[], &|_, _| {});
+        if let Ok(folder) = std::env::var("VERDICTS") {
+            let name = std::path::Path::new(&case).file_name().unwrap_or_default();
+            let folder = std::path::Path::new(&folder).join(name);
+            let verdict = Verdict::new(&subject, &d, String::new());
+            let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
+            let written =
+                std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(folder.join("verdict.json"), text));
+            if let Err(error) = written {
+                println!("{}: {error}", folder.display());
+            }
+        }
         println!(
             "== {case} {:.1?} gap {:.3} gate p {:.3} ({:.1}) none {:.3} left p {:.3} ({:.1}) shrink {:.4}/{:.4}/{:.4} {:.1} % {:.0?} withdrawn {:?}",
             t.elapsed(),

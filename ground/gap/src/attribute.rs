@@ -259,6 +259,7 @@ fn bounded(problem: &Problem, library: &mut Library, set: Vec<usize>, best: Refi
         .last()
         .copied()
         .filter(|last| !library.hypotheses[*last].places.is_empty())
+        .filter(|last| onset::may_pass(library.hypotheses[*last].effect()))
     else {
         return (set, best);
     };

@@ -15,7 +15,8 @@ use crate::{
     scatter::Scatter,
 };
 
-/// Evidence is raised to one over this: see [`crate::evidence`]. Fitted on simulated logs with effects of the library.
+/// Evidence is raised to one over this: see [`crate::evidence`]. A guess, not yet fitted:
+/// `TRIALS.md` says how far it holds.
 pub const TEMPERATURE: f64 = 2.0;
 
 /// Prior sigmas beyond which a parameter more likely stands for something else (gap method, pitfall 19).
@@ -99,15 +100,9 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
                 .filter(|(_, energy)| *energy >= NAMED_SHARE * total)
                 .map(|(channel, _)| *channel)
                 .collect(),
-            probability: by_effect(library, &chosen.rivals)
-                .into_iter()
-                .filter(|(name, _)| *name == own)
-                .map(|(_, p)| p)
-                .sum(),
+            probability: probability(library, chosen),
             gain: chosen.gain,
-            is_suspicious: parameters
-                .iter()
-                .any(|sized| sized.value.abs() > SUSPICIOUS * sized.parameter.prior_sigma),
+            is_suspicious: oversize(&chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
             parameters,
             share: total,
             when: match hypothesis.span {
@@ -159,6 +154,45 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
     }
 }
 
+/// Largest parameter in prior sigmas.
+fn oversize(theta: &nalgebra::DVector<f64>, parameters: &[Parameter]) -> f64 {
+    let sizes = theta
+        .iter()
+        .zip(parameters)
+        .map(|(value, parameter)| value.abs() / parameter.prior_sigma);
+    sizes.fold(0.0, f64::max)
+}
+
+/// Probability of a chosen effect at any place, against all others and nothing. Beyond [`SUSPICIOUS`] prior sigmas it is a
+/// proxy for something else at odds that rise with the square of its size: evidence cannot tell, for the effect that is
+/// meant is in no list.
+pub fn probability(library: &Library, chosen: &Chosen) -> f64 {
+    let hypothesis = &library.hypotheses[chosen.hypothesis];
+    let own: f64 = by_effect(library, &chosen.rivals)
+        .into_iter()
+        .filter(|(name, _)| *name == hypothesis.effect())
+        .map(|(_, p)| p)
+        .sum();
+    own * itself(oversize(&chosen.theta, &hypothesis.parameters))
+}
+
+/// Probability that a chosen effect or one of those it cannot be told from is there, whichever it is.
+pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
+    let hypothesis = &library.hypotheses[chosen.hypothesis];
+    let any: f64 = by_effect(library, &chosen.rivals).into_iter().map(|(_, p)| p).sum();
+    any * itself(oversize(&chosen.theta, &hypothesis.parameters))
+}
+
+/// Probability that an effect of so many prior sigmas is itself and no proxy.
+fn itself(size: f64) -> f64 {
+    let excess = size / SUSPICIOUS;
+    if excess > 1.0 {
+        1.0 / (1.0 + excess * excess)
+    } else {
+        1.0
+    }
+}
+
 /// Energies to shares, most first.
 pub fn share_out(causes: &mut [Cause]) {
     let total: f64 = causes.iter().map(|cause| cause.share).sum();
@@ -184,20 +218,22 @@ pub fn by_effect(library: &Library, rivals: &[(usize, f64)]) -> Vec<(&'static st
     sums
 }
 
-/// Effects that are not causes, with the probability that one of the causes is really they.
-pub fn alternatives(library: &Library, found: &Attribution) -> Vec<(&'static str, f64)> {
-    let chosen: Vec<&str> = found
-        .chosen
+/// Effects that are not causes, with the probability that one of the causes is really they, or, of a refused one, that it
+/// is there after all.
+pub fn alternatives(library: &Library, found: &Attribution, refused: &[Chosen]) -> Vec<(&'static str, f64)> {
+    let name = |chosen: &Chosen| library.hypotheses[chosen.hypothesis].effect();
+    let causes: Vec<&str> = found.chosen.iter().map(name).collect();
+    let own = refused
         .iter()
-        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
-        .collect();
+        .map(|refused| (name(refused), probability(library, refused)));
+    let rivals = found.chosen.iter().chain(refused).flat_map(|chosen| {
+        let mut rivals = by_effect(library, &chosen.rivals);
+        rivals.retain(|(rival, _)| *rival != name(chosen));
+        rivals
+    });
     let mut sums: Vec<(&'static str, f64)> = Vec::new();
-    for (name, share) in found
-        .chosen
-        .iter()
-        .flat_map(|chosen| by_effect(library, &chosen.rivals))
-    {
-        if chosen.contains(&name) || share < 0.005 {
+    for (name, share) in own.chain(rivals) {
+        if causes.contains(&name) || share < 0.005 {
             continue;
         }
         match sums.iter_mut().find(|(known, _)| *known == name) {
@@ -223,4 +259,16 @@ pub fn alone(library: &Library, found: &Attribution) -> Vec<(String, f64)> {
     }
     best.sort_by(|one, other| other.1.total_cmp(&one.1));
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_beyond_five_prior_sigmas_is_never_named() {
+        assert_eq!(itself(4.9), 1.0);
+        assert!(itself(5.1) < 0.5);
+        assert!(itself(50.0) < 0.01);
+    }
 }

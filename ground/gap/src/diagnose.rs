@@ -6,9 +6,9 @@
 use nalgebra::DVector;
 
 use crate::{
-    attribute::attribute,
+    attribute::{Chosen, attribute},
     case::Subject,
-    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, share_out},
+    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, probability_of_any, share_out},
     confusion,
     held::{Finished, Shrink},
     leftover::{self, Leftover, STRETCHES, View},
@@ -16,11 +16,14 @@ use crate::{
     model::Model,
     problem::Problem,
     scatter::{Scatter, scatters},
-    sight,
+    sight, temper,
 };
 
 /// [nats] an effect on the scatter must gain.
 const SCATTER_MARGIN: f64 = 3.0;
+
+/// Probability from which an effect is named.
+const SAID: f64 = 0.5;
 
 /// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
 const MOST_CAUSES: usize = 3;
@@ -88,28 +91,54 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
-    let mut model = Model::around(&problem, &library, found.model(&library));
-    let mut scatter = best_scatter(&problem, &model, withheld);
+    let first = Model::around(&problem, &library, found.model(&library));
+    let mut scatter = best_scatter(&problem, &first, withheld);
     let mut sigmas_after = problem.sigmas.clone();
-    if let Some(first) = &scatter {
-        // The noise as found, then everything else anew, then the noise once more.
-        let factors = factors(&problem, &model, first);
-        problem.reweigh(&factors);
-        library.products.reweigh(
-            &problem,
-            &factors.iter().map(|factor| 1.0 / factor).collect::<Vec<f64>>(),
-        );
+    let loud = scatter.as_ref().map_or_else(
+        || vec![1.0; problem.frames.len()],
+        |scatter| factors(&problem, &first, scatter),
+    );
+    sigmas_after
+        .iter_mut()
+        .zip(&loud)
+        .for_each(|(sigma, factor)| *sigma *= factor);
+    let mut tempered = temper::factors(&first.fitted.rest);
+    tempered
+        .iter_mut()
+        .zip(&loud)
+        .filter(|(_, loud)| **loud != 1.0)
+        .for_each(|(tempered, _)| *tempered = 1.0);
+    let both: Vec<f64> = loud
+        .iter()
+        .zip(&tempered)
+        .map(|(loud, tempered)| loud * tempered)
+        .collect();
+    if both.iter().any(|factor| *factor != 1.0) {
+        // The noise as found, then everything else anew with it.
+        reweigh(&mut problem, &mut library, &both);
         found = attribute(&problem, &mut library, &|share| progress("search", share));
-        model = Model::around(&problem, &library, found.model(&library));
+    }
+    let sought = distinct(&library, &found.chosen);
+    let (kept, mut refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
+        .into_iter()
+        .partition(|chosen| probability_of_any(&library, chosen) >= SAID);
+    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
+    let is_refused = gains(&refused) > gains(&kept);
+    found.chosen = kept;
+    // What is left is judged with the noise as described, or a misfit would excuse itself.
+    let back: Vec<f64> = tempered.iter().map(|factor| 1.0 / factor).collect();
+    reweigh(&mut problem, &mut library, &back);
+    let model = Model::around(&problem, &library, found.model(&library));
+    if scatter.is_some() {
         scatter = best_scatter(&problem, &model, withheld);
-        sigmas_after
-            .iter_mut()
-            .zip(&factors)
-            .for_each(|(sigma, factor)| *sigma *= factor);
     }
     progress("leftover", 0.0);
     let scattered: Vec<usize> = scatter.iter().flat_map(|scatter| scatter.channels.clone()).collect();
-    let mut left = leftover::judge(&views, &model.joint, &model.fitted, &scattered);
+    let mut left = if found.chosen.is_empty() && scatter.is_none() {
+        gate.clone()
+    } else {
+        leftover::judge(&views, &model.joint, &model.fitted, &scattered)
+    };
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
         .collect();
@@ -127,8 +156,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut withdrawn = Vec::new();
     let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
-    let is_patchwork = found.chosen.len() + usize::from(scatter.is_some()) > MOST_CAUSES;
-    if has_effect && (!is_smaller || is_patchwork) {
+    let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
+    if has_effect && (!is_smaller || is_patchwork || is_refused) {
         withdrawn.extend(
             found
                 .chosen
@@ -136,6 +165,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
                 .map(|chosen| library.hypotheses[chosen.hypothesis].effect()),
         );
         withdrawn.extend(scatter.iter().map(|scatter| scatter.effect.page().name));
+        refused.append(&mut found.chosen);
+        scatter = None;
+    }
+    if found.chosen.is_empty() && scatter.is_none() {
         // Without the effects what is left is all there was.
         left = gate.clone();
         shrink = judge(&quiet.predicted, &problem.sigmas);
@@ -147,14 +180,18 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
     let trust = 1.0 - unknown * (1.0 - explained);
     causes.iter_mut().for_each(|cause| cause.probability *= trust);
+    // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
+    let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
+        causes.into_iter().partition(|cause| cause.probability >= SAID);
     share_out(&mut causes);
-    let mut alternatives = alternatives(&library, &found);
+    let mut alternatives = alternatives(&library, &found, &refused);
+    let trust_in_others = if found.chosen.is_empty() { 1.0 - unknown } else { trust };
     alternatives
         .iter_mut()
-        .for_each(|(_, probability)| *probability *= trust);
-    if !withdrawn.is_empty() {
-        causes.clear();
-    }
+        .for_each(|(_, probability)| *probability *= trust_in_others);
+    alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
+    alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
+    alternatives.dedup_by_key(|(name, _)| *name);
     Diagnosis {
         gap,
         gate,
@@ -168,7 +205,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         known: model
             .components
             .iter()
-            .filter(|_| withdrawn.is_empty())
+            .filter(|_| !causes.is_empty())
             .map(|component| component.active.to_known())
             .collect(),
         rivals: confusion::pair(&library, &found),
@@ -187,6 +224,25 @@ fn root_mean_square(problem: &Problem) -> f64 {
         samples += frame.series.rows.len();
     }
     (energy / samples.max(1) as f64).sqrt()
+}
+
+/// How many effects are chosen: packets lost at three instants are one.
+fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
+    let names: std::collections::BTreeSet<&str> = chosen
+        .iter()
+        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
+        .collect();
+    names.len()
+}
+
+/// Takes the noise of each channel for so many times what it was.
+fn reweigh(problem: &mut Problem, library: &mut Library, factors: &[f64]) {
+    if factors.iter().all(|factor| *factor == 1.0) {
+        return;
+    }
+    problem.reweigh(factors);
+    let inverse: Vec<f64> = factors.iter().map(|factor| 1.0 / factor).collect();
+    library.products.reweigh(problem, &inverse);
 }
 
 fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {

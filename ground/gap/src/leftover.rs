@@ -29,10 +29,10 @@ const BINS: usize = 500;
 const LAGS: usize = 10;
 
 /// Simulated logs: fewest (p then has a floor of 1/101) and most.
-const SIMULATIONS: [usize; 2] = [100, 300];
+const SIMULATIONS: [usize; 2] = [100, 200];
 
 /// Normal numbers drawn in all, so that long logs take bounded time.
-const DRAWS: usize = 100_000_000;
+const DRAWS: usize = 20_000_000;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
 const TAILS: f64 = 10.0;

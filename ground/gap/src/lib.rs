@@ -36,6 +36,7 @@ pub mod refine;
 pub mod regime;
 pub mod scatter;
 pub mod sight;
+pub mod temper;
 pub mod terminal;
 pub mod verdict;
 pub mod windows;

@@ -9,7 +9,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
     effect::Active,
-    predict::{Accuracy, Column, Kind, Twin},
+    predict::{Accuracy, Column, Feel, Kind, Twin},
 };
 
 use crate::{
@@ -22,6 +22,25 @@ use crate::{
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
 /// in it.
 pub const REFERENCE_CORRELATION_S: f64 = 1.0;
+
+/// [s] how well a gyro's instant is known: it converts 256 times a second by its own clock (ADIS16265 data sheet, table 1), so
+/// a reading is up to half a period older or younger than described, and that evenly: a period over the root of 12.
+pub const GYRO_INSTANT_SIGMA_S: f64 = 1.0 / 256.0 / 3.464;
+
+/// What the calibration leaves open in one channel: its own, and the instant of a gyro's conversion.
+pub fn calibration(twin: &Twin, index: usize) -> Vec<Column> {
+    let mut columns = twin.calibration(index);
+    let channel = &twin.unit().channels[index];
+    if channel.sensor == Kind::Gyro {
+        let slope = |feel: &Feel| feel.rate_dot_b.dot(&channel.axis_b);
+        columns.push(Column {
+            name: format!("instant_{}", channel.name),
+            sigma: GYRO_INSTANT_SIGMA_S,
+            entries: vec![(index, twin.feels(index).iter().map(slope).collect())],
+        });
+    }
+    columns
+}
 
 /// An effect in a model: what, how large, and for effects that come and go, when.
 #[derive(Clone, Debug)]
@@ -111,7 +130,7 @@ impl<'a> Problem<'a> {
             };
             sigmas.push(channel.sigma().hypot(reference));
             let weight_sigma = channel.sigma().hypot(reference * alike.sqrt());
-            let columns = twin.calibration(index);
+            let columns = calibration(twin, index);
             let nuisance = DMatrix::from_fn(series.rows.len(), columns.len(), |row, column| {
                 let column = &columns[column];
                 column.entries[0].1[series.rows[row] as usize] * column.sigma / weight_sigma

@@ -47,12 +47,27 @@ fn is_odd(view: &View) -> bool {
 /// would otherwise swallow any effect the library does not have, and be believed.
 const COLOURED: f64 = 0.2;
 
-/// Effects that stand for white noise.
-const WHITE: [&str; 1] = ["noise-level"];
+/// Effects that stand for white noise, and for its outliers.
+const WHITE: [&str; 2] = ["noise-level", "shock"];
+
+/// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
+/// and these must not make the rest of the log look alike.
+const CUT: f64 = 2.0;
+
+/// Median of the absolute value of a standard normal variable.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
 /// Whether neighbouring residuals are alike.
 fn is_coloured(view: &View) -> bool {
-    let rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let mut sizes: Vec<f64> = rest.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return false;
+    }
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let most = (CUT * median / MEDIAN_OF_NORMAL).max(f64::MIN_POSITIVE);
+    rest.iter_mut().for_each(|value| *value = value.clamp(-most, most));
     let energy: f64 = rest.iter().map(|value| value * value).sum();
     let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
     alike > COLOURED * energy

@@ -13,11 +13,12 @@ use emems::{
 };
 use packets::channel::{self, CHANNELS};
 
-/// Names of the estimator's columns: attitude, gyro bias [rad/s], deviations of attitude [rad] and bias [rad/s].
+/// Names of the estimator's columns: attitude, gyro bias [rad/s], deviations of attitude [rad] and bias [rad/s],
+/// sensors not used (hexadecimal).
 const ESTIMATE: &str =
-    "q0,q1,q2,q3,bias_x,bias_y,bias_z,sigma_x,sigma_y,sigma_z,sigma_bias_x,sigma_bias_y,sigma_bias_z";
+    "q0,q1,q2,q3,bias_x,bias_y,bias_z,sigma_x,sigma_y,sigma_z,sigma_bias_x,sigma_bias_y,sigma_bias_z,sensors";
 /// Commas of as many empty cells.
-const NO_ESTIMATE: &str = ",,,,,,,,,,,,";
+const NO_ESTIMATE: &str = ",,,,,,,,,,,,,";
 
 /// The header.
 pub fn header() -> String {
@@ -72,6 +73,7 @@ pub fn row(key: Key, entry: &Entry, si: bool) -> String {
             let values = estimate.q_nb.iter().chain(&estimate.bias_b).chain(&estimate.sigma);
             let values: Vec<String> = values.map(|value| format!("{value:e}")).collect();
             row += &values.join(",");
+            push(&mut row, format_args!(",{:08X}", estimate.sensors.0));
         }
         None => row += NO_ESTIMATE,
     }
@@ -85,7 +87,7 @@ fn push(row: &mut String, text: std::fmt::Arguments<'_>) {
 
 #[cfg(test)]
 mod tests {
-    use emems::{derived::Health, flight_log::record::Estimate};
+    use emems::{derived::Health, faults::SensorHealth, flight_log::record::Estimate};
 
     use super::*;
 
@@ -116,6 +118,7 @@ mod tests {
                 q_nb: [1.0, 0.0, 0.0, 0.0],
                 bias_b: [0.25; 3],
                 sigma: [0.5; 6],
+                sensors: SensorHealth(1),
             }),
             ..entry()
         };

@@ -48,6 +48,7 @@ fn an_estimate_is_kept_to_its_resolution() {
         q_nb: [0.5, -0.5, 0.707, -1.0],
         bias_b: [1e-3, -2.5e-4, 0.0],
         sigma: [0.01, 0.02, 0.5, 1e-5, 2e-5, 3e-5],
+        sensors: SensorHealth(0x8000_0007),
     };
     let with_estimate = Entry {
         estimate: Some(given),
@@ -62,7 +63,7 @@ fn an_estimate_is_kept_to_its_resolution() {
     else {
         panic!("no estimate came back");
     };
-    assert_eq!(got.bias_b, given.bias_b);
+    assert_eq!((got.bias_b, got.sensors), (given.bias_b, given.sensors));
     for axis in 0..4 {
         assert!(
             (got.q_nb[axis] - given.q_nb[axis]).abs() <= QUATERNION_TOLERANCE,

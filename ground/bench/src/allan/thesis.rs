@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use super::{bounds::bounds, report::digits};
-use crate::table::Table;
+use crate::{
+    reproduction::allan::{factor, flicker_angle, white_rate},
+    table::Table,
+};
 
 /// Half a unit of the fifth digit printed, twice for a ratio.
 const PRINTED: f64 = 5e-5;
@@ -33,22 +36,6 @@ fn printed(name: &str) -> Option<Vec<[f64; 7]>> {
     )
 }
 
-/// The averaging factor behind a printed time: 0.8 s was entered for a sampling interval of 0.05 s.
-fn factor(printed_tau_s: f64) -> f64 {
-    (printed_tau_s / 0.8).log2().round().exp2()
-}
-
-/// Degrees of freedom of NIST SP 1065, table 5.
-fn white_rate(count: f64, m: f64) -> f64 {
-    (3.0 * (count - 1.0) / (2.0 * m) - 2.0 * (count - 2.0) / count) * 4.0 * m * m / (4.0 * m * m + 5.0)
-}
-
-fn flicker_angle(count: f64, m: f64) -> f64 {
-    (((count - 1.0) / (2.0 * m)).ln() * ((2.0 * m + 1.0) * (count - 1.0) / 4.0).ln())
-        .sqrt()
-        .exp()
-}
-
 #[test]
 fn time_deviation_follows_from_the_modified_one_in_every_table() {
     for name in [
@@ -72,7 +59,8 @@ fn time_deviation_follows_from_the_modified_one_in_every_table() {
 /// samples left after its outliers (1018, 674, 16 of 145312).
 #[test]
 fn the_printed_bounds_are_those_of_another_noise_than_the_table_says() {
-    let tables: [(&str, f64, fn(f64, f64) -> f64); 3] = [
+    type EquivalentFreedom = fn(f64, f64) -> f64;
+    let tables: [(&str, f64, EquivalentFreedom); 3] = [
         ("000_tableE_1_SD02.csv", 145_312.0 - 1_018.0, white_rate),
         ("000_tableE_2_SD04.csv", 145_312.0 - 674.0, flicker_angle),
         ("000_tableE_4_LME02.csv", 145_312.0 - 16.0, white_rate),

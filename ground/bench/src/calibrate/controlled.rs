@@ -177,7 +177,7 @@ impl Common {
         let found = controlled::calibrate(experiment, &options)?;
         let mut report = describe(experiment, &found, self.contradicted);
         report.remarks.extend(remarks);
-        let entries = Entry::controlled(&found, experiment.kind, &self.output.part);
+        let entries = Entry::controlled(&found, experiment.kind);
         self.output.finish(&report, entries, files)
     }
 }

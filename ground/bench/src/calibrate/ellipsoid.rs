@@ -89,10 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
         }
         None => (Matrix3::identity(), "magnetometer"),
     };
-    let mut entries = Entry::ellipsoid(&found, &names, sensor, &dcm_bp);
-    for entry in &mut entries {
-        entry.part.clone_from(&arguments.output.part);
-    }
+    let entries = Entry::ellipsoid(&found, &names, sensor, &dcm_bp);
     if arguments.output.set.is_some() && nominal.is_none() {
         report
             .wrong

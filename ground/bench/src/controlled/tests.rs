@@ -130,6 +130,46 @@ fn intervals_of_rate_table_calibrations_cover_95_of_100() {
 }
 
 #[test]
+fn intervals_of_multi_position_calibrations_cover_95_of_100() {
+    // An accelerometer of 34 counts per m/s2 in the thirteen outer angles of Table 4.6 at six inner ones.
+    let truth = (Vector3::new(-11.0, 1.5, 32.0), 7.5);
+    let poses = (0..78).map(|k| Pose {
+        inner_rad: f64::to_radians(60.0 * f64::from(k / 13)),
+        outer_rad: f64::to_radians(30.0 * f64::from(k % 13)),
+    });
+    let force_b: Vec<Vector3<f64>> = poses.map(|pose| Mount::EMEMS.force_b(pose, &SITE, [0.0; 2])).collect();
+    let rows: Vec<_> = force_b.iter().copied().map(Some).collect();
+    let normal = Normal::new(0.0, 1.53).expect("sigma");
+    let mut inside = [0; 4];
+    for seed in 0..1000 {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut position = |force_b: &Vector3<f64>| Trial {
+            values: vec![Some(truth.0.dot(force_b) + truth.1 + normal.sample(&mut random))],
+            ..trial(*force_b, &mut || 0.0)
+        };
+        let experiment = Experiment {
+            file: "positions".into(),
+            kind: Kind::Force,
+            channels: vec!["a1x".into()],
+            trials: force_b.iter().map(&mut position).collect(),
+            remarks: Vec::new(),
+        };
+        let found = fit(&experiment, &rows, &[], Orders::default(), 0)
+            .expect("fit")
+            .response;
+        let values = found.sensitivity_b.iter().copied().chain([found.bias[0]]);
+        for (p, (value, truth)) in values.zip(truth.0.iter().copied().chain([truth.1])).enumerate() {
+            let half = student_95(found.freedom) * found.covariance[(p, p)].sqrt();
+            inside[p] += usize::from((value - truth).abs() < half);
+        }
+    }
+    println!("held {inside:?} of 1000");
+    for inside in inside {
+        assert!((930..=970).contains(&inside), "{inside}");
+    }
+}
+
+#[test]
 fn an_earth_rate_that_is_left_out_stands_in_the_bias_unless_the_runs_cancel_it() {
     let off = |runs: std::ops::Range<usize>| {
         let mut experiment = campaign(&mut || 0.0);

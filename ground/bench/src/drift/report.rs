@@ -32,6 +32,11 @@ impl Section {
         format!("{}\n{}", self.title, rows.chain(said).collect::<String>())
     }
 
+    /// Whether something is wrong.
+    pub fn is_wrong(&self) -> bool {
+        self.verdict.iter().any(|line| line.starts_with("wrong:"))
+    }
+
     /// For the page.
     pub fn into_blocks(self) -> Vec<Block> {
         let mut blocks = vec![

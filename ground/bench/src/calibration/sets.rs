@@ -1,9 +1,9 @@
-//! `ground calibrate diff` and `unit`: what two sets say differently, and a set as the twin's nominal unit.
+//! `ground calibration diff` and `unit`: what two sets say differently, and a set as the twin's nominal unit.
 
 use std::path::PathBuf;
 
-use super::{CalibrateError, read_set, read_text};
 use crate::{
+    calibrate::{CalibrateError, read_set, read_text},
     report::Report,
     set::{diff, unit},
 };
