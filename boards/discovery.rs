@@ -14,7 +14,7 @@
 //! Everything else on the board is left alone: LIS302DL (PA5 to PA7, PE0, PE1, PE3), CS43L22 (PA4, PB6, PB9, PC7,
 //! PC10, PC12, PD4), MP45DT02 (PB10, PC3), LEDs (PD12 to PD15), button (PA0), USB (PA9 to PA12, PC0, PD5). SPI1's
 //! other pins are the LIS302DL's, which takes them for I2C while its own chip select is high: hence PB3 to PB5.
-//! There is no NAND.
+//! There is no NAND: nothing is recorded, and the console says so.
 
 mod stm32f407;
 
@@ -22,7 +22,7 @@ use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, recorder, stack_use, start, telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -52,7 +52,7 @@ pub fn init() -> Parts<Discovery> {
         discretes: VehicleInputs::new(p.PE12, p.PE13),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: recorder(),
+        nand: NandPort::absent(),
         reset,
         oscillator,
         stack_use,

@@ -10,8 +10,8 @@
 //! | umbilical out, in | PB10, PB11 | USART3 |
 //! | Lift_Off# | PC6 | closed to ground by the vehicle, internal pull-up |
 //! | Micro_G# | PC7 | closed to ground by the vehicle, internal pull-up |
-//! | NAND D0 to D7 | PD14, PD15, PD0, PD1, PE7, PE8, PE9, PE10 | FSMC bank 2; all NAND pins are reserved, not configured |
-//! | NAND RE#, WE#, R/B#, CE# | PD4, PD5, PD6, PD7 | FSMC NOE, NWE, NWAIT, NCE2 |
+//! | NAND D0 to D7 | PD14, PD15, PD0, PD1, PE7, PE8, PE9, PE10 | FSMC bank 2 |
+//! | NAND RE#, WE#, R/B#, CE# | PD4, PD5, PD6, PD7 | FSMC NOE, NWE, NCE2; R/B# is left to the status register |
 //! | NAND CLE, ALE | PD11, PD12 | FSMC A16, A17 |
 //! | NAND WP# | PC8 | 10 kOhm to ground: protected while the MCU is in reset |
 //! | crystal | PH0, PH1 | 8 MHz |
@@ -23,7 +23,7 @@ use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, recorder, stack_use, start, telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -53,7 +53,24 @@ pub fn init() -> Parts<Obc> {
         discretes: VehicleInputs::new(p.PC6, p.PC7),
         watchdog,
         retained: ResetSafeRam::new(),
-        recorder: recorder(),
+        nand: NandPort::new(
+            [
+                p.PD14.into(),
+                p.PD15.into(),
+                p.PD0.into(),
+                p.PD1.into(),
+                p.PE7.into(),
+                p.PE8.into(),
+                p.PE9.into(),
+                p.PE10.into(),
+                p.PD4.into(),
+                p.PD5.into(),
+                p.PD7.into(),
+                p.PD11.into(),
+                p.PD12.into(),
+            ],
+            p.PC8.into(),
+        ),
         reset,
         oscillator,
         stack_use,

@@ -3,7 +3,7 @@
 use embedded_hal_async::{i2c::I2c, spi::SpiDevice};
 use embedded_io_async::{Read, Write};
 
-use crate::{crash::CrashRecord, recorder::Recorder, resume::Resume};
+use crate::{crash::CrashRecord, nand::k9f1208::NandBus, resume::Resume};
 
 /// The set of types a board provides. One implementation per board file; none of them is named in `src/`.
 pub trait Board {
@@ -23,8 +23,8 @@ pub trait Board {
     type Watchdog: Watchdog;
     /// What survives a reset but not a power cut.
     type Retained: Retained;
-    /// The flight recorder.
-    type Recorder: Recorder;
+    /// The flight recorder's memory.
+    type Nand: NandBus;
 }
 
 /// Everything [`crate::unit::run`] takes, ready to use: clocks run, peripherals are configured, nothing has been sent.
@@ -45,8 +45,8 @@ pub struct Parts<B: Board> {
     pub watchdog: B::Watchdog,
     /// Retained memory.
     pub retained: B::Retained,
-    /// Flight recorder.
-    pub recorder: B::Recorder,
+    /// The flight recorder's memory.
+    pub nand: B::Nand,
     /// Why the unit started.
     pub reset: ResetCause,
     /// What its time comes from.

@@ -42,7 +42,7 @@ pub enum Command {
     Dump,
     /// Read a part of the recorder.
     DumpRange {
-        /// Number of the first record.
+        /// Number of the first page of the log.
         first: u32,
         /// How many.
         count: u32,
@@ -101,7 +101,7 @@ pub const COMMANDS: [Entry; 18] = [
     entry(
         b"G_LR",
         Command::DumpRange { first: 0, count: 0 },
-        "WAIT: read records, G_LRffffffcccccc (hex first, count)",
+        "WAIT: read pages, G_LRffffffcccccc (hex first, count)",
     ),
     entry(
         b"G_CW",

@@ -1,6 +1,6 @@
 //! The derived frame: what a packet has no room for.
 //!
-//! In: a [`Derived`]; out: 225 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
+//! In: a [`Derived`]; out: 486 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
 //! neither `@` nor `#`, so a reader of 156-byte packets passes over it; it is off unless asked for (G_DL).
 //!
 //! Between `$` and `*` stand upper-case hexadecimal fields, fixed width, most significant digit first; `CCCC` is
@@ -8,14 +8,21 @@
 //!
 //! ```text
 //! version 2 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
-//! covered_us 6 | angle_b 8 x 3 (IEEE 754) | for each gyro: integral 8 (IEEE 754), least 4, most 4, count 2
+//! covered_us 6 | end_us 16 | angle_b 8 x 3 | for each gyro: integral 8, least 4, most 4, count 2
+//! estimate_us 5 | force_b 8 x 3 | field_b_ut 8 x 3 | rate_b 8 x 3 | sensors 8 | triad_nb 8 x 4 (0: none)
+//! q_nb 8 x 4 (0: none) | covariance_n 8 x 6 | bias_b 8 x 3 | bias_sd 8 x 3
 //! ```
+//!
+//! Numbers of 8 digits are IEEE 754, but for `health` and `sensors`, which are bits. With the packet of the same counter
+//! a frame holds all that [`estimate`](crate::estimate) was given, so a stream of both from the start gives its result again.
 
 use core::fmt;
 
 use crc::{CRC_16_IBM_3740, Crc};
 
 use crate::{
+    estimate::Estimate,
+    faults::SensorHealth,
     increments::{Channel, Increments},
     mode::Mode,
     packet::hex_value,
@@ -28,8 +35,11 @@ pub const DERIVED_START: u8 = b'$';
 /// Bytes of a derived frame.
 pub const DERIVED_BYTES: usize = 1 + FIELD_DIGITS + 1 + 4 + 1;
 
-const VERSION: u64 = 1;
-const FIELD_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT + 6 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
+const VERSION: u64 = 2;
+const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + ESTIMATE_DIGITS;
+const CYCLE_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT;
+const GYRO_DIGITS: usize = 6 + 16 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
+const ESTIMATE_DIGITS: usize = 5 + 8 * (3 + 3 + 3 + 1 + 4 + 4 + 6 + 3 + 3);
 const NO_SLOT_CODE: u64 = 0xF_FFFF;
 
 /// CRC-16/CCITT-FALSE, which the catalogue calls IBM-3740; "123456789" gives 29B1.
@@ -94,6 +104,10 @@ pub struct Derived {
     pub slots_us: [u32; SENSOR_COUNT],
     /// The gyros since the packet before.
     pub increments: Increments,
+    /// [us] the estimation took on the unit's clock.
+    pub estimate_us: u32,
+    /// What it all says of the attitude.
+    pub estimate: Estimate,
 }
 
 /// Why bytes are not a derived frame.
@@ -154,14 +168,26 @@ pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
         );
     }
     fields.put(u64::from(derived.increments.covered_us).min(0xFF_FFFF), 6);
-    for angle in derived.increments.angle_b {
-        fields.put(angle.to_bits().into(), 8);
-    }
+    fields.put(derived.increments.end_us, 16);
+    fields.reals(&derived.increments.angle_b);
     for channel in derived.increments.gyro {
-        fields.put(channel.integral_counts_s.to_bits().into(), 8);
+        fields.reals(&[channel.integral_counts_s]);
         fields.put((channel.least as u16).into(), 4);
         fields.put((channel.most as u16).into(), 4);
         fields.put(channel.count.into(), 2);
+    }
+    fields.put(u64::from(derived.estimate_us).min(0xF_FFFF), 5);
+    let estimate = &derived.estimate;
+    for vector in [&estimate.force_b, &estimate.field_b_ut, &estimate.rate_b] {
+        fields.reals(vector);
+    }
+    fields.put(estimate.sensors.0.into(), 8);
+    for attitude in [estimate.triad_nb, estimate.q_nb] {
+        fields.reals(&attitude.unwrap_or_default());
+    }
+    fields.reals(&estimate.covariance_n);
+    for vector in [&estimate.bias_b, &estimate.bias_sd] {
+        fields.reals(vector);
     }
     let crc = CRC.checksum(&frame[1..1 + FIELD_DIGITS]);
     let mut end = Writer {
@@ -213,13 +239,29 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
         }),
         increments: Increments {
             covered_us: fields.take(6) as u32,
-            angle_b: core::array::from_fn(|_| fields.real()),
-            gyro: core::array::from_fn(|_| Channel {
-                integral_counts_s: fields.real(),
-                least: fields.word() as i16,
-                most: fields.word() as i16,
-                count: fields.take(2) as u8,
+            end_us: fields.take(16),
+            angle_b: fields.reals(),
+            gyro: core::array::from_fn(|_| {
+                let [integral_counts_s] = fields.reals();
+                Channel {
+                    integral_counts_s,
+                    least: fields.word() as i16,
+                    most: fields.word() as i16,
+                    count: fields.take(2) as u8,
+                }
             }),
+        },
+        estimate_us: fields.take(5) as u32,
+        estimate: Estimate {
+            force_b: fields.reals(),
+            field_b_ut: fields.reals(),
+            rate_b: fields.reals(),
+            sensors: SensorHealth(fields.take(8) as u32),
+            triad_nb: fields.attitude(),
+            q_nb: fields.attitude(),
+            covariance_n: fields.reals(),
+            bias_b: fields.reals(),
+            bias_sd: fields.reals(),
         },
     })
 }
@@ -234,6 +276,12 @@ impl Writer<'_> {
         for digit in (0..digits).rev() {
             self.frame[self.at] = b"0123456789ABCDEF"[(value >> (4 * digit) & 0xF) as usize];
             self.at += 1;
+        }
+    }
+
+    fn reals(&mut self, values: &[f32]) {
+        for value in values {
+            self.put(value.to_bits().into(), 8);
         }
     }
 }
@@ -257,8 +305,12 @@ impl Reader<'_> {
         self.take(4) as u16
     }
 
-    fn real(&mut self) -> f32 {
-        f32::from_bits(self.take(8) as u32)
+    fn reals<const N: usize>(&mut self) -> [f32; N] {
+        core::array::from_fn(|_| f32::from_bits(self.take(8) as u32))
+    }
+
+    fn attitude(&mut self) -> Option<[f32; 4]> {
+        Some(self.reals()).filter(|parts| *parts != [0.0; 4])
     }
 }
 
@@ -283,9 +335,22 @@ mod tests {
             health: Health(0x80).with(Health::RECORDING),
             cycle_us: 3_700,
             slots_us,
+            estimate_us: 240,
+            estimate: Estimate {
+                force_b: [0.1, 0.0, -9.8],
+                field_b_ut: [17.0, -6.9, -14.2],
+                rate_b: [-0.0, 1e-3, 2.0],
+                sensors: SensorHealth(0x8400_0001),
+                triad_nb: None,
+                q_nb: Some([0.5, -0.5, 0.5, -0.5]),
+                covariance_n: [1e-5, -1e-7, 0.0, 2e-5, 3e-7, 4e-4],
+                bias_b: [1e-3, -2e-3, 0.0],
+                bias_sd: [1e-4, 1e-4, 2e-4],
+            },
             increments: Increments {
                 angle_b: [0.1, -0.2, 1.0e-7],
                 covered_us: 200_000,
+                end_us: 86_399_995_100,
                 gyro: [channel(20), channel(19), channel(0), channel(255)],
             },
         }
@@ -294,7 +359,7 @@ mod tests {
     #[test]
     fn a_frame_says_what_it_was_given() {
         assert_eq!(decode(&encode(&derived())), Ok(derived()));
-        assert_eq!(DERIVED_BYTES, 225);
+        assert_eq!(DERIVED_BYTES, 486);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The gyros between two packets: integrated rates with coning correction.
 //!
-//! In: the four gyros in counts and the instant of each fast sample. Out, once a cycle: the rotation increment of b,
-//! and for each gyro the integral, smallest and largest count and how many samples.
+//! In: the four gyros in counts and the instant of each fast sample. Out, once a cycle: the rotation increment of b, when it
+//! ended, and for each gyro the integral, smallest and largest count and how many samples.
 //!
 //! A 5 Hz filter on single rate samples loses what happened between them; on increments it loses nothing. The increment
 //! is a rotation vector: `phi = sum d_k + 1/2 sum (a_{k-1} + d_{k-1}/6) x d_k` with `d_k` the angle of interval `k`
@@ -27,6 +27,8 @@ pub struct Increments {
     pub angle_b: [f32; 3],
     /// [us] time the increment covers; shorter than the cycle by its gaps.
     pub covered_us: u32,
+    /// [us] instant of the newest fast sample, since the unit's clock started: the increment's end. 0 before the first.
+    pub end_us: u64,
     /// Each gyro.
     pub gyro: [Channel; 4],
 }
@@ -48,6 +50,7 @@ pub struct Channel {
 const EMPTY: Increments = Increments {
     angle_b: [0.0; 3],
     covered_us: 0,
+    end_us: 0,
     gyro: [Channel {
         integral_counts_s: 0.0,
         least: NOT_READ,
@@ -97,6 +100,7 @@ impl Integrator {
         for (channel, counts) in self.sum.gyro.iter_mut().zip(fast.counts) {
             channel.note(counts);
         }
+        self.sum.end_us = fast.at_us;
         let Some(last) = self.last.replace(fast) else { return };
         let dt_s = fast.at_us.saturating_sub(last.at_us) as f32 * 1e-6;
         if dt_s <= 0.0 || dt_s > LONGEST_INTERVAL_S {
@@ -130,7 +134,8 @@ impl Integrator {
 
     /// What came since it was last asked; the next interval begins where this one ended.
     pub fn take(&mut self) -> Increments {
-        let mut taken = core::mem::replace(&mut self.sum, EMPTY);
+        let end_us = self.sum.end_us;
+        let mut taken = core::mem::replace(&mut self.sum, Increments { end_us, ..EMPTY });
         taken.angle_b = (Vector3::from(taken.angle_b) + core::mem::take(&mut self.coning_b)).into();
         taken
     }

@@ -4,11 +4,14 @@
 //!
 //! ```text
 //! bytes --sensor--> counts --unit::acquire--> Sample --packet--> 156 bytes -> telemetry, umbilical, recorder
-//!                   gyro counts --increments--> rotation increments --derived--> derived frame
+//!                   gyro counts --increments--> rotation increments
+//! Sample, increments --estimate--> vectors, health, attitude --derived--> derived frame
+//! packets, attitude --flight_log--> pages --nand--> chip
 //! umbilical bytes --command--> Command --mode--> Mode, Task
 //! ```
 //!
-//! Everything outside [`sensor`] and [`unit`] is a function of its arguments: no clock, no I/O, no allocation.
+//! Everything outside [`sensor`], [`nand`], [`flight_log`] and [`unit`] is a function of its arguments: no clock, no I/O,
+//! no allocation.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -28,14 +31,16 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+pub mod estimate;
 pub mod faults;
+pub mod flight_log;
 pub mod geometry;
 pub mod increments;
 pub mod kalman;
 pub mod mode;
+pub mod nand;
 pub mod packet;
 pub mod quest;
-pub mod recorder;
 pub mod redundancy;
 pub mod resume;
 pub mod sample;

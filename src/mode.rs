@@ -44,9 +44,9 @@ pub enum Task {
     Idle,
     /// New packets go to the umbilical.
     SendPackets,
-    /// Records `next..end` go to the umbilical.
+    /// Pages `next..end` of the log go to the umbilical.
     Dump {
-        /// Number of the next record.
+        /// Number of the next page.
         next: u32,
         /// Number after the last.
         end: u32,
@@ -116,6 +116,14 @@ impl State {
             mode,
             recording,
             ..State::default()
+        }
+    }
+
+    /// Takes what the recorder says of the time before a power cut, unless something is known already.
+    pub fn recovered(&mut self, flight: bool, recording: bool) {
+        if flight && self.mode == Mode::Wait {
+            self.enter(Mode::Flight);
+            self.recording = recording;
         }
     }
 

@@ -30,6 +30,7 @@ use embassy_futures::join;
 
 use crate::{
     board::{Board, Parts, Retained},
+    estimate::{Estimator, Site},
     sensor::{adis16265, hmc5883l, lis331hh, tca9548a::Switch},
 };
 
@@ -37,7 +38,7 @@ use gyros::Gyros;
 use shared::{Shared, Start};
 
 /// What a laboratory may choose without touching the code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// [ms] from packet to packet, 20 to 1000. Short: more packets, less idle time. The thesis has 200.
     pub period_ms: u64,
@@ -49,16 +50,28 @@ pub struct Settings {
     pub field: hmc5883l::Gain,
     /// Range of the gyros.
     pub rate: adis16265::Range,
+    /// Where the unit is.
+    pub site: Site,
+    /// Which unit this is, at most 16 letters: every boot in the log begins with it.
+    pub unit: &'static str,
+    /// Which set of calibration parameters belongs to it, at most 16 letters; empty for none.
+    pub calibration: &'static str,
 }
 
 impl Settings {
-    /// The thesis' unit: 5 Hz, 3 mg, 0.92 mG and 0.07326 deg/s a count.
+    /// The thesis' unit: 5 Hz, 3 mg, 0.92 mG and 0.07326 deg/s a count, in the laboratory.
     pub const NOMINAL: Settings = Settings {
         period_ms: 200,
         gyro_hz: 100,
         acceleration: lis331hh::FullScale::G6,
         field: hmc5883l::Gain::PerGauss1090,
         rate: adis16265::Range::DegPerS320,
+        site: Site::LABORATORY,
+        unit: match option_env!("EMEMS_UNIT") {
+            Some(unit) => unit,
+            None => "EM",
+        },
+        calibration: "",
     };
 
     /// The accelerometers': as many samples a second as cycles, or 50.
@@ -107,6 +120,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();
+    let mut estimator = Estimator::of(&settings);
     let link = join::join4(
         telemetry::run::<B>(&shared, &votes, parts.telemetry),
         umbilical::send::<B>(&shared, &votes, parts.umbilical_tx),
@@ -116,8 +130,8 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     let data = join::join4(
         acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.retained),
         gyros::run::<B>(&shared, &votes, &gyros),
-        estimate::run(&shared, &votes),
-        record::run::<B>(&shared, &votes, parts.recorder),
+        estimate::run(&shared, &votes, &mut estimator),
+        record::run::<B>(&shared, &votes, parts.nand),
     );
     let care = join::join(
         self_test::run::<B>(&shared, &switch, &gyros),

@@ -7,6 +7,8 @@
 //! | gyros, mode 3, 1.3125 MHz, 16 bit | SPI1 | none: `gyros.rs` says why |
 //! | telemetry, 115200 8N1 | USART2 | DMA1 stream 6 transmits, channel 4 |
 //! | umbilical, 115200 8N1 | USART3 | DMA1 stream 3 transmits, channel 4; bytes are received one by one |
+//! | NAND, 8 bit | FSMC bank 2 | none |
+//! | supply below 2.9 V | PVD | |
 //! | watchdog, 1 s | IWDG | |
 //!
 //! In: the pins. Out: the [`Parts`](emems::board::Parts) of [`Stm32f407`]. All of the firmware's unsafe code is in
@@ -17,6 +19,7 @@ mod clock;
 mod crash;
 mod gyros;
 mod lines;
+mod nand;
 mod retained;
 mod stack;
 
@@ -25,12 +28,11 @@ use core::marker::PhantomData;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
 use emems::board::{Board, Oscillator, ResetCause, Watchdog};
-use emems::recorder::MemoryRecorder;
-use static_cell::ConstStaticCell;
 
 pub use self::bus::SensorBus;
 pub use self::gyros::gyros;
 pub use self::lines::{VehicleInputs, telemetry, umbilical};
+pub use self::nand::NandPort;
 pub use self::retained::ResetSafeRam;
 pub use self::stack::stack_use;
 
@@ -57,17 +59,7 @@ impl<Scl: bus::Scl, Sda: bus::Sda> Board for Stm32f407<Scl, Sda> {
     type Discretes = VehicleInputs;
     type Watchdog = Iwdg;
     type Retained = ResetSafeRam;
-    type Recorder = &'static mut MemoryRecorder<RECORDS>;
-}
-
-/// Records that fit: 12.8 s of flight at 5 Hz, until there is a NAND.
-const RECORDS: usize = 64;
-
-static RECORDER: ConstStaticCell<MemoryRecorder<RECORDS>> = ConstStaticCell::new(MemoryRecorder::new());
-
-/// The recorder in RAM.
-pub fn recorder() -> &'static mut MemoryRecorder<RECORDS> {
-    RECORDER.take()
+    type Nand = NandPort;
 }
 
 /// The independent watchdog. Nothing but a reset stops it.

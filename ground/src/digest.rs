@@ -27,7 +27,7 @@ pub enum Entry {
         reading: Reading,
     },
     /// A derived frame.
-    Derived(Derived),
+    Derived(Box<Derived>),
     /// Bytes that are no frame.
     Reject(Reject),
 }

@@ -14,12 +14,35 @@ enum Command {
     Decode(ground::decode::Arguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
+    Gap(Gap),
     Size(ground::size::Arguments),
+    Attitude(attitude::Arguments),
+    Dump(recorder::dump::Arguments),
+    Recover(recorder::recover::Arguments),
     Allan(bench::allan::Arguments),
     Calibrate(bench::calibrate::Arguments),
     Calibration(bench::calibration::Arguments),
     Design(bench::design::command::Arguments),
     Report(bench::reproduction::Arguments),
+}
+
+/// Finds what the twin of a unit lacks
+///
+/// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
+/// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
+/// `blind` checks it on cases whose cause is withheld.
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct Gap {
+    #[command(flatten)]
+    case: Option<gap::Arguments>,
+    #[command(subcommand)]
+    challenge: Option<Challenge>,
+}
+
+#[derive(clap::Subcommand)]
+enum Challenge {
+    Blind(trials::command::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -38,12 +61,26 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Sources => print!("{}", ground::fly::source::list()),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
+        Command::Gap(arguments) => gap(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
+        Command::Attitude(arguments) => attitude::run(&arguments)?,
+        Command::Dump(arguments) => recorder::dump::run(&arguments)?,
+        Command::Recover(arguments) => recorder::recover::run(&arguments)?,
         Command::Allan(arguments) => bench::allan::run(&arguments)?,
         Command::Calibrate(arguments) => bench::calibrate::run(&arguments)?,
         Command::Calibration(arguments) => bench::calibration::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
         Command::Report(arguments) => bench::reproduction::run(&arguments)?,
+    }
+    Ok(())
+}
+
+fn gap(arguments: &Gap) -> Result<(), Box<dyn Error>> {
+    if let Some(Challenge::Blind(step)) = &arguments.challenge {
+        trials::command::run(step, &|case| Ok(gap::write_verdict(case)?))?;
+    }
+    if let Some(case) = &arguments.case {
+        gap::run(case)?;
     }
     Ok(())
 }

@@ -59,15 +59,21 @@ pub fn derived_header() -> String {
     for name in SLOT_NAMES {
         push(&mut header, format_args!(",slot_{name}_us"));
     }
-    header.push_str(",covered_us,angle_x_rad,angle_y_rad,angle_z_rad");
+    header.push_str(",covered_us,end_us,angle_x_rad,angle_y_rad,angle_z_rad");
     for plate in 1..=4 {
         push(
             &mut header,
             format_args!(",g{plate}_integral_counts_s,g{plate}_least,g{plate}_most,g{plate}_count"),
         );
     }
+    header.push_str(ESTIMATE_HEADER);
     header
 }
+
+/// Columns of the estimate: vectors in b, covariance about the axes of n.
+const ESTIMATE_HEADER: &str = ",estimate_us,force_x,force_y,force_z,field_x_ut,field_y_ut,field_z_ut,rate_x,rate_y,\
+    rate_z,sensors,triad_w,triad_x,triad_y,triad_z,q_w,q_x,q_y,q_z,p_nn,p_ne,p_nd,p_ee,p_ed,p_dd,bias_x,bias_y,bias_z,\
+    bias_sd_x,bias_sd_y,bias_sd_z";
 
 /// A derived frame's row.
 pub fn derived_row(derived: &Derived) -> String {
@@ -86,7 +92,10 @@ pub fn derived_row(derived: &Derived) -> String {
         }
     }
     let increments = &derived.increments;
-    push(&mut row, format_args!(",{}", increments.covered_us));
+    push(
+        &mut row,
+        format_args!(",{},{}", increments.covered_us, increments.end_us),
+    );
     for angle in increments.angle_b {
         push(&mut row, format_args!(",{angle}"));
     }
@@ -100,7 +109,29 @@ pub fn derived_row(derived: &Derived) -> String {
         }
         push(&mut row, format_args!(",{}", gyro.count));
     }
+    push_estimate(&mut row, derived);
     row
+}
+
+fn push_estimate(row: &mut String, derived: &Derived) {
+    let estimate = &derived.estimate;
+    push(row, format_args!(",{}", derived.estimate_us));
+    for value in [estimate.force_b, estimate.field_b_ut, estimate.rate_b].as_flattened() {
+        push(row, format_args!(",{value}"));
+    }
+    push(row, format_args!(",{:08X}", estimate.sensors.0));
+    for attitude in [estimate.triad_nb, estimate.q_nb] {
+        for part in 0..4 {
+            row.push(',');
+            if let Some(attitude) = attitude {
+                push(row, format_args!("{}", attitude[part]));
+            }
+        }
+    }
+    let rest = [estimate.bias_b, estimate.bias_sd];
+    for value in estimate.covariance_n.iter().chain(rest.as_flattened()) {
+        push(row, format_args!(",{value}"));
+    }
 }
 
 /// Short names of the sensors in reading order, as channels begin and as the command line takes them.
@@ -121,6 +152,7 @@ fn push(row: &mut String, text: std::fmt::Arguments<'_>) {
 mod tests {
     use emems::{
         derived::Health,
+        estimate::Estimate,
         increments::{Channel, Increments},
         mode::Mode,
         packet,
@@ -181,8 +213,11 @@ mod tests {
             increments: Increments {
                 angle_b: [0.0; 3],
                 covered_us: 0,
+                end_us: 0,
                 gyro: [silent; 4],
             },
+            estimate_us: 0,
+            estimate: Estimate::NOTHING,
         };
         let check = |header: String, row: String| assert_eq!(header.matches(',').count(), row.matches(',').count());
         check(counts_header(), counts_row(0.0, &golden()));

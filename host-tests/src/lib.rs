@@ -1,10 +1,11 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
 pub mod counts;
+pub mod recorder;
 pub mod reference;
 pub mod watched;
 
-use std::sync::Arc;
+use std::{cell::RefCell, rc::Rc, sync::Arc};
 
 use emems::{
     derived::{self, DERIVED_BYTES, DERIVED_START, Derived},
@@ -14,7 +15,7 @@ use emems::{
 };
 use twin::{
     host::{self, HostReport},
-    part::Nanos,
+    part::{Nanos, nand::Cells},
     plant::Plant,
     run::{Bench, Fault, Flow, Scheduled},
     truth::TruthSource,
@@ -66,7 +67,9 @@ impl Flight {
             said: self.said,
             ..Flown::default()
         };
-        flown.report = host::fly(self.plant, self.settings, &self.faults, duration, &mut flown);
+        let plant = Rc::new(RefCell::new(self.plant));
+        flown.report = host::fly_around(&plant, self.settings, &self.faults, duration, &mut flown);
+        flown.nand = Some(plant.borrow().nand.cells.clone());
         flown
     }
 }
@@ -83,6 +86,8 @@ pub struct Flown {
     pub strange: Vec<Vec<u8>>,
     /// Everything the umbilical said.
     pub umbilical: Vec<u8>,
+    /// The recorder's memory afterwards.
+    pub nand: Option<Cells>,
     /// What the host board says of the run.
     pub report: HostReport,
 }

@@ -96,8 +96,3 @@ fn a_hang_ends_in_a_reset_that_resumes_flight(fault: Fault) {
 fn a_part_that_never_yields_lets_the_watchdog_bite_and_flight_is_resumed() {
     a_hang_ends_in_a_reset_that_resumes_flight(Fault::DmaHung);
 }
-
-#[test]
-fn a_part_that_never_votes_lets_the_watchdog_bite_though_all_others_go_on() {
-    a_hang_ends_in_a_reset_that_resumes_flight(Fault::RecorderHung);
-}

@@ -50,9 +50,12 @@ impl Disagreement {
         })
     }
 
-    /// In standard deviations.
-    pub(super) fn sigmas(&self) -> f32 {
-        self.by.abs() / ComplexField::sqrt(self.variance)
+    /// In standard deviations, if it is beyond the gate. Looked at squared first: the root is seldom needed.
+    fn beyond_gate(&self) -> Option<f32> {
+        if self.by * self.by <= GATE * GATE * self.variance {
+            return None;
+        }
+        Some(self.by.abs() / ComplexField::sqrt(self.variance)).filter(|sigmas| *sigmas > GATE)
     }
 }
 
@@ -70,10 +73,10 @@ impl Values<'_> {
     fn worst(&self, solution: &Solution) -> Option<usize> {
         let mut worst = (GATE, None);
         for k in (0..12).filter(|k| solution.used >> k & 1 == 1) {
-            let sigmas = self
+            let beyond = self
                 .disagreement(k, solution)
-                .map_or(0.0, |disagreement| disagreement.sigmas());
-            if sigmas > worst.0 {
+                .and_then(|disagreement| disagreement.beyond_gate());
+            if let Some(sigmas) = beyond.filter(|sigmas| *sigmas > worst.0) {
                 worst = (sigmas, Some(k));
             }
         }

@@ -16,7 +16,7 @@
 //!
 //! [`vector_rate`]: super::vector_rate
 
-use nalgebra::{ComplexField, Vector3};
+use nalgebra::{ComplexField, SMatrix, Vector3, Vector4};
 
 use super::{
     health::Verdict,
@@ -57,6 +57,11 @@ pub(super) struct Cycle<'a> {
 pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
     noise: [f32; PLATES],
+    /// Unit vector of the parity.
+    across: [f32; PLATES],
+    /// Least squares by all four, and without each.
+    rate_from_all: SMatrix<f32, 3, PLATES>,
+    rate_without: [SMatrix<f32, 3, PLATES>; PLATES],
     uncertainty: Uncertainty,
     /// [s] by how much the sampling instants are unsure.
     timing_s: f32,
@@ -77,8 +82,12 @@ pub(super) struct Gyros {
 impl Gyros {
     pub(super) fn new(axes: &[Axis; PLATES], uncertainty: Uncertainty, timing_s: f32) -> Self {
         let allowed = uncertainty.bias * uncertainty.bias;
+        let axes_b = core::array::from_fn(|k| axes[k].axis_b);
         Gyros {
-            axes_b: core::array::from_fn(|k| axes[k].axis_b),
+            axes_b,
+            across: across(&axes_b),
+            rate_from_all: matrix(&axes_b, ALL),
+            rate_without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k))),
             noise: core::array::from_fn(|k| axes[k].noise),
             uncertainty,
             timing_s,
@@ -131,7 +140,11 @@ impl Gyros {
     /// [rad2/s2] what does not average out: scale and direction away from where the parity was learned, and angular
     /// acceleration within the uncertainty of the sampling instants.
     fn systematic(&self, cycle: &Cycle, candidates: u16) -> f32 {
-        let rough_b = solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates).vector_b;
+        let rough_b = if candidates == ALL {
+            self.rate_from_all * Vector4::from(*cycle.values)
+        } else {
+            solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates).vector_b
+        };
         let Uncertainty { scale, direction, .. } = self.uncertainty;
         let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
         let acceleration = match (self.course_b, cycle.dt_s) {
@@ -152,7 +165,7 @@ impl Gyros {
 
     /// The parity of all four; the rate of those left.
     fn check(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
-        let across = self.across();
+        let across = self.across;
         let sum = |part: &dyn Fn(usize) -> f32| (0..PLATES).map(part).sum::<f32>();
         let parity = sum(&|k| across[k] * cycle.values[k]) - self.parity.offset;
         let noise = ComplexField::sqrt(sum(&|k| across[k] * across[k] * self.noise[k] * self.noise[k]));
@@ -187,15 +200,6 @@ impl Gyros {
         }
     }
 
-    /// Unit vector of the parity: across the three columns of the axes.
-    fn across(&self) -> [f32; PLATES] {
-        let [a, b, c, d] = &self.axes_b;
-        let volume = |x: &Vector3<f32>, y: &Vector3<f32>, z: &Vector3<f32>| x.dot(&y.cross(z));
-        let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
-        let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
-        across.map(|part| part / length)
-    }
-
     /// The gyro that has leapt in this cycle or goes on leaping, if the parity is `sigmas` and it is one only.
     fn leap(&mut self, cycle: &Cycle, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
         let before = core::mem::replace(&mut self.last_sigmas, sigmas.abs());
@@ -228,7 +232,7 @@ impl Gyros {
     /// Excludes a gyro. One that is frozen explains what others were accused of on the parity's word.
     pub(super) fn blame(&mut self, plate: usize, verdict: Verdict) {
         // What it disagreed by before is what the parity has learned, over its part in the parity.
-        let part = self.across()[plate];
+        let part = self.across[plate];
         let watch = &mut self.watches[plate];
         watch.exclude(verdict);
         watch.offset = self.parity.offset / part;
@@ -268,9 +272,26 @@ impl Gyros {
     /// The rate without each gyro in turn; `None` unless all four are used. The parity's learned offset is taken out across
     /// all four, which leaves the rate of all as it is and gives each of these the same bias.
     pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
-        let across = self.across();
-        let values: [f32; PLATES] = core::array::from_fn(|k| values[k] - across[k] * self.parity.offset);
-        let without = |k: usize| solve(&self.axes_b, &values, &[1.0; PLATES], ALL & !(1 << k)).vector_b;
-        (used == ALL).then(|| core::array::from_fn(without))
+        let values = Vector4::from(*values) - Vector4::from(self.across) * self.parity.offset;
+        (used == ALL).then(|| self.rate_without.map(|matrix| matrix * values))
     }
+}
+
+/// Unit vector of the parity: across the three columns of the axes.
+fn across(axes_b: &[Vector3<f32>; PLATES]) -> [f32; PLATES] {
+    let [a, b, c, d] = axes_b;
+    let volume = |x: &Vector3<f32>, y: &Vector3<f32>, z: &Vector3<f32>| x.dot(&y.cross(z));
+    let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
+    let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
+    across.map(|part| part / length)
+}
+
+/// Rate from values about the axes whose bit is set, all weighing the same.
+fn matrix(axes_b: &[Vector3<f32>; PLATES], wanted: u16) -> SMatrix<f32, 3, PLATES> {
+    let column = |k: usize| {
+        let mut value = [0.0; PLATES];
+        value[k] = 1.0;
+        solve(axes_b, &value, &[1.0; PLATES], wanted).vector_b
+    };
+    SMatrix::from_columns(&[column(0), column(1), column(2), column(3)])
 }

@@ -37,6 +37,8 @@ pub(super) struct Trace {
     squares: i32,
     systematic: i32,
     systematic_squares: i32,
+    /// Sums of disagreement and systematic part over the newest [`SHORT`].
+    short: [i32; 2],
 }
 
 /// Limits of a window: means in standard deviations, and the sum of squares.
@@ -59,6 +61,7 @@ impl Trace {
         squares: 0,
         systematic: 0,
         systematic_squares: 0,
+        short: [0; 2],
     };
 
     /// Takes a cycle; what is not a number is as wild as can be.
@@ -67,6 +70,9 @@ impl Trace {
             disagreement: clipped(disagreement),
             systematic: clipped(systematic),
         };
+        let left = self.ring[(usize::from(self.next) + LONG - SHORT) % LONG];
+        self.short[0] += i32::from(new.disagreement) - i32::from(left.disagreement);
+        self.short[1] += i32::from(new.systematic) - i32::from(left.systematic);
         let old = core::mem::replace(&mut self.ring[usize::from(self.next)], new);
         let square = |value: i16| i32::from(value) * i32::from(value);
         self.sum += i32::from(new.disagreement) - i32::from(old.disagreement);
@@ -82,22 +88,17 @@ impl Trace {
         usize::from(self.held) == LONG
     }
 
-    /// The largest of its three figures, in parts of their limits. The means count from [`SHORT`] cycles on.
-    pub(super) fn over(&self, limits: Limits) -> f32 {
+    /// Square of the largest of its three figures, in parts of their limits: roots cost more than all the rest. The means
+    /// count from [`SHORT`] cycles on.
+    pub(super) fn over_squared(&self, limits: Limits) -> f32 {
         let allowed = limits.squares + SYSTEMATIC_SQUARES * squared_sigmas(self.systematic_squares);
-        let spread = ComplexField::sqrt(squared_sigmas(self.squares) / allowed);
+        let spread = squared_sigmas(self.squares) / allowed;
         if usize::from(self.held) < SHORT {
             return spread;
         }
-        let newest = (1..=SHORT).map(|back| self.ring[(usize::from(self.next) + LONG - back) % LONG]);
-        let (short, systematic) = newest.fold((0, 0), |(sum, systematic), cycle| {
-            (
-                sum + i32::from(cycle.disagreement),
-                systematic + i32::from(cycle.systematic),
-            )
-        });
-        let short = mean(short, systematic, SHORT as f32) / limits.short;
-        let long = mean(self.sum, self.systematic, f32::from(self.held)) / limits.long;
+        let [short, systematic] = self.short;
+        let short = mean_squared(short, systematic, SHORT as f32) / (limits.short * limits.short);
+        let long = mean_squared(self.sum, self.systematic, f32::from(self.held)) / (limits.long * limits.long);
         spread.max(short).max(long)
     }
 
@@ -118,10 +119,10 @@ fn squared_sigmas(squares: i32) -> f32 {
     squares as f32 / (PER_SIGMA * PER_SIGMA)
 }
 
-/// A sum in its standard deviations.
-fn mean(sum: i32, systematic: i32, cycles: f32) -> f32 {
-    let (sum, systematic) = (sum as f32 / PER_SIGMA, systematic as f32 / PER_SIGMA);
-    sum.abs() / ComplexField::sqrt(cycles + systematic * systematic)
+/// Square of a sum in its standard deviations.
+fn mean_squared(sum: i32, systematic: i32, cycles: f32) -> f32 {
+    let (sum, systematic) = (sum as f32, systematic as f32);
+    sum * sum / (PER_SIGMA * PER_SIGMA * cycles + systematic * systematic)
 }
 
 #[cfg(test)]
@@ -134,6 +135,10 @@ mod tests {
         squares: 1e9,
     };
 
+    fn over(trace: &Trace, limits: Limits) -> f32 {
+        trace.over_squared(limits).sqrt()
+    }
+
     fn filled(with: impl Iterator<Item = (f32, f32)>) -> Trace {
         let mut trace = Trace::EMPTY;
         with.for_each(|(disagreement, systematic)| trace.push(disagreement, systematic));
@@ -144,10 +149,10 @@ mod tests {
     fn sums_are_those_of_the_newest_and_never_drift() {
         let wild = (0..1_000_000_u32).map(|n| ((n.wrapping_mul(2_654_435_761) % 1000) as f32 - 500.0, 3.0));
         let trace = filled(wild.chain(core::iter::repeat_n((0.5, 0.0), LONG)));
-        assert!((trace.over(ONE) - 0.5 * 26.0_f32.sqrt()).abs() < 1e-6);
-        assert!((trace.over(Limits { long: 1e9, ..ONE }) - 0.5 * 6.0_f32.sqrt()).abs() < 1e-6);
+        assert!((over(&trace, ONE) - 0.5 * 26.0_f32.sqrt()).abs() < 1e-6);
+        assert!((over(&trace, Limits { long: 1e9, ..ONE }) - 0.5 * 6.0_f32.sqrt()).abs() < 1e-6);
         assert_eq!(
-            trace.over(Limits {
+            trace.over_squared(Limits {
                 short: 1e9,
                 long: 1e9,
                 squares: 6.5
@@ -160,7 +165,7 @@ mod tests {
     #[test]
     fn means_count_from_a_second_on_and_grow_to_five() {
         for cycles in 1..=LONG {
-            let over = filled(core::iter::repeat_n((1.0, 0.0), cycles)).over(ONE);
+            let over = over(&filled(core::iter::repeat_n((1.0, 0.0), cycles)), ONE);
             let expected = if cycles < SHORT { 0.0 } else { (cycles as f32).sqrt() };
             // The sum of squares adds the root of 26 over its limit.
             assert!((over - expected).abs() < 2e-4, "{cycles}: {over}");
@@ -171,15 +176,15 @@ mod tests {
     fn what_is_systematic_does_not_average_out_and_leaves_with_its_cycles() {
         let steady = filled(core::iter::repeat_n((2.0, 2.0), LONG));
         // 52 against sqrt(26 + 52^2).
-        assert!((steady.over(ONE) - 0.995).abs() < 1e-3, "{}", steady.over(ONE));
+        assert!((over(&steady, ONE) - 0.995).abs() < 1e-3, "{}", over(&steady, ONE));
         let gone = filled(core::iter::repeat_n((2.0, 2.0), LONG).chain(core::iter::repeat_n((0.0, 0.0), LONG)));
-        assert_eq!(gone.over(ONE), 0.0);
+        assert_eq!(gone.over_squared(ONE), 0.0);
     }
 
     #[test]
     fn wild_values_and_those_that_are_no_numbers_are_clipped() {
         let wild = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30];
         let trace = filled(wild.into_iter().cycle().take(100).map(|sigmas| (sigmas, 0.0)));
-        assert!(trace.over(ONE).is_finite() && trace.variance().0 > 100.0);
+        assert!(trace.over_squared(ONE).is_finite() && trace.variance().0 > 100.0);
     }
 }

@@ -10,9 +10,9 @@
 //! fits, with every other worse by [`MARGIN`], some thousand times less likely. What turns about the only direction there is (field
 //! alone in micro-gravity) makes no difference and leaves the question open.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
-use crate::geometry::PLATES;
+use crate::{attitude::from_rotation_vector, geometry::PLATES};
 
 /// [s] after which the directions of now are the new start.
 const STRETCH_S: f32 = 10.0;
@@ -91,7 +91,7 @@ impl VectorRate {
                 Some(earlier_b) => (now_b[k] * 5.0 + before_b[k] * 8.0 - earlier_b[k]) / 12.0,
                 None => (now_b[k] + before_b[k]) / 2.0,
             };
-            let back = UnitQuaternion::from_scaled_axis(mean_b * -dt_s);
+            let back = from_rotation_vector(mean_b * -dt_s);
             for carried in self.carried.iter_mut().flatten() {
                 carried.now_b[k] = back * carried.now_b[k];
             }

@@ -20,8 +20,8 @@ use super::{
 pub(super) const MEMORY: f32 = 1000.0;
 /// Standard deviations of the calibration's uncertainty that an offset may reach.
 const OFFSET_LIMIT: f32 = 6.0;
-/// Nothing is learned from a window that is this near to an alarm.
-pub(super) const QUIET: f32 = 0.75;
+/// Nothing is learned from a window that is this near to an alarm: three quarters of the way, squared.
+pub(super) const QUIET: f32 = 0.75 * 0.75;
 /// Cycles in a row beyond the gate that make a fault.
 const STRIKES: u8 = 3;
 /// An excluded axis comes back below these.
@@ -79,8 +79,13 @@ impl Watch {
     pub(super) fn note(&mut self, disagreement: f32, noise: f32, systematic: f32) {
         let systematic = ComplexField::sqrt(systematic + self.offset_variance) / noise;
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
-        let most = WILD * ComplexField::sqrt(1.0 + systematic * systematic);
-        self.trace.push((disagreement / noise).clamp(-most, most), systematic);
+        let mut sigmas = disagreement / noise;
+        // The root is worth its while only beyond what it is at least.
+        if sigmas.abs() > WILD {
+            let most = WILD * ComplexField::sqrt(1.0 + systematic * systematic);
+            sigmas = sigmas.clamp(-most, most);
+        }
+        self.trace.push(sigmas, systematic);
     }
 
     /// Notes that the axis was beyond the gate in this cycle, or not.
@@ -88,14 +93,16 @@ impl Watch {
         self.strikes = if gated { self.strikes.saturating_add(1) } else { 0 };
     }
 
-    /// How near it is to an alarm; above 1 there is one.
+    /// How near it is to an alarm, squared; above 1 there is one.
     pub(super) fn alarm(&self, limits: Limits) -> f32 {
-        let over = self.trace.over(limits);
-        let crept = self.offset.abs() / (OFFSET_LIMIT * ComplexField::sqrt(self.allowed));
-        let struck = f32::from(self.strikes) / f32::from(STRIKES);
-        // At the third strike the alarm is as loud as the disagreement, so that the worst of several goes first.
-        let struck = if struck >= 1.0 { struck + over } else { 0.0 };
-        over.max(crept).max(struck)
+        let over = self.trace.over_squared(limits);
+        if self.strikes >= STRIKES {
+            // At the third strike the alarm is as loud as the disagreement, so that the worst of several goes first.
+            let loud = f32::from(self.strikes) / f32::from(STRIKES) + ComplexField::sqrt(over);
+            return loud * loud;
+        }
+        let crept = self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed);
+        over.max(crept)
     }
 
     /// Learns from a disagreement of this variance in all, unless something may be wrong.
@@ -130,7 +137,7 @@ impl Watch {
     /// Looks at an excluded axis after a cycle was noted: it comes back after a full window of agreement, and after each
     /// relapse only after twice as many.
     pub(super) fn reconsider(&mut self) {
-        let agrees = self.trace.over(SOUND) < 1.0;
+        let agrees = self.trace.over_squared(SOUND) < 1.0;
         self.sound_for = if agrees { self.sound_for.saturating_add(1) } else { 0 };
         if self.sound_for >= (LONG as u16) << self.relapses.saturating_sub(1) {
             self.verdict = Verdict::Sound;

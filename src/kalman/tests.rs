@@ -218,6 +218,19 @@ fn boost_and_free_fall_after_lift_off_do_not_move_it() {
 }
 
 #[test]
+fn after_lift_off_a_steady_push_is_not_taken_for_the_vertical() {
+    let mut world = World::new(tilted(), params());
+    world.fly(10.0, Vector3::zeros(), nothing);
+    let q_nb = world.q_nb;
+    // 1.15 g, tilted by 29 deg: near enough to one g for a shaken unit's mean, not for a sample in flight.
+    world.fly(20.0, Vector3::zeros(), |_, step| {
+        step.lift_off = true;
+        step.acc.as_mut().unwrap().value_b += q_nb.inverse_transform_vector(&Vector3::new(5.5, 0.0, 0.0));
+    });
+    world.off_by_less_than(1.0);
+}
+
+#[test]
 fn in_micro_gravity_the_field_bounds_what_it_can() {
     let mut world = World::new(tilted(), params());
     world.fly(10.0, Vector3::zeros(), nothing);

@@ -1,22 +1,30 @@
-//! What is derived from a cycle.
+//! What is derived from a cycle: the whole estimation, once its packet is on the line.
+//!
+//! The step holds the processor for as long as it takes. So it comes after everybody else has had the cycle: telemetry has
+//! handed its packet to the DMA, and half an interval lies between the closing of a cycle and the next fast sample.
+
+use embassy_futures::yield_now;
 
 use super::{
+    clock::now,
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
 use crate::{
     board::Oscillator,
     derived::{Derived, Health},
+    estimate::{Estimate, Estimator},
     mode::State,
 };
 
 /// Derives for ever.
-pub async fn run(shared: &Shared, votes: &Votes) {
+pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator) {
     let Some(mut cycles) = shared.cycle_reader() else {
         return;
     };
     loop {
         let cycle = votes.waiting(Voter::Estimate, cycles.next_message_pure()).await;
+        votes.waiting(Voter::Estimate, yield_now()).await;
         let state = *shared.state.borrow();
         let health = cycle
             .health
@@ -25,11 +33,14 @@ pub async fn run(shared: &Shared, votes: &Votes) {
                 Health::INTERNAL_OSCILLATOR,
                 shared.start.oscillator == Oscillator::Internal,
             );
-        shared.publish_derived(derive(&cycle, state, health));
+        let began = now();
+        let estimate = estimator.step(&cycle.sample, &cycle.increments);
+        let estimate_us = (now() - began).as_micros() as u32;
+        shared.publish_derived(derive(&cycle, state, health, estimate_us, estimate));
     }
 }
 
-fn derive(cycle: &Cycle, state: State, health: Health) -> Derived {
+fn derive(cycle: &Cycle, state: State, health: Health, estimate_us: u32, estimate: Estimate) -> Derived {
     let reading = &cycle.sample.reading;
     Derived {
         counter: reading.counter,
@@ -41,5 +52,7 @@ fn derive(cycle: &Cycle, state: State, health: Health) -> Derived {
         cycle_us: cycle.cycle_us,
         slots_us: cycle.sample.slots_us,
         increments: cycle.increments,
+        estimate_us,
+        estimate,
     }
 }

@@ -15,11 +15,11 @@ use crate::{
     board::{Oscillator, ResetCause, StackUse},
     calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
-    derived::{Derived, Health},
+    derived::{DERIVED_BYTES, Derived, Health},
+    flight_log::{self, LogError, record::RecordBytes},
     increments::{Increments, Integrator},
     mode::State,
     packet::PACKET_BYTES,
-    recorder::RecorderStatus,
     resume::Resume,
     sample::{Errors, Sample},
 };
@@ -42,19 +42,23 @@ pub struct Cycle {
 /// Two: a reader may be busy with one while the next arrives. A reader that is later than that loses the oldest.
 const QUEUED: usize = 2;
 
+/// Of both lines, 8N1.
+const LINE_BAUD: u64 = 115_200;
+const BITS_PER_BYTE: u64 = 10;
+
 type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
-type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 2, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A reader of the cycles.
 pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
 /// A reader of the derived frames.
-pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 2, 0>;
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 3, 0>;
 
 /// A line for the console, without its end.
 pub type Line = String<128>;
 
-/// A packet on its way from the recorder's part to the umbilical's.
-pub type DumpedPacket = [u8; PACKET_BYTES];
+/// A record on its way from the recorder's part to the umbilical's, and the page it came from.
+pub type Dumped = (u32, RecordBytes);
 
 /// What the board says of this start.
 pub struct Start {
@@ -92,7 +96,9 @@ pub struct Shared {
     /// Debounced lift-off and micro-g.
     pub discretes: Cell<(bool, bool)>,
     /// The recorder, as of its last action.
-    pub recorder: Cell<RecorderStatus>,
+    pub recorder: Cell<flight_log::Status>,
+    /// Why it cannot be used.
+    pub recorder_error: Cell<Option<LogError>>,
     /// The recorder refused the last packet.
     pub recorder_refused: Cell<bool>,
     /// An erase was ordered and has not begun.
@@ -113,8 +119,8 @@ pub struct Shared {
     derived: DerivedFrames,
     /// Lines for the console.
     pub replies: Channel<NoopRawMutex, Line, 8>,
-    /// Packets read from the recorder for the umbilical.
-    pub dumped: Channel<NoopRawMutex, DumpedPacket, 1>,
+    /// Records read from the recorder for the umbilical: as many as a page holds.
+    pub dumped: Channel<NoopRawMutex, Dumped, 2>,
 }
 
 impl Shared {
@@ -128,6 +134,7 @@ impl Shared {
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
             discretes: Cell::default(),
             recorder: Cell::default(),
+            recorder_error: Cell::default(),
             recorder_refused: Cell::default(),
             erase_ordered: Cell::default(),
             self_test_ordered: Signal::new(),
@@ -157,6 +164,17 @@ impl Shared {
     pub fn publish_cycle(&self, cycle: Cycle) {
         self.errors.set(cycle.sample.reading.errors);
         self.cycles.immediate_publisher().publish_immediate(cycle);
+    }
+
+    /// Whether a derived frame is to be sent: they are on, and the line has room for it beside the packets. A unit that is
+    /// too fast for all of them sends as many as there is time for; each stands for itself.
+    pub fn is_wanted(&self, frame: &Derived) -> bool {
+        let line_us = |bytes: usize| (bytes as u64 * BITS_PER_BYTE * 1_000_000).div_ceil(LINE_BAUD);
+        let free_us = (self.settings.period_ms * 1000)
+            .saturating_sub(line_us(PACKET_BYTES))
+            .max(1);
+        let every = line_us(DERIVED_BYTES).div_ceil(free_us);
+        self.state.borrow().derived && u64::from(frame.counter).is_multiple_of(every)
     }
 
     /// Gives a derived frame to every reader.

@@ -23,7 +23,7 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Telemetr
         let next = select(cycles.next_message_pure(), frames.next_message_pure());
         match votes.waiting(Voter::Telemetry, next).await {
             Either::First(cycle) => write(&shared.clock, &mut line, &cycle.packet).await,
-            Either::Second(frame) if shared.state.borrow().derived => {
+            Either::Second(frame) if shared.is_wanted(&frame) => {
                 write(&shared.clock, &mut line, &derived::encode(&frame)).await;
             }
             Either::Second(_) => {}

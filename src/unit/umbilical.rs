@@ -16,6 +16,7 @@ use crate::{
     board::Board,
     command::{COMMANDS, Command, Heard, Parser, word_of},
     derived,
+    flight_log::{dump, record},
     mode::{Action, Refusal, Task, Verdict},
 };
 
@@ -43,19 +44,21 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
             frames.next_message_pure(),
         );
         let next = votes.waiting(Voter::UmbilicalSend, next).await;
-        let (sending, derived_on) = {
-            let state = shared.state.borrow();
-            (state.task == Task::SendPackets, state.derived)
-        };
+        let sending = shared.state.borrow().task == Task::SendPackets;
         match next {
             Either4::First(reply) => {
                 write(&shared.clock, &mut line, b">").await;
                 write(&shared.clock, &mut line, reply.as_bytes()).await;
                 write(&shared.clock, &mut line, b"\r\n").await;
             }
-            Either4::Second(packet) => write(&shared.clock, &mut line, &packet).await,
+            Either4::Second((page, record)) => {
+                if let Some(packet) = record::packet(&record) {
+                    write(&shared.clock, &mut line, packet).await;
+                }
+                write(&shared.clock, &mut line, &dump::encode(page, &record)).await;
+            }
             Either4::Third(cycle) if sending => write(&shared.clock, &mut line, &cycle.packet).await,
-            Either4::Fourth(frame) if sending && derived_on => {
+            Either4::Fourth(frame) if sending && shared.is_wanted(&frame) => {
                 write(&shared.clock, &mut line, &derived::encode(&frame)).await
             }
             _ => {}
@@ -111,10 +114,7 @@ async fn answer(shared: &Shared, heard: Heard) {
         }
         Verdict::Done(Action::Erase) => {
             shared.erase_ordered.set(true);
-            shared.say(format_args!(
-                "{word} ok: erasing {} records",
-                shared.recorder.get().used
-            ));
+            shared.say(format_args!("{word} ok: erasing {} pages", shared.recorder.get().used));
         }
         Verdict::Done(Action::SelfTest) => {
             shared.self_test_ordered.signal(());
@@ -163,10 +163,25 @@ fn status(shared: &Shared) {
         shared.umbilical_noise.get()
     ));
     shared.say(format_args!(
-        "G_ST recorder {} of {} {} started {:?} resets {resets} up {} s",
-        recorder.used,
-        recorder.capacity,
-        if recorder.erasing.is_some() { "erasing" } else { "ready" },
+        "G_ST recorder {} of {} pages, {} bad blocks, {} bits corrected, {} halves lost",
+        recorder.used, recorder.capacity, recorder.bad_blocks, recorder.corrected, recorder.uncorrectable
+    ));
+    match (shared.recorder_error.get(), recorder.erasing) {
+        (Some(error), _) => shared.say(format_args!("G_ST recorder: {error}")),
+        (None, Some(left)) => shared.say(format_args!("G_ST recorder: erasing, {left} blocks left")),
+        (None, None) => match recorder.last {
+            Some((key, start_us)) => shared.say(format_args!(
+                "G_ST recorder: last record {} of boot {}, epoch {}, at {} ms",
+                key.seq,
+                key.boot,
+                key.epoch,
+                start_us / 1000
+            )),
+            None => shared.say(format_args!("G_ST recorder: empty")),
+        },
+    }
+    shared.say(format_args!(
+        "G_ST started {:?} resets {resets} up {} s",
         shared.start.reset,
         now().as_secs()
     ));

@@ -10,8 +10,10 @@ use std::{
 };
 
 use rigless::{
-    chip::{Timeline, i2c, spi, uart},
+    chip::{Timeline, i2c, parallel, spi, uart},
+    device::DeviceContext,
     snapshot::Store,
+    soc::Width,
     time::VirtualNanos,
 };
 use twin::{
@@ -24,6 +26,7 @@ use twin::{
 pub struct SharedPlant(Arc<Mutex<Plant>>);
 
 impl SharedPlant {
+    /// The parts of this plant.
     pub fn new(plant: Plant) -> Self {
         SharedPlant(Arc::new(Mutex::new(plant)))
     }
@@ -97,6 +100,34 @@ impl spi::Peer for Gyro {
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
         let now = context.now().0;
         self.part(|part| part.deselect(now), ());
+    }
+}
+
+/// The NAND in the FSMC's bank 2: command latch on A16, address latch on A17. Its WP# is PC8, which [`crate::wires`]
+/// does not carry; the driver lifts protection before every change, so the part is left writable.
+#[derive(Debug)]
+pub struct Nand(pub SharedPlant);
+
+/// Offset bit of the command latch.
+const CLE: u64 = 1 << 16;
+/// Offset bit of the address latch.
+const ALE: u64 = 1 << 17;
+
+impl Store for Nand {}
+
+impl parallel::Peer for Nand {
+    fn read(&mut self, _offset: u64, _width: Width, context: &mut DeviceContext<'_>) -> u64 {
+        u64::from(self.0.lock().nand.read(context.now().0))
+    }
+
+    fn write(&mut self, offset: u64, _width: Width, value: u64, context: &mut DeviceContext<'_>) {
+        let (byte, now) = (value as u8, context.now().0);
+        let nand = &mut self.0.lock().nand;
+        match offset & (CLE | ALE) {
+            CLE => nand.command(byte, now),
+            ALE => nand.address(byte, now),
+            _ => nand.write(byte, now),
+        }
     }
 }
 

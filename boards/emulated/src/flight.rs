@@ -38,6 +38,9 @@ use crate::{
 
 /// [ns] between two meetings of the core and the bench.
 pub const STEP: Nanos = 20_000_000;
+/// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
+const RETAINED: u64 = 0x2001_FF00;
+const RETAINED_BYTES: u64 = 256;
 const MILLISECOND: Nanos = 1_000_000;
 
 /// How a run differs from the plain one.
@@ -124,6 +127,22 @@ pub fn fly_with(
     duration: Nanos,
     bench: &mut dyn Bench,
 ) -> Result<Report, Error> {
+    Ok(fly_keeping(options, image, plant, faults, duration, bench)?.0)
+}
+
+/// The same, and the plant as it is afterwards.
+///
+/// # Errors
+///
+/// As [`fly_with`].
+pub fn fly_keeping(
+    options: &Options,
+    image: &Image,
+    plant: Plant,
+    faults: &[Scheduled],
+    duration: Nanos,
+    bench: &mut dyn Bench,
+) -> Result<(Report, SharedPlant), Error> {
     let statics = (options.statics.iter())
         .map(|(name, bytes)| Ok((image.symbol(name)?, *bytes)))
         .collect::<Result<Vec<_>, ImageError>>()?;
@@ -142,6 +161,7 @@ pub fn fly_with(
 
     let (to_bench, heard) = sync_channel::<Heard>(1);
     let (to_core, said) = sync_channel::<Said>(1);
+    let kept = plant.clone();
     let pilot = Pilot {
         plant,
         faults,
@@ -167,6 +187,7 @@ pub fn fly_with(
         drop(to_core);
         core.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
+    .map(|report| (report, kept))
 }
 
 /// The next meeting, on the grid of whole steps from power-on, whatever other stops there are.
@@ -241,6 +262,14 @@ impl Pilot {
         while let Some(scheduled) = self.faults.pop_if(|scheduled| scheduled.at <= stop.at.0) {
             match scheduled.fault {
                 Fault::Reset => session.reset_by_pin(stop.at, stop.instruction_count, host),
+                Fault::PowerCut(_) => {
+                    self.plant.lock().apply(scheduled.fault, stop.at.0);
+                    // The emulator's memory survives; what a power cut loses is lost here (memory.x).
+                    for at in (RETAINED..RETAINED + RETAINED_BYTES).step_by(4) {
+                        let _ = host.write(at, Width::W32, 0xDEAD_BEEF);
+                    }
+                    session.reset_by_pin(stop.at, stop.instruction_count, host);
+                }
                 Fault::DmaHung => session.board_mut().mcu.hang_dma(),
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }

@@ -18,6 +18,7 @@ mod stand;
 mod toolchain;
 mod wires;
 
+pub use chips::SharedPlant;
 pub use covers::Covers;
 pub use flight::{Error, Options, Report, fly, fly_with};
 pub use image::Image;

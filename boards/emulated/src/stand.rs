@@ -11,10 +11,10 @@ use std::num::{NonZeroU32, NonZeroU64};
 use rigless::{
     device::{ErasedDevice, Level, ResetCause},
     machine::{Board, Target, armv7m},
-    mcu::{Mcu, Operate},
+    mcu::{self, Mcu, Operate},
     snapshot::Store,
     soc::{
-        Bus, Error,
+        Bus, Error, Gate, Window,
         stm32f427::{
             Stm32f427,
             generated::{
@@ -33,7 +33,7 @@ use rigless::{
 };
 
 use crate::{
-    chips::{Gyro, Line, SensorBus, SharedPlant},
+    chips::{Gyro, Line, Nand, SensorBus, SharedPlant},
     covers::{self, Covers},
     wires::{BusPins, DiscretePins, SensorPort},
 };
@@ -47,6 +47,10 @@ const NAME: &str = "emems";
 const TELEMETRY: usize = 1;
 /// Index of USART3: the umbilical.
 const UMBILICAL: usize = 2;
+
+/// Where the FSMC's bank 2 answers once PCR2.PBKEN is set (RM0090 section 36.4.2).
+const NAND_WINDOW: Window = Window::new("NAND2", 0x7000_0000, NonZeroU64::new(1 << 28).expect("not zero"))
+    .gated(Gate::by("FMC", "PCR2", "PBKEN"));
 
 /// The slots of the peripherals the stand answers for or watches.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +66,8 @@ struct Slots {
 /// The microcontroller with the stand's own models in three of its slots.
 #[derive(Debug)]
 pub struct Wired {
-    part: Stm32f427,
+    /// The part, with the recorder's memory in a window of its FSMC.
+    part: mcu::Wired<Stm32f427, Nand>,
     sensor_port: SensorPort,
     bus_pins: BusPins,
     discrete_pins: DiscretePins,
@@ -93,6 +98,9 @@ impl Wired {
         }
         part.usart[TELEMETRY].attach(Line::default());
         part.usart[UMBILICAL].attach(Line::default());
+        // WP# is not wired here: the driver lifts it before every change anyway.
+        plant.lock().nand.protect(false, 0);
+        let part = mcu::Wired::new(part, NAND_WINDOW, Nand(plant.clone()))?;
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);
         i2c.attach(SensorBus(plant.clone()));
         let bus = part.bus();
@@ -121,25 +129,25 @@ impl Wired {
 
     /// The far end of the telemetry line.
     pub fn telemetry(&mut self) -> Option<&mut Line> {
-        self.part.usart[TELEMETRY].chip_mut()
+        self.part.part.usart[TELEMETRY].chip_mut()
     }
 
     /// The far end of the umbilical.
     pub fn umbilical(&mut self) -> Option<&mut Line> {
-        self.part.usart[UMBILICAL].chip_mut()
+        self.part.part.usart[UMBILICAL].chip_mut()
     }
 
     /// How many in a million of the bytes towards the unit arrive with a framing error. Which ones is drawn by rigless
     /// from the byte's number, so it is the same in every run.
     pub fn garble_umbilical(&mut self, per_million: u32) {
-        let errors = self.part.usart[UMBILICAL].errors_mut();
+        let errors = self.part.part.usart[UMBILICAL].errors_mut();
         errors.framing.name = "umbilical framing";
         errors.framing.per_million = per_million;
     }
 
     /// Takes the high-speed crystal off the board.
     pub fn remove_crystal(&mut self) {
-        self.part.rcc.attach_crystals(0, 0);
+        self.part.part.rcc.attach_crystals(0, 0);
         self.crystal = false;
     }
 

@@ -1,11 +1,13 @@
 //! The twin: physical truth, the parts at register level, and the host board on which the unit runs in virtual time.
 
+pub mod effect;
 pub mod environment;
 pub mod geometry;
 pub mod host;
 pub mod motion;
 pub mod part;
 pub mod plant;
+pub mod predict;
 pub mod recording;
 pub mod run;
 pub mod truth;

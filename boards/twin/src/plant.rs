@@ -14,7 +14,10 @@ mod tests;
 
 use std::sync::Arc;
 
-use emems::sample::{Kind, SENSORS};
+use emems::{
+    nand::K9F1208_BLOCKS,
+    sample::{Kind, SENSORS},
+};
 
 use nalgebra::Vector3;
 
@@ -26,6 +29,7 @@ use crate::{
         adis16265::{Adis16265, Measurand},
         hmc5883l::{self, Hmc5883l},
         lis331hh::{self, Lis331hh},
+        nand::{Cells, latch::K9f1208},
         signal::{Noise, Specimen},
         tca9548a::Tca9548a,
         tmp102::{self, Tmp102},
@@ -89,6 +93,10 @@ pub struct Plant {
     pub i2c: SensorBus,
     /// The plates' gyros.
     pub gyro: [Gyro; PLATES],
+    /// The recorder's memory.
+    pub nand: K9f1208,
+    /// The supply is above what the NAND needs.
+    pub supply_good: bool,
     source: Arc<dyn TruthSource>,
 }
 
@@ -115,6 +123,8 @@ impl Plant {
         Plant {
             i2c: SensorBus::new(Tca9548a::new(plates)),
             gyro: core::array::from_fn(|plate| views.gyro(plate, seeds.stream((PLATES + plate) as u64), quality)),
+            nand: K9f1208::new(Cells::formatted(K9F1208_BLOCKS, seed)),
+            supply_good: true,
             source,
         }
     }
@@ -154,8 +164,15 @@ impl Plant {
                     gyro.babble(babbling);
                 }
             }
+            Fault::NandDead(dead) => self.nand.cells.befalls.dead = dead,
+            Fault::NandAbsent => self.nand.cells.befalls.absent = true,
+            Fault::SupplyFailing(failing) => self.supply_good = !failing,
+            Fault::PowerCut(tear) => {
+                self.nand.power_cut(now, tear);
+                self.supply_good = true;
+            }
             Fault::Stretching(slot, duration) => self.stretch(slot, duration),
-            Fault::DmaHung | Fault::RecorderHung | Fault::Reset => {}
+            Fault::DmaHung | Fault::Reset => {}
         }
     }
 

@@ -45,11 +45,17 @@ pub enum Fault {
     Stretching(usize, Nanos),
     /// The gyro of this plate answers noise (`true`) or is itself again.
     GyroGarbage(usize, bool),
+    /// The recorder's memory is busy for ever (`true`) or answers again.
+    NandDead(bool),
+    /// There is no recorder's memory.
+    NandAbsent,
+    /// The supply falls below what a program needs (`true`) or is back.
+    SupplyFailing(bool),
+    /// The power goes and comes back: what the recorder's memory was doing tears, in the way of this number.
+    PowerCut(usize),
     /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
     /// never comes round. A reset frees it.
     DmaHung,
-    /// The recorder never gets ready: whoever records waits for ever, and everybody else goes on. A reset frees it.
-    RecorderHung,
     /// The reset pin.
     Reset,
 }

@@ -113,8 +113,14 @@ pub fn files(folder: &Path) -> Result<Vec<(String, PathBuf)>, RecordingError> {
     Ok(files)
 }
 
+/// A recording's number, and its errors in each mode of [`Mode::ALL`].
+pub type Line = (String, [Option<Rmse>; 3]);
+
+/// A line a recording.
+pub type Table = Vec<Line>;
+
 /// Errors on each recording of a folder in each mode of [`Mode::ALL`].
-pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Vec<(String, [Option<Rmse>; 3])>, RecordingError> {
+pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Table, RecordingError> {
     let mut table = Vec::new();
     for (number, path) in files(folder)? {
         let rows = recording::read(&path)?;
@@ -126,14 +132,14 @@ pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Vec<(String, [Op
 }
 
 /// The mean over those of `numbers` that are in a table, in the mode at `mode`.
-pub fn mean_of(table: &[(String, [Option<Rmse>; 3])], numbers: &[&str], mode: usize) -> Option<Rmse> {
+pub fn mean_of(table: &[Line], numbers: &[&str], mode: usize) -> Option<Rmse> {
     let chosen = table.iter().filter(|(number, _)| numbers.contains(&number.as_str()));
     let all: Option<Vec<Rmse>> = chosen.map(|(_, modes)| modes[mode]).collect();
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
 /// The table as text.
-pub fn format(table: &[(String, [Option<Rmse>; 3])]) -> String {
+pub fn format(table: &[Line]) -> String {
     let mut text = format!("{:<14}", "RMSE [deg]");
     for mode in Mode::ALL {
         text += &format!("{:>24}", mode.name());

@@ -90,7 +90,9 @@ fn step(rows: &[Row], noise: &Noise) -> Step {
     }
 }
 
-/// Recordings may begin before their zero; the filter's clock may not.
+/// [s] the filter's clock at the recording's zero: recordings may begin before theirs, the filter's clock may not.
+pub const EPOCH_S: f64 = 1e6;
+
 fn micros(t_s: f64) -> u64 {
-    ((t_s + 1e6) * 1e6).round() as u64
+    ((t_s + EPOCH_S) * 1e6).round() as u64
 }

@@ -1,1 +1,44 @@
 //! The gap between the twin and the unit: where it is, which effect makes it, how far it shrinks.
+//!
+//! In: a case ([`case`]), that is a unit's log, what it was made to do, and what its designers believed of it. Out: a
+//! verdict. The flow, one module a step:
+//!
+//! ```text
+//! case -> windows (what is fitted | what only judges) -> problem (residual in units of noise)
+//!      -> library (every effect at every place) -> attribute (which, by evidence) -> leftover (is it enough)
+//!      -> held (how far it shrinks) -> verdict
+//! ```
+//!
+//! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
+//! significant, and none of it is an effect.
+
+pub mod attribute;
+pub mod case;
+pub mod cause;
+pub mod command;
+pub mod confusion;
+pub mod diagnose;
+pub mod evidence;
+pub mod gram;
+pub mod gross;
+pub mod held;
+pub mod joint;
+pub mod leftover;
+pub mod library;
+pub mod log;
+pub mod model;
+pub mod next;
+pub mod onset;
+pub mod page;
+pub mod problem;
+pub mod products;
+pub mod refine;
+pub mod regime;
+pub mod scatter;
+pub mod sight;
+pub mod temper;
+pub mod terminal;
+pub mod verdict;
+pub mod windows;
+
+pub use command::{Arguments, GapError, run, write_verdict};

@@ -47,7 +47,7 @@ pub enum Item {
         /// Offset of its `$`.
         offset: u64,
         /// What it says.
-        derived: Derived,
+        derived: Box<Derived>,
     },
     /// Bytes that are no intact frame.
     Reject(Reject),
@@ -161,7 +161,10 @@ impl Decoder {
         let offset = self.position + 1 - self.candidate.len() as u64;
         let item = if self.candidate.starts_with(&[DERIVED_START]) {
             derived::decode(&self.candidate)
-                .map(|derived| Item::Derived { offset, derived })
+                .map(|derived| Item::Derived {
+                    offset,
+                    derived: Box::new(derived),
+                })
                 .map_err(Reason::Derived)
         } else {
             self.read_packet().map(|reading| Item::Packet { offset, reading })

@@ -1,1 +1,14 @@
-//! The flight log on the ground: dumped, decoded, recovered.
+//! The flight log on the ground: pulled over the umbilical, decoded, recovered.
+//!
+//! ```text
+//! unit --umbilical--> dump --> file of packets and frames --+
+//! chip read out on a bench --> raw image ------------------+--> log --> table (CSV)
+//! ```
+//!
+//! `ground dump` pulls, `ground recover` turns either file into tables and says what is missing, of this epoch and of
+//! older ones that no erase has reached. The formats are the unit's own: `emems::flight_log`.
+
+pub mod dump;
+pub mod log;
+pub mod recover;
+pub mod table;

@@ -200,7 +200,17 @@ fn starts_or_stops(command: Command) -> bool {
     use Command::*;
     match command {
         Flight | Wait | SendPackets | ConfirmErase | Dump | DumpRange { .. } | Stop => true,
-        Erase | Record | Status | Version | Help | DerivedOn | DerivedOff | SelfTest => false,
+        Erase
+        | Record
+        | Status
+        | Version
+        | Help
+        | DerivedOn
+        | DerivedOff
+        | SelfTest
+        | SetWord { .. }
+        | LoadSet
+        | ReadSet => false,
     }
 }
 

@@ -103,6 +103,26 @@ fn rubbish_in_any_input_leaves_the_state_finite_and_is_recovered_from() {
 }
 
 #[test]
+fn one_bad_sample_costs_itself_and_not_its_window() {
+    let mut world = World::new(tilted(), params());
+    world.fly(5.0, Vector3::zeros(), nothing);
+    for bad in [f32::NAN, f32::INFINITY, 1e30] {
+        let outcome = world.fly(1.0, Vector3::zeros(), |t_s, step| {
+            if t_s < STEP_S {
+                step.acc.as_mut().unwrap().value_b.x = bad;
+                step.mag.as_mut().unwrap().value_b.z = bad;
+            }
+        });
+        assert_eq!(
+            (outcome.innovations.len(), outcome.aligned),
+            (INNOVATIONS, false),
+            "{bad}"
+        );
+        assert!(outcome.innovations.iter().all(|record| record.accepted));
+    }
+}
+
+#[test]
 fn zero_vectors_and_collinear_ones_do_not_align_it() {
     let mut world = World::new(tilted(), params());
     world.fly(5.0, Vector3::zeros(), |_, step| {

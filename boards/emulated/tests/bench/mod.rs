@@ -82,6 +82,7 @@ impl Tape {
     }
 
     /// The derived frames heard whole.
+    #[allow(dead_code, reason = "not every test file asks for them")]
     pub fn derived(&self) -> Vec<Derived> {
         let bytes: Vec<u8> = self.telemetry.iter().map(|(_, byte)| *byte).collect();
         let frames = bytes.split_inclusive(|byte| *byte == b'\n');
@@ -102,6 +103,7 @@ pub fn image() -> &'static Image {
     IMAGE.get_or_init(|| image::build().unwrap_or_else(|error| panic!("{error}")))
 }
 
+#[allow(dead_code, reason = "not every test file flies this way")]
 /// Flies the image for `ms` milliseconds from power-on, at rest, with parts free of noise and bias.
 pub fn flown(options: &Options, faults: &[Scheduled], ms: u64, tape: &mut Tape) -> Report {
     let plant = Plant::ideal(world("still"));

@@ -5,23 +5,17 @@ use std::{
     rc::Rc,
 };
 
-use emems::{
-    board::{Board, Oscillator, Parts, ResetCause, StackUse},
-    recorder::MemoryRecorder,
-};
+use emems::board::{Board, Oscillator, Parts, ResetCause, StackUse};
 
 use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
-    recorder::MayHang,
+    nand::NandPins,
 };
 use crate::plant::Plant;
 
 /// The type that names the host board's parts.
 pub struct Host;
-
-/// As many as the flight computer's interim recorder.
-const RECORDS: usize = 64;
 
 impl Board for Host {
     type SensorBus = SensorBus;
@@ -32,7 +26,7 @@ impl Board for Host {
     type Discretes = Inputs;
     type Watchdog = Fed;
     type Retained = Kept;
-    type Recorder = MayHang<MemoryRecorder<RECORDS>>;
+    type Nand = NandPins;
 }
 
 /// The outside ends of the host board.
@@ -50,8 +44,6 @@ pub struct Ends {
     pub kept: Kept,
     /// The sensor bus' DMA stands still.
     pub dma_hung: Rc<Cell<bool>>,
-    /// The recorder never gets ready.
-    pub recorder_hung: Rc<Cell<bool>>,
 }
 
 /// The parts of a unit that starts because of `reset`.
@@ -65,10 +57,7 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         discretes: Inputs(plant.clone()),
         watchdog: ends.fed.clone(),
         retained: ends.kept.clone(),
-        recorder: MayHang {
-            recorder: MemoryRecorder::new(),
-            hung: ends.recorder_hung.clone(),
-        },
+        nand: NandPins(plant.clone()),
         reset,
         oscillator: Oscillator::Crystal,
         stack_use: StackUse::default,

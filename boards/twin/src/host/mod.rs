@@ -8,8 +8,8 @@ mod board;
 mod bus;
 mod clock;
 mod lines;
-mod recorder;
+mod nand;
 mod run;
 pub mod timing;
 
-pub use run::{HostReport, fly};
+pub use run::{HostReport, fly, fly_around};

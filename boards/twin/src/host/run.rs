@@ -41,7 +41,17 @@ pub fn fly(
     duration: Nanos,
     bench: &mut dyn Bench,
 ) -> HostReport {
-    let plant = Rc::new(RefCell::new(plant));
+    fly_around(&Rc::new(RefCell::new(plant)), settings, faults, duration, bench)
+}
+
+/// The same around a plant that is looked at afterwards.
+pub fn fly_around(
+    plant: &Rc<RefCell<Plant>>,
+    settings: Settings,
+    faults: &[Scheduled],
+    duration: Nanos,
+    bench: &mut dyn Bench,
+) -> HostReport {
     let ends = Ends::default();
     let mut report = HostReport::default();
     let mut faults: Vec<Scheduled> = faults.to_vec();
@@ -52,8 +62,7 @@ pub fn fly(
         clock::start(now + BOOT);
         ends.fed.0.set(now + BOOT);
         ends.dma_hung.set(false);
-        ends.recorder_hung.set(false);
-        let mut unit = pin!(unit::run(parts(&plant, &ends, cause), settings));
+        let mut unit = pin!(unit::run(parts(plant, &ends, cause), settings));
         let reset = loop {
             let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
             let until = (now + STEP).min(fault).min(duration);
@@ -70,7 +79,11 @@ pub fn fly(
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
                     Some(Fault::DmaHung) => ends.dma_hung.set(true),
-                    Some(Fault::RecorderHung) => ends.recorder_hung.set(true),
+                    Some(cut @ Fault::PowerCut(_)) => {
+                        plant.borrow_mut().apply(cut, now);
+                        ends.kept.0.set(None);
+                        struck = Some(ResetCause::PowerOn);
+                    }
                     Some(fault) => plant.borrow_mut().apply(fault, now),
                     None => {}
                 }

@@ -10,6 +10,7 @@ mod profile;
 mod rate_table;
 mod recorded;
 mod rotation_test;
+mod smooth;
 mod sounding_rocket;
 mod spline;
 mod still;
@@ -64,6 +65,10 @@ pub trait Motion: Send + Sync {
     fn at(&self, t_s: f64) -> Pose;
     /// [s] when it ends; `None` for a motion without an end.
     fn duration_s(&self) -> Option<f64>;
+    /// [m] place of the unit's centre in n, from wherever the motion counts; zero where it does not tell.
+    fn position_n(&self, _t_s: f64) -> Vector3<f64> {
+        Vector3::zeros()
+    }
 }
 
 /// A motion the command line offers.

@@ -51,6 +51,40 @@ impl Recorded {
         Self::of(&Table::read(bytes, file, &Self::columns())?)
     }
 
+    /// The same motion with what is above these corners smoothed away, without phase: for a truth instrument whose noise,
+    /// differentiated once (attitude) or twice (position), is more than the unit's own.
+    pub fn smoothed(&self, attitude_hz: f64, position_hz: f64) -> Self {
+        let step_s = self.step_s();
+        Self {
+            attitude: self.attitude.smoothed(attitude_hz, step_s),
+            position: self
+                .position
+                .as_ref()
+                .map(|position| position.smoothed(position_hz, step_s)),
+            temperature_c: self.temperature_c.clone(),
+        }
+    }
+
+    /// [s] its usual step between attitudes: the median.
+    pub fn step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.attitude.t_s().windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// [s] where the instrument lost sight: from the last attitude before to the first after, where these are more than
+    /// one and a half usual steps apart.
+    pub fn lost_s(&self) -> Vec<(f64, f64)> {
+        let longest = 1.5 * self.step_s();
+        let neighbours = self.attitude.t_s().windows(2).map(|pair| (pair[0], pair[1]));
+        neighbours.filter(|(before, after)| after - before > longest).collect()
+    }
+
+    /// [s] its first and last attitude.
+    pub fn span_s(&self) -> (f64, f64) {
+        self.attitude.span_s()
+    }
+
     fn columns() -> Vec<&'static str> {
         [&ATTITUDE[..], &POSITION, &[TEMPERATURE]].concat()
     }
@@ -87,6 +121,12 @@ impl Motion for Recorded {
 
     fn duration_s(&self) -> Option<f64> {
         Some(self.attitude.span_s().1)
+    }
+
+    fn position_n(&self, t_s: f64) -> Vector3<f64> {
+        self.position
+            .as_ref()
+            .map_or(Vector3::zeros(), |position| position.at(t_s).value)
     }
 }
 
@@ -206,6 +246,13 @@ mod tests {
         let expected = Vector3::new(-1.005_f64.sin(), 0.0, -18.0 * 3.015_f64.cos());
         assert!((pose.acc_n - expected).norm() < 0.01, "{}", pose.acc_n);
         assert!((pose.temperature_c.unwrap() - 21.005).abs() < 1e-9);
+    }
+
+    #[test]
+    fn where_it_lost_sight_is_known() {
+        let recorded = read("t_s,qw,qx,qy,qz\n0,1,0,0,0\n1,1,0,0,0\n2,,,,\n3,1,0,0,0\n4,1,0,0,0\n").unwrap();
+        assert_eq!(recorded.lost_s(), [(1.0, 3.0)]);
+        assert_eq!((recorded.step_s(), recorded.span_s()), (1.0, (0.0, 4.0)));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use nalgebra::SVector;
 
+use super::smooth::smoothed;
 use crate::recording::Series;
 
 /// The spline of a vector of N components.
@@ -34,9 +35,20 @@ impl<const N: usize> Spline<N> {
         Self { samples, curvatures }
     }
 
+    /// Through what is left of the same samples when all above `corner_hz` is smoothed away.
+    pub fn smoothed(&self, corner_hz: f64, step_s: f64) -> Self {
+        let mut values = smoothed(&self.samples, corner_hz, step_s).into_iter();
+        Self::natural(self.samples.clone().map(|value| values.next().unwrap_or(value)))
+    }
+
     /// [s] first and last sample.
     pub fn span_s(&self) -> (f64, f64) {
         self.samples.span_s()
+    }
+
+    /// [s] the instants of the samples.
+    pub fn t_s(&self) -> &[f64] {
+        self.samples.t_s()
     }
 
     /// Value and derivatives at `t_s`.

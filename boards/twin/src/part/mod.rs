@@ -6,6 +6,7 @@
 pub mod adis16265;
 pub mod hmc5883l;
 pub mod lis331hh;
+pub mod nand;
 pub mod signal;
 pub mod tca9548a;
 pub mod tmp102;

@@ -76,7 +76,7 @@ impl Tca9548a {
         for socket in self.selected() {
             let called = !socket.silent && socket.part.address() == address;
             socket.addressed = called && socket.part.start(read, now);
-            if socket.addressed {
+            if socket.addressed && socket.stretch > 0 {
                 socket.scl_held_until = now + socket.stretch;
             }
             acknowledged |= socket.addressed;

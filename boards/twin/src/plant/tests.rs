@@ -5,6 +5,8 @@ use nalgebra::Vector3;
 use super::*;
 use crate::part::SpiPart;
 
+mod agreement;
+
 const MS: Nanos = 1_000_000;
 const G: f64 = 9.80665;
 /// All parts have started and settled.

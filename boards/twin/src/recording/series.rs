@@ -35,7 +35,7 @@ impl<const N: usize> Series<N> {
     }
 
     /// The values turned, scaled or otherwise replaced one by one.
-    pub fn map(mut self, each: impl Fn(SVector<f64, N>) -> SVector<f64, N>) -> Self {
+    pub fn map(mut self, mut each: impl FnMut(SVector<f64, N>) -> SVector<f64, N>) -> Self {
         for value in &mut self.values {
             *value = each(*value);
         }

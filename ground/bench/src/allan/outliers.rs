@@ -69,7 +69,7 @@ mod tests {
         Series {
             step_s: 1.0,
             values,
-            gaps: vec![10..12],
+            gaps: std::iter::once(10..12).collect(),
         }
     }
 

@@ -158,7 +158,10 @@ mod tests {
             ..Selection::default()
         };
         let records = records(&table, &selection).expect("readable");
-        assert_eq!((records[0].0.as_str(), &records[0].1.gaps), ("g1", &vec![10..14]));
+        assert_eq!(
+            (records[0].0.as_str(), &records[0].1.gaps),
+            ("g1", &std::iter::once(10..14).collect())
+        );
         assert!((records[0].1.step_s - 0.05).abs() < 1e-12);
     }
 

@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn a_missing_stretch_is_a_gap_of_whole_steps() {
         let series = stamped(&[0.1, 0.4, 0.1]).expect("uniform");
-        assert_eq!(series.gaps, [21..24]);
+        assert_eq!(series.gaps, std::iter::once(21..24).collect::<Vec<_>>());
         assert_eq!((series.values.len(), series.measured()), (26, 23));
         assert_eq!(series.stretches().collect::<Vec<_>>(), [0..21, 24..26]);
     }

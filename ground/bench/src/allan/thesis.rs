@@ -59,7 +59,8 @@ fn time_deviation_follows_from_the_modified_one_in_every_table() {
 /// samples left after its outliers (1018, 674, 16 of 145312).
 #[test]
 fn the_printed_bounds_are_those_of_another_noise_than_the_table_says() {
-    let tables: [(&str, f64, fn(f64, f64) -> f64); 3] = [
+    type EquivalentFreedom = fn(f64, f64) -> f64;
+    let tables: [(&str, f64, EquivalentFreedom); 3] = [
         ("000_tableE_1_SD02.csv", 145_312.0 - 1_018.0, white_rate),
         ("000_tableE_2_SD04.csv", 145_312.0 - 674.0, flicker_angle),
         ("000_tableE_4_LME02.csv", 145_312.0 - 16.0, white_rate),

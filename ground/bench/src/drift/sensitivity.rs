@@ -95,7 +95,8 @@ pub fn sensitivity(test: &[(Position, f64)]) -> Result<Sensitivity, SensitivityE
     let covariance = &inverse * inverse.transpose() * variance;
     let t = student_95(freedom);
     let per_rate = fitted[0];
-    if !(per_rate.abs() > t * covariance[(0, 0)].sqrt()) {
+    let seen = per_rate.abs() > t * covariance[(0, 0)].sqrt();
+    if !seen {
         return Err(SensitivityError::NoScale);
     }
     let coefficients = std::array::from_fn(|j| {

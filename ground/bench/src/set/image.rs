@@ -185,7 +185,8 @@ fn axis(entry: &Entry, at_c: f64, noise: f32) -> Result<Axis, ImageError> {
         };
         let most = (0..=16).map(bend).fold(0.0, f64::max);
         // Not the contrary comparison: a scale that vanishes in between gives no number.
-        if !(most <= MOST_BEND) {
+        let straight = most <= MOST_BEND;
+        if !straight {
             return Err(ImageError::Bend {
                 channel: entry.name.clone(),
                 percent: 100.0 * most,

@@ -1,6 +1,7 @@
 //! What the stream reader finds, literal damage first, then any damage.
 
 use emems::{
+    estimate::Estimate,
     increments::{Channel, Increments},
     mode::Mode,
     packet::{Expected, encode},
@@ -129,19 +130,23 @@ fn derived_frame() -> [u8; DERIVED_BYTES] {
         increments: Increments {
             angle_b: [0.0; 3],
             covered_us: 0,
+            end_us: 0,
             gyro: [silent; 4],
         },
+        estimate_us: 0,
+        estimate: Estimate::NOTHING,
     })
 }
 
 #[test]
 fn derived_frames_between_packets_are_read_too() {
+    const AFTER_BOTH: u64 = 156 + DERIVED_BYTES as u64;
     let stream = [GOLDEN.as_slice(), &derived_frame(), GOLDEN].concat();
     let items = Decoder::default().push(&stream);
     let [
         Item::Packet { offset: 0, .. },
         Item::Derived { offset: 156, derived },
-        Item::Packet { offset: 381, .. },
+        Item::Packet { offset: AFTER_BOTH, .. },
     ] = items.as_slice()
     else {
         panic!("{items:?}")

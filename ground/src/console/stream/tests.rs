@@ -2,6 +2,7 @@
 
 use emems::{
     derived::DERIVED_BYTES,
+    estimate::Estimate,
     increments::Integrator,
     mode::Mode,
     packet::{Expected, PACKET_BYTES, encode},
@@ -28,6 +29,8 @@ fn derived() -> Derived {
         cycle_us: 8000,
         slots_us: [NO_SLOT; SENSOR_COUNT],
         increments: Integrator::new(1.0).take(),
+        estimate_us: 0,
+        estimate: Estimate::NOTHING,
     }
 }
 

@@ -97,7 +97,7 @@ fn bounds_are_those_of_the_chi_squared_distribution() {
     for (edf, low, high) in [
         (10.0, 3.24697278, 20.48317735),
         (1.5, 0.01311302, 6.27580797),
-        (96_875.0, 96_014.17769, 97_739.60991),
+        (96_875.0, 96_014.177_69, 97_739.609_91),
     ] {
         let (from, to) = bounds(2.0, edf, 0.95).expect("bounds");
         let expected = (2.0 * (edf / high).sqrt(), 2.0 * (edf / low).sqrt());

@@ -61,7 +61,7 @@ fn the_unit_reads_back_what_was_calibrated_at_every_temperature() {
         let above_c = celsius - 20.0;
         let scale = f64::from(axis.scale_at(above_c as f32));
         let value = scale * (counts - f64::from(axis.bias_counts_at(above_c as f32)));
-        let truth = f64::from(axis.axis_b.cast::<f64>().dot(&rate_b));
+        let truth = axis.axis_b.cast::<f64>().dot(&rate_b);
         // Half a count of rounding would be 6e-4; the chord of the scale costs 1e-5 of 2 rad/s.
         assert!((value - truth).abs() < ROUNDING, "{celsius}: {value} {truth}");
     }

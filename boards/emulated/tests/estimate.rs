@@ -1,0 +1,66 @@
+//! The estimation on the emulated board: the bits a host finds again, and what it costs.
+
+#[allow(dead_code, reason = "each test file uses its own share of the bench")]
+mod bench;
+
+use bench::{MS, Tape, image, world};
+use emems::{
+    derived::{self, Derived},
+    estimate::Estimator,
+    sample::Sample,
+    unit::Settings,
+};
+use twin::plant::Plant;
+
+/// Instructions in a microsecond: the emulator executes 168 million a second.
+const PER_US: u32 = 168;
+/// Instructions that half of the steps stay below: what they took when this was written, and a sixth more. 20,000 is wanted.
+const MEDIAN_CEILING: u32 = 100_000;
+
+/// Thirty seconds of tumbling from power-on, derived frames on.
+fn tumbled() -> Tape {
+    let mut tape = Tape {
+        script: vec![(MS, b"G_DL".to_vec())],
+        ..Tape::default()
+    };
+    let plant = Plant::new(world("tumble"), 7);
+    emulated::fly(image(), plant, &[], 30_000 * MS, &mut tape).expect("the image flies");
+    tape
+}
+
+#[test]
+fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
+    let tape = tumbled();
+    let (packets, frames) = (tape.packets(), tape.derived());
+    assert!(frames.len() > 145, "{} frames", frames.len());
+    let mut estimator = Estimator::of(&Settings::NOMINAL);
+    let mut costs = Vec::new();
+    for frame in &frames {
+        let packet = packets.iter().find(|(_, reading)| reading.counter == frame.counter);
+        let (_, reading) = *packet.expect("its packet");
+        let sample = Sample {
+            reading,
+            start_us: frame.start_us,
+            slots_us: frame.slots_us,
+        };
+        let again = Derived {
+            estimate: estimator.step(&sample, &frame.increments),
+            ..*frame
+        };
+        assert_eq!(
+            derived::encode(frame),
+            derived::encode(&again),
+            "cycle {}",
+            frame.counter
+        );
+        costs.push(frame.estimate_us * PER_US);
+    }
+    costs.sort_unstable();
+    println!(
+        "instructions of a step: least {}, median {}, most {}",
+        costs[0],
+        costs[costs.len() / 2],
+        costs[costs.len() - 1]
+    );
+    assert!(costs[costs.len() / 2] < MEDIAN_CEILING);
+}

@@ -1,0 +1,64 @@
+//! Axis order: the magnetometer's registers come as X, Z, Y, and its gain has eight settings; either is easily mistaken.
+
+use super::{Effect, Nature, Page, Scope, Site};
+use crate::predict::{Chain, Kind};
+
+/// `mag-axis-order`.
+pub struct AxisOrder;
+
+/// The orders of three axes; the first is as described.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+/// Signed orders: six orders by eight signs. The variant is their number; the first is as described.
+const SIGNED: u32 = 48;
+/// [counts/G] by gain setting; variants from [`SIGNED`] on are gains instead of the nominal one.
+const GAINS: [f64; 8] = [1370.0, 1090.0, 820.0, 660.0, 440.0, 390.0, 330.0, 230.0];
+const NOMINAL_GAIN: f64 = 1090.0;
+
+const PAGE: Page = Page {
+    name: "mag-axis-order",
+    physics: "The magnetometer's axes are taken in the wrong order or sign, or its gain for another setting.",
+    equation: "(x, y, z) = signed permutation of what the chip feels, or gain/1090 of it",
+    source: "HMC5883L data sheet: output registers X, Z, Y; gain settings of CRB",
+    excited_by: "any attitude",
+    siblings: &["plate-rotation", "plate-swap"],
+    confirm_by: "Point one axis after the other along the field.",
+    nature: Nature::Discrete,
+    scope: Scope::Plate,
+    common: true,
+    sensors: &[Kind::Magnetometer],
+    ..Page::SMOOTH
+};
+
+impl Effect for AxisOrder {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn act<'a>(&self, _theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
+        let (number, chip) = (variant as u32, site.triad());
+        if number >= SIGNED {
+            let gain = GAINS.get((number - SIGNED) as usize).copied().unwrap_or(NOMINAL_GAIN);
+            chain.aim.axis_b *= gain / NOMINAL_GAIN;
+            return;
+        }
+        let order = ORDERS[(number / 8) as usize];
+        let Some(place) = chip
+            .iter()
+            .position(|&index| index == site.index)
+            .filter(|_| chip.len() == 3)
+        else {
+            return;
+        };
+        let sign = if number >> place & 1 == 1 { -1.0 } else { 1.0 };
+        chain.aim.axis_b = site.unit.channels[chip[order[place]]].axis_b * sign;
+    }
+
+    /// All but the described order, then all but the nominal gain.
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        let gains = (0..GAINS.len()).filter(|&i| GAINS[i] != NOMINAL_GAIN);
+        (1..SIGNED)
+            .map(f64::from)
+            .chain(gains.map(|i| f64::from(SIGNED) + i as f64))
+            .collect()
+    }
+}

@@ -1,0 +1,94 @@
+//! Bit faults: one bit of the code is stuck, or the two bytes come in the wrong order.
+
+use super::spread::{IMPOSSIBLE, View, mixed};
+use super::{Effect, Nature, Page};
+use crate::part::signal::Noise;
+use crate::predict::Kind;
+
+/// The variant of exchanged bytes: one after bit 11, the highest a 12-bit code has apart from its sign.
+const EXCHANGED: i16 = 24;
+
+/// What the fault makes of a code.
+fn forced(code: i16, variant: i16) -> i16 {
+    match variant {
+        EXCHANGED => code.swap_bytes(),
+        _ if variant % 2 == 0 => code & !(1 << (variant / 2)),
+        _ => code | 1 << (variant / 2),
+    }
+}
+
+/// The codes that the fault makes this one of.
+fn origins(code: i16, variant: i16) -> [Option<i16>; 2] {
+    if variant == EXCHANGED {
+        return [Some(code.swap_bytes()), None];
+    }
+    let possible = forced(code, variant) == code;
+    [code, code ^ 1 << (variant / 2)].map(|origin| possible.then_some(origin))
+}
+
+/// `bit-fault`.
+pub struct BitFault;
+
+const PAGE: Page = Page {
+    name: "bit-fault",
+    physics: "A bit of the count is stuck at 0 or 1, or its two bytes are exchanged.",
+    equation: "y = code with bit k forced, or bytes exchanged",
+    source: "A line of a bus or a wrong register order",
+    excited_by: "any",
+    siblings: &["coarse-quantisation", "packet-corruption"],
+    confirm_by: "A histogram of the codes: a comb of gaps 2^k wide.",
+    nature: Nature::Spread,
+    common: true,
+    sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
+    ..Page::SMOOTH
+};
+
+impl Effect for BitFault {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        let _ = theta;
+        let of = |view: &View| -> f64 {
+            if view.channel.bits.is_none() {
+                return IMPOSSIBLE * view.measured.len() as f64;
+            }
+            let lsb = view.channel.lsb;
+            let sample = |(k, residual): (usize, f64)| {
+                let code = (view.measured[k] / lsb).round() as i16;
+                // What it must have been: one code, or, where the stuck bit hides it, two.
+                let could = origins(code, variant as i16);
+                let mass = |origin: i16| {
+                    let from = residual + f64::from(i32::from(origin) - i32::from(code)) * lsb;
+                    view.within(from - 0.5 * lsb, from + 0.5 * lsb)
+                };
+                match could {
+                    [None, None] => IMPOSSIBLE,
+                    [Some(one), None] | [None, Some(one)] => mass(one),
+                    [Some(one), Some(other)] => mixed(0.5, mass(one), mass(other)) + 2.0_f64.ln(),
+                }
+            };
+            view.residuals().map(sample).sum()
+        };
+        views.iter().map(of).sum()
+    }
+
+    fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
+        let _ = (theta, noise);
+        let faulty = |view: &View| {
+            let fault =
+                |measured: &f64| f64::from(forced((measured / view.channel.lsb).round() as i16, variant as i16));
+            view.measured
+                .iter()
+                .map(|measured| fault(measured) * view.channel.lsb)
+                .collect()
+        };
+        views.iter().map(faulty).collect()
+    }
+
+    /// `2 bit` for stuck at 0, `2 bit + 1` for stuck at 1, then exchanged bytes.
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        (0..=EXCHANGED).map(f64::from).collect()
+    }
+}

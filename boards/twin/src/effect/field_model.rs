@@ -1,0 +1,44 @@
+//! Field model: the site's field is not the one assumed.
+
+use nalgebra::Vector3;
+
+use super::{Effect, Page, Scope, Site, Symbol};
+use crate::predict::{Chain, Kind};
+
+/// `field-model`.
+pub struct FieldModel;
+
+const PAGE: Page = Page {
+    name: "field-model",
+    physics: "The geomagnetic field of the site is not the assumed one: model error, the hour of the day, or the building.",
+    equation: "m = C_bn (field_n + d_n)",
+    source: "World Magnetic Model: 150 nT; diurnal 20 to 100 nT; microteslas in buildings",
+    excited_by: "turning through all attitudes",
+    siblings: &[
+        "hard-iron",
+        "soft-iron",
+        "table-tilt",
+        "field-gradient",
+        "mag-scale-temperature",
+    ],
+    confirm_by: "A proton magnetometer, or the same turns outdoors.",
+    scope: Scope::Unit,
+    sensors: &[Kind::Magnetometer],
+    parameters: &[
+        Symbol::signed("dn", "uT", 0.5),
+        Symbol::signed("de", "uT", 0.5),
+        Symbol::signed("dd", "uT", 0.5),
+    ],
+    ..Page::SMOOTH
+};
+
+impl Effect for FieldModel {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn act<'a>(&self, theta: &'a [f64], _variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
+        let (change_n, axis_b) = (Vector3::from_column_slice(theta), site.channel.axis_b);
+        chain.add(move |feel, _| axis_b.dot(&feel.to_b(change_n)));
+    }
+}

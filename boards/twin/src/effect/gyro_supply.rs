@@ -1,0 +1,45 @@
+//! Supply sensitivity: the zero moves with the supply voltage, which sags along the log or steps with a load.
+//!
+//! No packet carries the voltage, so its course is tried: a ramp over the whole log (a battery), or a step (a load).
+
+use super::{Effect, Page, Site, Symbol, onsets};
+use crate::predict::{Chain, Kind};
+
+/// The variant that is a ramp.
+const RAMP: f64 = -1.0;
+
+/// `gyro-supply`.
+pub struct GyroSupply;
+
+const PAGE: Page = Page {
+    name: "gyro-supply",
+    physics: "The gyro's zero follows its supply voltage.",
+    equation: "y = n.w + k (V - 5), V a ramp over the log or a step",
+    source: "Gyros of this class: 0.5 deg/s per V",
+    excited_by: "a sagging battery, load steps",
+    siblings: &["gyro-bias", "gyro-warm-up", "gyro-bias-walk", "gyro-bias-temperature"],
+    confirm_by: "Read SUPPLY_OUT, or run from a bench supply and step it by 0.2 V.",
+    sensors: &[Kind::Gyro],
+    parameters: &[Symbol::signed("k_dV", "rad/s", 2e-3)],
+    ..Page::SMOOTH
+};
+
+impl Effect for GyroSupply {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn act<'a>(&self, theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
+        let shift = theta[0];
+        let (from_s, to_s) = site.log_s;
+        chain.add(move |feel, _| match variant {
+            RAMP => shift * (feel.t_s - from_s) / (to_s - from_s).max(f64::MIN_POSITIVE),
+            onset_s => shift * f64::from(feel.t_s >= onset_s),
+        });
+    }
+
+    /// A ramp, then onsets [s].
+    fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
+        core::iter::once(RAMP).chain(onsets(starts_s)).collect()
+    }
+}

@@ -1,0 +1,42 @@
+//! High-pass left on: the accelerometer's filter for motion detection takes gravity away.
+
+use core::f64::consts::TAU;
+
+use super::{Effect, Nature, Page, Scope, Site};
+use crate::predict::{Chain, Kind};
+
+/// `accel-high-pass`.
+pub struct HighPass;
+
+/// [Hz] corners of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0) at 50, 100, 400 and 1000 Hz.
+const CORNERS_HZ: [f64; 11] = [20.0, 10.0, 8.0, 5.0, 4.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.125];
+
+const PAGE: Page = Page {
+    name: "accel-high-pass",
+    physics: "The accelerometer's high-pass filter is on: what stands still, gravity above all, disappears.",
+    equation: "tau y' + y = tau (n.f)'",
+    source: "LIS331HH data sheet, CTRL_REG2 bit FDS",
+    excited_by: "rest",
+    siblings: &["stuck-channel"],
+    confirm_by: "Read CTRL_REG2; tilt the unit by hand and watch the reading die away.",
+    nature: Nature::Discrete,
+    scope: Scope::Plate,
+    common: true,
+    sensors: &[Kind::Accelerometer],
+    ..Page::SMOOTH
+};
+
+impl Effect for HighPass {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn act<'a>(&self, _theta: &'a [f64], variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
+        chain.high_pass_s = Some(1.0 / (TAU * variant));
+    }
+
+    /// Corners [Hz].
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        CORNERS_HZ.to_vec()
+    }
+}

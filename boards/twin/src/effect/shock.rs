@@ -1,0 +1,65 @@
+//! Shocks: taps, stops, separation. All accelerometers, and the gyros with them, jump together for a few samples.
+
+use super::spread::{View, mixed};
+use super::{Effect, Nature, Page, Scope, Symbol};
+use crate::part::signal::Noise;
+use crate::predict::Kind;
+
+/// `shock`.
+pub struct Shock;
+
+const PAGE: Page = Page {
+    name: "shock",
+    physics: "Blows: now and then all accelerometers are far off together, and the gyros with them.",
+    equation: "all y scatter W times as far, with probability p, together",
+    source: "Taps and stops: 1 to 100 m/s2",
+    excited_by: "blows",
+    siblings: &["vibration", "packet-corruption", "accel-hysteresis"],
+    confirm_by: "A faster log of one blow; damp the mounting.",
+    nature: Nature::Spread,
+    scope: Scope::Unit,
+    sensors: &[Kind::Accelerometer, Kind::Gyro],
+    parameters: &[Symbol::positive("p", "1", 0.01)],
+    ..Page::SMOOTH
+};
+
+impl Effect for Shock {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        let p = theta[0].clamp(0.0, 0.999);
+        let rows = views.iter().map(|view| view.measured.len()).max().unwrap_or(0);
+        let (mut usual, mut hit) = (vec![0.0; rows], vec![0.0; rows]);
+        for view in views {
+            let sigma = view.channel.sigma();
+            for (k, residual) in view.residuals() {
+                usual[k] += view.normal(residual, sigma);
+                hit[k] += view.normal(residual, sigma * variant);
+            }
+        }
+        usual
+            .into_iter()
+            .zip(hit)
+            .map(|(usual, hit)| mixed(p, usual, hit))
+            .sum()
+    }
+
+    fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
+        let hit = |(number, view): (usize, &View)| {
+            let stream = noise.stream(1 + number as u64);
+            let sample = |(k, measured): (usize, &f64)| match noise.uniform(k as u64) < theta[0] {
+                true => measured + variant * view.channel.sigma() * stream.normal(k as u64),
+                false => *measured,
+            };
+            view.measured.iter().enumerate().map(sample).collect()
+        };
+        views.iter().enumerate().map(hit).collect()
+    }
+
+    /// How many times as far they scatter.
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        vec![5.0, 20.0, 100.0]
+    }
+}

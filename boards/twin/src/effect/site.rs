@@ -1,0 +1,64 @@
+//! Where an effect acts when it acts on one channel, and what the description tells about the neighbours.
+
+use nalgebra::Vector3;
+
+use crate::environment::Environment;
+use crate::predict::{Channel, Kind, UnitDescription};
+
+/// A channel among the others, at a place on Earth, in a log.
+#[derive(Clone, Copy)]
+pub struct Site<'a> {
+    /// The unit.
+    pub unit: &'a UnitDescription,
+    /// Index of the channel.
+    pub index: usize,
+    /// The channel.
+    pub channel: &'a Channel,
+    /// Where the unit is.
+    pub environment: &'a Environment,
+    /// [s] first and last cycle of the log.
+    pub log_s: (f64, f64),
+}
+
+impl Site<'_> {
+    /// The channels of the same kind in the same group, in the order of the file: x, y, z of one chip.
+    pub fn triad(&self) -> Vec<usize> {
+        self.of_group(&self.channel.group, self.channel.sensor)
+    }
+
+    /// The channels of this kind in this group, in the order of the file.
+    pub fn of_group(&self, group: &str, sensor: Kind) -> Vec<usize> {
+        let channels = self.unit.channels.iter().enumerate();
+        let wanted = channels.filter(|(_, channel)| channel.group == group && channel.sensor == sensor);
+        wanted.map(|(index, _)| index).collect()
+    }
+
+    /// [m] place of the channel in b: its own, or that of the accelerometer on the same plate, for only these are described.
+    pub fn place_b(&self) -> Vector3<f64> {
+        let neighbour = self
+            .of_group(&self.channel.group, Kind::Accelerometer)
+            .into_iter()
+            .next();
+        neighbour.map_or(self.channel.lever_m, |index| self.unit.channels[index].lever_m)
+    }
+
+    /// An axis of the plate in b, `which` of 1, 2, 3: that of its accelerometer's or else its magnetometer's channel.
+    pub fn plate_axis_b(&self, which: f64) -> Option<Vector3<f64>> {
+        let place = (which as usize).checked_sub(1)?;
+        let vectors = [Kind::Accelerometer, Kind::Magnetometer];
+        let triads = vectors
+            .into_iter()
+            .map(|sensor| self.of_group(&self.channel.group, sensor));
+        let index = triads.filter_map(|triad| triad.get(place).copied()).next()?;
+        Some(self.unit.channels[index].axis_b)
+    }
+
+    /// Place of the channel's sensor in the reading order: how many slots are before its own.
+    pub fn read_position(&self) -> usize {
+        let before = self.unit.channels.iter().map(|channel| channel.slot_s);
+        let mut before: Vec<f64> = before.filter(|slot_s| *slot_s < self.channel.slot_s).collect();
+        before.sort_by(f64::total_cmp);
+        before.dedup();
+        before.len()
+    }
+}

@@ -1,0 +1,140 @@
+//! How likely a log is, given what was predicted: for effects that change how readings scatter.
+//!
+//! In: a [`View`] of each channel, the prediction with calibration and deterministic effects already in it. Out: natural
+//! logarithms of probabilities of what was logged, sample by sample, so that the models of two effects can be compared.
+//! A logged value stands for the interval of one resolution around it: a count, or, where nothing rounds, a small part of
+//! sigma, so that probabilities, of a value repeated to the last digit above all, are finite.
+
+use super::Effect;
+use crate::predict::Channel;
+
+/// One channel's log against its prediction.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// The channel.
+    pub channel: &'a Channel,
+    /// [s] instants, one a cycle.
+    pub t_s: &'a [f64],
+    /// [physical unit] predicted.
+    pub predicted: &'a [f64],
+    /// [physical unit] logged; NaN for no sample.
+    pub measured: &'a [f64],
+}
+
+/// Part of sigma that a log without rounding resolves.
+const RESOLVED: f64 = 1e-4;
+/// ln of a probability so small that the model is refuted by a few of them; keeps one sample from being infinitely so.
+pub(super) const IMPOSSIBLE: f64 = -40.0;
+
+impl View<'_> {
+    /// [physical unit] between two values that can be logged.
+    pub fn resolution(&self) -> f64 {
+        if self.channel.bits.is_some() {
+            self.channel.lsb
+        } else {
+            RESOLVED * self.channel.sigma()
+        }
+    }
+
+    /// [physical unit] the least and the most it can log. A channel without a stated range has that of what it logged.
+    pub fn limits(&self) -> [f64; 2] {
+        let [low, high] = self.channel.range;
+        if (high - low).is_finite() {
+            return [low, high];
+        }
+        let logged = self.measured.iter().filter(|value| value.is_finite());
+        logged.fold([-1.0, 1.0], |[low, high], &value| [low.min(value), high.max(value)])
+    }
+
+    /// [physical unit] between these.
+    pub fn span(&self) -> f64 {
+        let [low, high] = self.limits();
+        high - low
+    }
+
+    /// Index, residual of every sample there is.
+    pub fn residuals(&self) -> impl Iterator<Item = (usize, f64)> {
+        let pairs = self.measured.iter().zip(self.predicted).enumerate();
+        pairs
+            .map(|(k, (measured, predicted))| (k, measured - predicted))
+            .filter(|(_, residual)| residual.is_finite())
+    }
+
+    /// ln probability of a sample with this residual under a normal scatter of `sigma`.
+    pub fn normal(&self, residual: f64, sigma: f64) -> f64 {
+        let density = -0.5 * (residual / sigma).powi(2) - (sigma * core::f64::consts::TAU.sqrt()).ln();
+        density + self.resolution().ln()
+    }
+
+    /// ln probability that the unrounded value lies within `low` to `high` of its prediction.
+    pub fn within(&self, low: f64, high: f64) -> f64 {
+        let sigma = self.channel.noise_sigma.max(self.resolution() * RESOLVED) * core::f64::consts::SQRT_2;
+        // Both tails from the side where they are small.
+        let (low, high) = if low + high > 0.0 { (low, high) } else { (-high, -low) };
+        let mass = 0.5 * (libm::erfc(low / sigma) - libm::erfc(high / sigma));
+        if mass > 0.0 {
+            mass.ln().max(IMPOSSIBLE)
+        } else {
+            IMPOSSIBLE
+        }
+    }
+
+    /// ln probability of the log of this channel if nothing is wrong.
+    pub fn nominal(&self) -> f64 {
+        let sigma = self.channel.sigma();
+        self.residuals().map(|(_, residual)| self.normal(residual, sigma)).sum()
+    }
+}
+
+/// ln((1 - p) exp(usual) + p exp(unusual)).
+pub(super) fn mixed(p: f64, usual: f64, unusual: f64) -> f64 {
+    let (usual, unusual) = ((-p).ln_1p() + usual, p.ln() + unusual);
+    let most = usual.max(unusual);
+    if most == f64::NEG_INFINITY {
+        most
+    } else {
+        most + ((usual - most).exp() + (unusual - most).exp()).ln()
+    }
+}
+
+/// Relative sizes at which the search for the best parameter begins.
+const SIZES: [f64; 9] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0];
+/// Golden sections after it: a thousandth of the interval.
+const SECTIONS: usize = 16;
+
+/// The most likely parameters of an effect that changes the scatter of these channels, which share them, and how much
+/// likelier the log is with it than without [ln].
+pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f64>, f64) {
+    let nominal: f64 = views.iter().map(View::nominal).sum();
+    let Some(symbol) = effect.page().parameters.first() else {
+        return (Vec::new(), effect.log_likelihood(&[], variant, views) - nominal);
+    };
+    let likelihood = |theta: f64| effect.log_likelihood(&[theta], variant, views) - nominal;
+    let signs: &[f64] = if symbol.signed { &[1.0, -1.0] } else { &[1.0] };
+    let mut best = (0.0, 0.0);
+    for sign in signs {
+        let at = |size: f64| sign * size * symbol.prior_sigma;
+        let tried: Vec<f64> = SIZES.iter().map(|&size| likelihood(at(size))).collect();
+        let top = (0..SIZES.len())
+            .max_by(|&i, &j| tried[i].total_cmp(&tried[j]))
+            .unwrap_or(0);
+        let (mut low, mut high) = (
+            SIZES[top.saturating_sub(1)].ln(),
+            SIZES[(top + 1).min(SIZES.len() - 1)].ln(),
+        );
+        for _ in 0..SECTIONS {
+            let (first, second) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
+            if likelihood(at(first.exp())) > likelihood(at(second.exp())) {
+                high = second
+            } else {
+                low = first
+            }
+        }
+        let theta = at((0.5 * (low + high)).exp());
+        let gain = likelihood(theta);
+        if gain > best.1 {
+            best = (theta, gain);
+        }
+    }
+    (vec![best.0], best.1)
+}

@@ -1,0 +1,64 @@
+//! Stale samples: now and then a read times out and the value before is sent again.
+
+use super::spread::{View, mixed};
+use super::{Effect, Nature, Page, Symbol};
+use crate::part::signal::Noise;
+use crate::predict::Kind;
+
+/// `stale-sample`.
+pub struct StaleSample;
+
+const PAGE: Page = Page {
+    name: "stale-sample",
+    physics: "A read fails and the value of the cycle before is sent again.",
+    equation: "y_k = y_(k-1) with probability p",
+    source: "Timeouts on a shared bus: 0.1 to 5 %",
+    excited_by: "dynamics, or noise above a count",
+    siblings: &["sampling-jitter", "stuck-channel"],
+    confirm_by: "Error bits; codes that repeat more often than noise lets them.",
+    nature: Nature::Spread,
+    common: true,
+    sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
+    parameters: &[Symbol::positive("p", "1", 0.02)],
+    ..Page::SMOOTH
+};
+
+impl Effect for StaleSample {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        let _ = variant;
+        let p = theta[0].clamp(0.0, 0.999);
+        let of = |view: &View| -> f64 {
+            let sigma = view.channel.sigma();
+            let sample = |(k, residual): (usize, f64)| {
+                let fresh = view.normal(residual, sigma);
+                let Some(before) = k.checked_sub(1).map(|k| view.measured[k]) else {
+                    return fresh;
+                };
+                let repeated = (view.measured[k] - before).abs() < 0.5 * view.resolution();
+                mixed(p, fresh, if repeated { 0.0 } else { f64::NEG_INFINITY })
+            };
+            view.residuals().map(sample).sum()
+        };
+        views.iter().map(of).sum()
+    }
+
+    fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
+        let _ = variant;
+        let repeated = |view: &View| {
+            let mut held: Option<f64> = None;
+            let sample = |(k, measured): (usize, &f64)| {
+                // The channels of one chip are read at one instant and are stale together.
+                let stale = noise.uniform(k as u64) < theta[0];
+                let value = held.filter(|_| stale).unwrap_or(*measured);
+                held = Some(value);
+                value
+            };
+            view.measured.iter().enumerate().map(sample).collect()
+        };
+        views.iter().map(repeated).collect()
+    }
+}

@@ -1,0 +1,72 @@
+//! A stuck channel: from some instant on it says the same, whatever happens.
+
+use super::spread::{IMPOSSIBLE, View};
+use super::{Effect, Nature, Page, onsets};
+use crate::part::signal::Noise;
+use crate::predict::Kind;
+
+/// `stuck-channel`.
+pub struct StuckChannel;
+
+const PAGE: Page = Page {
+    name: "stuck-channel",
+    physics: "From some instant on the channel gives one value: a dead part, a broken wire, an overflow code.",
+    equation: "y = c from t0 on",
+    source: "Dead sensors; HMC5883L data sheet: -4096 for overflow",
+    excited_by: "any",
+    siblings: &["accel-high-pass", "stale-sample"],
+    confirm_by: "The code does not change, not even by noise.",
+    nature: Nature::Spread,
+    common: true,
+    sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
+    ..Page::SMOOTH
+};
+
+impl Effect for StuckChannel {
+    fn page(&self) -> &'static Page {
+        &PAGE
+    }
+
+    fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        let _ = theta;
+        let of = |view: &View| -> f64 {
+            let sigma = view.channel.sigma();
+            let sample = |(k, residual): (usize, f64)| {
+                let before = k
+                    .checked_sub(1)
+                    .filter(|&k| view.t_s[k] >= variant)
+                    .map(|k| view.measured[k]);
+                match before {
+                    Some(before) if (view.measured[k] - before).abs() < 0.5 * view.resolution() => 0.0,
+                    Some(before) if before.is_finite() => IMPOSSIBLE,
+                    // The value it is stuck at may be any: no worse than one in a range of counts.
+                    _ if view.t_s[k] >= variant => -(view.span() / view.resolution()).ln(),
+                    _ => view.normal(residual, sigma),
+                }
+            };
+            view.residuals().map(sample).sum()
+        };
+        views.iter().map(of).sum()
+    }
+
+    fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
+        let _ = (theta, noise);
+        let stuck = |view: &View| {
+            let mut held = None;
+            let sample = |(measured, t_s): (&f64, &f64)| {
+                if *t_s < variant {
+                    *measured
+                } else {
+                    *held.get_or_insert(*measured)
+                }
+            };
+            view.measured.iter().zip(view.t_s).map(sample).collect()
+        };
+        views.iter().map(stuck).collect()
+    }
+
+    /// Onsets [s]; the first is the start of the log.
+    fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
+        starts_s.first().copied().into_iter().chain(onsets(starts_s)).collect()
+    }
+}

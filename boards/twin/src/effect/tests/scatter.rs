@@ -1,0 +1,163 @@
+//! Effects that are told by likelihood: the discrete ones, and those that change how readings scatter.
+
+use super::*;
+
+/// Readings of the unit: prediction and its noise.
+fn noisy(twin: &Twin, predicted: &[Vec<f64>], seed: u64) -> Vec<Vec<f64>> {
+    let noise = Noise::new(seed);
+    let channels = twin.unit().channels.iter().zip(predicted).enumerate();
+    let series = channels.map(|(index, (channel, predicted))| {
+        let stream = noise.stream(index as u64);
+        let samples = predicted.iter().enumerate();
+        samples
+            .map(|(k, value)| value + channel.noise_sigma * stream.normal(k as u64))
+            .collect()
+    });
+    series.collect()
+}
+
+fn logged(twin: &Twin, measured: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let channels = twin.unit().channels.iter().zip(measured);
+    channels
+        .map(|(channel, series)| series.iter().map(|value| channel.logged(*value)).collect())
+        .collect()
+}
+
+/// Half the energy of the standardised residual: minus the logarithm of the likelihood.
+fn misfit(twin: &Twin, cause: &Cause, predicted: &[Vec<f64>], measured: &[Vec<f64>]) -> f64 {
+    0.5 * difference(twin, cause, predicted, measured).norm_squared()
+}
+
+#[test]
+fn every_discrete_effect_is_told_from_its_other_variants() {
+    let twin = twin(SPARSE);
+    let nominal = twin.predict(&[]);
+    for &effect in LIBRARY.iter().filter(|effect| effect.page().nature == Nature::Discrete) {
+        let locality = effect.localities(twin.unit()).into_iter().next().unwrap();
+        let cause = |variant| Cause {
+            effect,
+            locality: locality.clone(),
+            variant,
+        };
+        let predicted = |variant| {
+            twin.predict(&[Active {
+                cause: cause(variant),
+                theta: Vec::new(),
+            }])
+        };
+        let variants = effect.variants(twin.starts_s());
+        let all: Vec<Vec<Vec<f64>>> = variants.iter().map(|&variant| predicted(variant)).collect();
+        for (i, &variant) in variants.iter().enumerate() {
+            let whole = difference(&twin, &cause(variant), &nominal, &all[i]).norm();
+            let measured = logged(&twin, &noisy(&twin, &all[i], 3));
+            let own = misfit(&twin, &cause(variant), &all[i], &measured);
+            // Not excited by this motion: rates stay below 160 deg/s, forces below 6 g.
+            if whole < 1e-9 {
+                continue;
+            }
+            assert!(
+                misfit(&twin, &cause(variant), &nominal, &measured) > own + 20.0,
+                "{:?}",
+                cause(variant)
+            );
+            for (j, other) in all.iter().enumerate().filter(|(j, _)| *j != i) {
+                let apart = difference(&twin, &cause(variant), &all[i], other).norm();
+                let other = misfit(&twin, &cause(variant), other, &measured);
+                assert!(
+                    other > own + 20.0 || apart < 1e-9,
+                    "{:?} taken for {}",
+                    cause(variant),
+                    variants[j]
+                );
+            }
+        }
+    }
+}
+
+/// A spread effect that was put in: parameters, variant to inject with, variant to look for it with, and place.
+struct Injected(&'static str, &'static [f64], f64, f64, Locality);
+
+#[test]
+fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
+    let twin = twin(DENSE);
+    let predicted = twin.predict(&[]);
+    let one = |name: &str| Locality::Channel(name.to_owned());
+    let injected = [
+        Injected("gyro-bias-walk", &[5e-4], 0.0, 0.0, one("g2")),
+        Injected("stale-sample", &[0.1], 0.0, 0.0, one("m3x")),
+        Injected("sampling-jitter", &[4e-3], 0.0, 0.0, Locality::Unit),
+        Injected("coarse-quantisation", &[], -2.0, -2.0, one("a2y")),
+        Injected("coarse-quantisation", &[], 3.0, 3.0, one("a2y")),
+        Injected("bit-fault", &[], 7.0, 7.0, one("a1x")),
+        Injected("stuck-channel", &[], 120.0, 120.0, one("m4y")),
+        Injected("packet-corruption", &[0.1], 0.0, 0.0, one("a3z")),
+        Injected("noise-level", &[0.4], 0.0, 0.0, one("g1")),
+        Injected("vibration", &[0.5], 1.37, 0.0, one("a4x")),
+        Injected("shock", &[0.1], 20.0, 20.0, Locality::Unit),
+    ];
+    let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
+    for Injected(name, theta, inject, look, locality) in injected {
+        let effect = by_name(name).unwrap();
+        let channels = Cause {
+            effect,
+            locality,
+            variant: inject,
+        }
+        .channels(twin.unit());
+        let mut measured = noisy(&twin, &predicted, 5);
+        let healthy = logged(&twin, &measured);
+        fn views<'a>(
+            twin: &'a Twin,
+            channels: &[usize],
+            t_s: &'a [Vec<f64>],
+            predicted: &'a [Vec<f64>],
+            measured: &'a [Vec<f64>],
+        ) -> Vec<View<'a>> {
+            let view = |&channel: &usize| View {
+                channel: &twin.unit().channels[channel],
+                t_s: &t_s[channel],
+                predicted: &predicted[channel],
+                measured: &measured[channel],
+            };
+            channels.iter().map(view).collect()
+        }
+        let disturbed = effect.disturb(
+            theta,
+            inject,
+            &views(&twin, &channels, &t_s, &predicted, &measured),
+            Noise::new(9),
+        );
+        for (&channel, disturbed) in channels.iter().zip(disturbed) {
+            measured[channel] = disturbed;
+        }
+        let measured = logged(&twin, &measured);
+        let (before, after) = (
+            views(&twin, &channels, &t_s, &predicted, &healthy),
+            views(&twin, &channels, &t_s, &predicted, &measured),
+        );
+        let (_, idle) = most_likely(effect, look, &before);
+        let (found, gain) = most_likely(effect, look, &after);
+        println!("{name}: healthy {idle:.1}, found {found:?} for {theta:?}, gain {gain:.1}");
+        assert!(idle < 6.0, "{name} is seen in a healthy log: {idle}");
+        assert!(gain > 20.0, "{name} is not seen: {gain}");
+        for (found, theta) in found.iter().zip(theta) {
+            // 1200 samples: 120 events scatter by 9 %, the terms of a walk by more.
+            assert!((found / theta - 1.0).abs() < 0.35, "{name}: {found} for {theta}");
+        }
+        for &other in LIBRARY
+            .iter()
+            .filter(|other| other.page().nature == Nature::Spread && other.page().name != name)
+        {
+            let concerned = |view: &&View| other.page().sensors.contains(&view.channel.sensor);
+            let seen: Vec<View> = after.iter().filter(concerned).copied().collect();
+            for variant in other.variants(twin.starts_s()) {
+                let (_, rival) = most_likely(other, variant, &seen);
+                assert!(
+                    rival < gain,
+                    "{name} ({gain:.1}) taken for {} ({rival:.1})",
+                    other.page().name
+                );
+            }
+        }
+    }
+}

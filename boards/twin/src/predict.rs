@@ -1,0 +1,283 @@
+//! The digital twin: what every channel of a unit should read along a known motion.
+//!
+//! In: a [`UnitDescription`], a [`Scene`] (motion in environment) and the instants at which the cycles begin; then, for
+//! every question, which effects of the library are active, where and how large. Out: predicted readings in physical units
+//! before rounding, one series a channel, clipped to the channel's range; their derivatives by effect and by calibration
+//! parameter ([`Column`]), and how far they may be off ([`Channel::sigma`], [`Twin::calibration`]).
+//!
+//! Channel `k` is read at `cycle start + slot_s`. All of it is a pure function of its arguments; nothing is random here.
+
+mod calibration;
+mod chain;
+mod emems;
+mod grid;
+mod scene;
+#[cfg(test)]
+mod tests;
+mod unit;
+
+use std::borrow::Cow;
+
+pub use calibration::{Accuracy, Column};
+pub use chain::Chain;
+pub use emems::{emems, thesis_slot_s};
+pub use grid::{Grid, LowPass};
+pub use scene::{Aim, Feel, Filter, Scene};
+pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
+
+use crate::effect::{Active, Site, UnknownEffect};
+use crate::environment::Environment;
+
+/// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
+/// low-passes divide zero by zero.
+const APART: f64 = 1e-4;
+/// Step of the difference quotients, in prior sigmas: rounding is then 1e-12 of a prior effect and curvature 1e-6.
+const STEP: f64 = 1e-3;
+
+/// The twin along one log.
+pub struct Twin {
+    unit: UnitDescription,
+    environment: Environment,
+    scene: Scene,
+    /// [s] when the cycles begin.
+    starts_s: Vec<f64>,
+    /// Low-passes of the nominal channels, by kind and time constant.
+    filters: Vec<(Kind, f64, Filter)>,
+    known: Vec<Active>,
+    /// What the centre feels when a channel is read, less the delay of its low-pass, by that instant after the start of the
+    /// cycle [s]: many effects ask for it, and few move the instants.
+    felt: Vec<(f64, Vec<Feel>)>,
+    /// Inputs of the nominal channels after their low-pass: most effects leave them alone.
+    plain: Vec<Vec<f64>>,
+    nominal: Vec<Vec<f64>>,
+}
+
+impl Twin {
+    /// A twin of `unit` in `scene`, whose cycles (or rows of the log) begin at `starts_s`. `environment` is the scene's.
+    pub fn new(
+        unit: UnitDescription,
+        environment: Environment,
+        scene: Scene,
+        starts_s: Vec<f64>,
+    ) -> Result<Self, UnknownEffect> {
+        let known = unit
+            .effects
+            .iter()
+            .map(|known| Active::known(known, &unit))
+            .collect::<Result<_, _>>()?;
+        let mut filters: Vec<(Kind, f64, Filter)> = Vec::new();
+        for channel in &unit.channels {
+            let (sensor, tau_s) = (channel.sensor, channel.tau_s());
+            if !filters.iter().any(|(kind, tau, _)| (*kind, *tau) == (sensor, tau_s)) {
+                filters.push((sensor, tau_s, scene.filter(sensor, tau_s)));
+            }
+        }
+        let mut twin = Self {
+            unit,
+            environment,
+            scene,
+            starts_s,
+            filters,
+            known,
+            felt: Vec::new(),
+            plain: Vec::new(),
+            nominal: Vec::new(),
+        };
+        for channel in &twin.unit.channels {
+            let after_s = seen_s(channel);
+            if !twin.felt.iter().any(|(kept_s, _)| *kept_s == after_s) {
+                let instants_s = twin.starts_s.iter().map(|start_s| start_s + after_s);
+                twin.felt
+                    .push((after_s, instants_s.map(|t_s| twin.scene.feel(t_s)).collect()));
+            }
+        }
+        twin.plain = (0..twin.unit.channels.len())
+            .map(|index| {
+                let channel = &twin.unit.channels[index];
+                twin.inputs(&Chain::of(channel), channel.tau_s(), &twin.instants_s(index))
+            })
+            .collect();
+        twin.nominal = (0..twin.unit.channels.len())
+            .map(|index| twin.computed(index, &[]))
+            .collect();
+        Ok(twin)
+    }
+
+    /// The unit.
+    pub fn unit(&self) -> &UnitDescription {
+        &self.unit
+    }
+
+    /// Where it is.
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    /// [s] when the cycles begin.
+    pub fn starts_s(&self) -> &[f64] {
+        &self.starts_s
+    }
+
+    /// [s] when this channel is read, one instant a cycle.
+    pub fn instants_s(&self, channel: usize) -> Vec<f64> {
+        let slot_s = self.unit.channels[channel].slot_s;
+        self.starts_s.iter().map(|start_s| start_s + slot_s).collect()
+    }
+
+    /// What the unit's centre feels when this channel is read, one state a cycle.
+    pub fn feels(&self, channel: usize) -> Vec<Feel> {
+        self.instants_s(channel)
+            .into_iter()
+            .map(|t_s| self.scene.feel(t_s))
+            .collect()
+    }
+
+    /// Readings of every channel, in the order of the unit, with these effects.
+    pub fn predict(&self, active: &[Active]) -> Vec<Vec<f64>> {
+        (0..self.unit.channels.len())
+            .map(|index| self.channel(index, active).into_owned())
+            .collect()
+    }
+
+    /// Readings of one channel.
+    pub fn channel(&self, index: usize, active: &[Active]) -> Cow<'_, [f64]> {
+        match active.iter().any(|active| active.touches(index, &self.unit)) {
+            true => Cow::Owned(self.computed(index, active)),
+            false => Cow::Borrowed(&self.nominal[index]),
+        }
+    }
+
+    fn computed(&self, index: usize, active: &[Active]) -> Vec<f64> {
+        let channel = &self.unit.channels[index];
+        let t_s = self.instants_s(index);
+        let site = Site {
+            unit: &self.unit,
+            index,
+            channel,
+            environment: &self.environment,
+            log_s: (
+                *self.starts_s.first().unwrap_or(&0.0),
+                *self.starts_s.last().unwrap_or(&0.0),
+            ),
+        };
+        let mut chain = Chain::of(channel);
+        for active in self.known.iter().chain(active) {
+            active.act(&site, &mut chain);
+        }
+        let mut readings = match chain.looks_as(channel) {
+            true => self.plain[index].clone(),
+            false => self.inputs(&chain, channel.tau_s(), &t_s),
+        };
+        let felt = match chain.is_delayed() {
+            true => None,
+            false => self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel)),
+        };
+        for (row, (reading, t_s)) in readings.iter_mut().zip(&t_s).enumerate() {
+            let added = match (chain.is_additive(), felt) {
+                (false, _) => 0.0,
+                (true, Some((_, felt))) => chain.added(&felt[row], *reading),
+                (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s) - channel.tau_s()), *reading),
+            };
+            // A high-pass takes the bias with it.
+            *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
+        }
+        chain.finish(&t_s, &mut readings);
+        for reading in &mut readings {
+            *reading = reading.clamp(channel.range[0], channel.range[1]);
+        }
+        readings
+    }
+
+    /// The channel's input after its filters. Filters in a row are a weighted sum of first-order ones (partial fractions).
+    fn inputs(&self, chain: &Chain, tau_s: f64, t_s: &[f64]) -> Vec<f64> {
+        let through = |tau_s: f64| -> Vec<f64> {
+            let cached = self
+                .filters
+                .iter()
+                .find(|(kind, tau, _)| (*kind, *tau) == (chain.aim.sensor, tau_s));
+            let filter = match cached {
+                Some((_, _, filter)) => Cow::Borrowed(filter),
+                None => Cow::Owned(self.scene.filter(chain.aim.sensor, tau_s)),
+            };
+            t_s.iter()
+                .map(|t_s| self.scene.input(&chain.aim, &filter, chain.instant(*t_s)))
+                .collect()
+        };
+        let mut slow = through(tau_s);
+        if chain.lag_s > 0.0 {
+            let lag_s = apart(chain.lag_s, tau_s);
+            let second = through(lag_s);
+            combine(&mut slow, tau_s / (tau_s - lag_s), &second, -lag_s / (tau_s - lag_s));
+        } else if chain.lag_s < 0.0 {
+            // Low-pass and lead: y + |lag| y', and tau y' = u - y.
+            let lead_s = -chain.lag_s;
+            let tau_s = if tau_s > 0.0 { tau_s } else { lead_s * APART };
+            let sharper = through(0.0);
+            let softer = if slow == sharper { through(tau_s) } else { slow.clone() };
+            combine(&mut slow, 1.0, &sharper, lead_s / tau_s);
+            combine(&mut slow, 1.0, &softer, -lead_s / tau_s);
+        }
+        if let Some(high_pass_s) = chain.high_pass_s {
+            let high_pass_s = apart(high_pass_s, tau_s);
+            let kept = through(high_pass_s);
+            let gain = high_pass_s / (high_pass_s - tau_s);
+            combine(&mut slow, gain, &kept, -gain);
+        }
+        slow
+    }
+
+    /// Derivatives of the readings by the parameters of `active[of]`, one column a parameter: central differences, exact
+    /// for what is linear. Channels the effect does not touch are left out.
+    pub fn jacobian(&self, active: &[Active], of: usize) -> Vec<Column> {
+        let parameters = active[of].cause.parameters(&self.unit);
+        let touched: Vec<usize> = (0..self.unit.channels.len())
+            .filter(|&channel| active[of].touches(channel, &self.unit))
+            .collect();
+        let mut moved = active.to_vec();
+        let columns = parameters.into_iter().enumerate().map(|(i, parameter)| {
+            let step = STEP * parameter.prior_sigma;
+            let theta = active[of].theta[i];
+            let mut at = |value: f64| -> Vec<(usize, Vec<f64>)> {
+                moved[of].theta[i] = value;
+                let of_parameter = moved[of].cause.touched_by(i, &self.unit);
+                let channels = touched.iter().copied().filter(|channel| of_parameter.contains(channel));
+                channels
+                    .map(|channel| (channel, self.computed(channel, &moved)))
+                    .collect()
+            };
+            let (mut entries, before) = (at(theta + step), at(theta - step));
+            moved[of].theta[i] = theta;
+            for ((_, after), (_, before)) in entries.iter_mut().zip(before) {
+                for (after, before) in after.iter_mut().zip(before) {
+                    *after = (*after - before) / (2.0 * step);
+                }
+            }
+            Column {
+                name: parameter.name,
+                sigma: parameter.prior_sigma,
+                entries,
+            }
+        });
+        columns.collect()
+    }
+}
+
+/// [s] after the start of the cycle: what a channel's low-pass lets through when it is read, to first order in its time
+/// constant. What an effect adds comes from then; for terms of some percent of a reading that is exact enough.
+fn seen_s(channel: &Channel) -> f64 {
+    channel.slot_s - channel.tau_s()
+}
+
+fn combine(sum: &mut [f64], weight: f64, other: &[f64], other_weight: f64) {
+    for (sum, other) in sum.iter_mut().zip(other) {
+        *sum = *sum * weight + other * other_weight;
+    }
+}
+
+fn apart(tau_s: f64, from_s: f64) -> f64 {
+    if (tau_s - from_s).abs() < APART * from_s {
+        from_s * (1.0 + APART)
+    } else {
+        tau_s
+    }
+}

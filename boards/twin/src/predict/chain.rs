@@ -1,0 +1,95 @@
+//! From what is felt to what a channel reads: the stages at which a physical effect can act.
+//!
+//! ```text
+//! when it is read -> where and along what -> low-pass -> high-pass -> + added -> passed through
+//!   read_late          aim                    lag_s      high_pass_s    add        then
+//! ```
+//!
+//! A chain begins as the nominal channel; effects change it in place, and several may change one chain. All stages are
+//! exact and smooth in what the effects put in.
+
+use super::scene::{Aim, Feel};
+use super::unit::Channel;
+
+/// [s] later as a function of the nominal instant [s].
+type Delay<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
+/// [physical unit] added, from what is felt and the channel's own input.
+type Term<'a> = Box<dyn Fn(&Feel, f64) -> f64 + 'a>;
+/// Changes the series of readings; told the nominal instants [s].
+type Stage<'a> = Box<dyn Fn(&[f64], &mut [f64]) + 'a>;
+
+/// How one channel comes to its readings.
+pub struct Chain<'a> {
+    /// What it looks at.
+    pub aim: Aim,
+    /// [physical unit] constant.
+    pub bias: f64,
+    /// [s] time constant of a second first-order low-pass. Below zero it is a lead of the same slope: the low-pass of the
+    /// channel is then faster than described.
+    pub lag_s: f64,
+    /// [s] time constant of a first-order high-pass.
+    pub high_pass_s: Option<f64>,
+    delays: Vec<Delay<'a>>,
+    terms: Vec<Term<'a>>,
+    stages: Vec<Stage<'a>>,
+}
+
+impl<'a> Chain<'a> {
+    /// The nominal one.
+    pub fn of(channel: &Channel) -> Self {
+        Self {
+            aim: Aim::of(channel),
+            bias: channel.bias,
+            lag_s: 0.0,
+            high_pass_s: None,
+            delays: Vec::new(),
+            terms: Vec::new(),
+            stages: Vec::new(),
+        }
+    }
+
+    /// What is logged at `t` was physically read `delay(t)` [s] later.
+    pub fn read_late(&mut self, delay: impl Fn(f64) -> f64 + 'a) {
+        self.delays.push(Box::new(delay));
+    }
+
+    /// Adds to every reading. What is felt is that of the instant which the channel's low-pass lets through, so that what acts
+    /// on the sensor, and not behind its filter, is filtered to first order.
+    pub fn add(&mut self, term: impl Fn(&Feel, f64) -> f64 + 'a) {
+        self.terms.push(Box::new(term));
+    }
+
+    /// Changes the finished readings, given the nominal instants.
+    pub fn then(&mut self, stage: impl Fn(&[f64], &mut [f64]) + 'a) {
+        self.stages.push(Box::new(stage));
+    }
+
+    /// [s] the physical instant of what is logged at `t_s`.
+    pub(super) fn instant(&self, t_s: f64) -> f64 {
+        t_s + self.delays.iter().map(|delay| delay(t_s)).sum::<f64>()
+    }
+
+    /// Whether it is read at other instants than the nominal ones.
+    pub(super) fn is_delayed(&self) -> bool {
+        !self.delays.is_empty()
+    }
+
+    /// Whether it looks at what the nominal channel looks at, when and through what that does.
+    pub(super) fn looks_as(&self, channel: &Channel) -> bool {
+        self.aim == Aim::of(channel) && self.lag_s == 0.0 && self.high_pass_s.is_none() && !self.is_delayed()
+    }
+
+    pub(super) fn is_additive(&self) -> bool {
+        !self.terms.is_empty()
+    }
+
+    pub(super) fn added(&self, feel: &Feel, input: f64) -> f64 {
+        self.terms.iter().map(|term| term(feel, input)).sum()
+    }
+
+    pub(super) fn finish(&self, t_s: &[f64], readings: &mut [f64]) {
+        for stage in &self.stages {
+            stage(t_s, readings);
+        }
+    }
+}

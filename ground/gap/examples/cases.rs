@@ -1,0 +1,66 @@
+//! Diagnoses the cases given, a few lines each, with the seconds each took, and leaves a verdict.json in the folder that
+//! `VERDICTS` names, one folder a case: for looking at many at once.
+use std::time::Instant;
+
+use gap::{case::Subject, diagnose::diagnose, verdict::Verdict};
+
+fn main() {
+    for case in std::env::args().skip(1) {
+        let t = Instant::now();
+        let subject = match Subject::open(std::path::Path::new(&case)) {
+            Ok(subject) => subject,
+            Err(error) => {
+                println!("{case}: {error}");
+                continue;
+            }
+        };
+        let d = diagnose(&subject, &[], &|_, _| {});
+        if let Ok(folder) = std::env::var("VERDICTS") {
+            let name = std::path::Path::new(&case).file_name().unwrap_or_default();
+            let folder = std::path::Path::new(&folder).join(name);
+            let verdict = Verdict::new(&subject, &d, String::new());
+            let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
+            let written =
+                std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(folder.join("verdict.json"), text));
+            if let Err(error) = written {
+                println!("{}: {error}", folder.display());
+            }
+        }
+        println!(
+            "== {case} {:.1?} gap {:.3} gate p {:.3} ({:.1}) none {:.3} left p {:.3} ({:.1}) shrink {:.4}/{:.4}/{:.4} {:.1} % {:.0?} withdrawn {:?}",
+            t.elapsed(),
+            d.gap,
+            d.gate.p,
+            d.gate.log_tail,
+            d.none_of_these,
+            d.leftover.p,
+            d.leftover.log_tail,
+            d.shrink.before,
+            d.shrink.recalibrated,
+            d.shrink.after,
+            d.shrink.percent,
+            d.shrink.interval_percent,
+            d.withdrawn
+        );
+        for c in &d.causes {
+            println!(
+                "   {} at {} P {:.3} gain {:.0} share {:.2} {} {}",
+                c.effect,
+                c.locality,
+                c.probability,
+                c.gain,
+                c.share,
+                c.when,
+                if c.is_suspicious { "SUSPICIOUS" } else { "" }
+            );
+        }
+        println!(
+            "   alternatives {:?} indistinguishable {:?}",
+            d.alternatives.iter().take(4).collect::<Vec<_>>(),
+            d.indistinguishable
+        );
+        for a in d.leftover.aspects.iter().take(3) {
+            println!("   left: {} {:.1}", a.what, a.size);
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! A case made ready: the twin along the whole log, what may be fitted, what only judges.
+//!
+//! Refuses, naming file and key: a motion that does not reach over the windows, an environment without what the unit's
+//! sensors need, a window without a sample.
+
+use std::path::Path;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use twin::{
+    effect::Active,
+    environment::Environment,
+    motion::Recorded,
+    predict::{Accuracy, Channel, Feel, Kind, Scene, Twin, UnitDescription},
+};
+
+use super::{CaseError, Opened, Position, read_table};
+use crate::{
+    gross::{Gross, put_right},
+    held::Held,
+    log::{Column, Log, Masked, Stream},
+    windows::{Fit, Span},
+};
+
+/// [counts] what the HMC5883L sends for a field beyond its range (datasheet, table 11).
+const MAGNETOMETER_OVERFLOW: i16 = -4096;
+
+/// Share of the windows' rows that the reference must reach over: an optical system may find its markers a few seconds
+/// late, but a motion that ends early belongs to another log.
+const LEAST_SEEN: f64 = 0.9;
+
+/// Rows that are kept at most: 40 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
+const MOST_ROWS: usize = 12_000;
+
+/// A case ready to be diagnosed.
+pub struct Subject {
+    /// Its file.
+    pub opened: Opened,
+    /// The twin along the log.
+    pub twin: Twin,
+    /// How well the reference knows.
+    pub accuracy: Accuracy,
+    /// What may be fitted.
+    pub fit: Fit,
+    /// What only judges.
+    pub held: Held,
+    /// What was left out of each channel.
+    pub masked: Vec<Masked>,
+    /// What happened to the stream.
+    pub stream: Stream,
+    /// Samples left out because the reference had lost sight.
+    pub unseen: usize,
+    /// One row in so many was kept.
+    pub thinned: usize,
+    /// What was grossly wrong and is put right; in tables only.
+    pub gross: Gross,
+}
+
+impl Subject {
+    /// Reads a case.
+    ///
+    /// # Errors
+    /// When anything of it cannot be read or does not fit the rest.
+    pub fn open(path: &Path) -> Result<Self, CaseError> {
+        let opened = Opened::open(path)?;
+        let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
+        if opened.text.kind == super::Kind::Table {
+            return Subject::of_table(opened, unit);
+        }
+        let environment = environment(&opened, &unit)?;
+        let columns: Vec<Column> = unit.channels.iter().map(column).collect();
+        let mut log = opened.log(&columns, unit.cycle_s)?;
+        let name = opened.text.motion.clone().unwrap_or_default();
+        let file = opened.path(&name);
+        let motion = Recorded::open(&file)?;
+        let (from_s, to_s) = motion.span_s();
+        log = within_windows(log, &opened);
+        let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
+        log = keep_rows(log, |row, _| row % thinned == 0);
+        let overlap_s = seen_share(&log, (from_s, to_s));
+        if overlap_s < LEAST_SEEN {
+            let problem = format!(
+                "runs from {from_s} to {to_s} s and covers {:.0} % of the windows; cut them to what both have",
+                100.0 * overlap_s
+            );
+            return Err(CaseError::key(&file, "t_s", problem));
+        }
+        let mut lost_s = vec![(f64::NEG_INFINITY, from_s)];
+        lost_s.extend(motion.lost_s());
+        lost_s.push((to_s, f64::INFINITY));
+        let unseen = drop_unseen(&mut log, &lost_s, &unit);
+        let (fit, held) = opened.windows.part(&log);
+        check_windows(&opened, &fit, &held)?;
+        let step_s = motion.step_s();
+        let scene = Scene::new(&motion, &environment, from_s, to_s, step_s);
+        let Log {
+            start_s,
+            masked,
+            stream,
+            ..
+        } = log;
+        Ok(Subject {
+            twin: Twin::new(unit, environment, scene, start_s)?,
+            accuracy: accuracy(&opened),
+            opened,
+            fit,
+            held,
+            masked,
+            stream,
+            unseen,
+            thinned,
+            gross: Gross::default(),
+        })
+    }
+
+    /// Of a table: gross errors are put right first, then its positions are instants a second apart.
+    fn of_table(opened: Opened, mut unit: UnitDescription) -> Result<Self, CaseError> {
+        let file = opened.path(&opened.text.measured);
+        if let Some(channel) = unit
+            .channels
+            .iter()
+            .find(|channel| channel.bandwidth_hz.is_some() || channel.slot_s != 0.0)
+        {
+            let problem = "has a bandwidth or a slot; the rows of a table are means at rest and have neither";
+            return Err(CaseError::key(&file, &channel.name, problem));
+        }
+        let environment = environment(&opened, &unit)?;
+        let mut positions = read_table(&file, &unit.channels)?;
+        let gross = put_right(&mut positions, &mut unit.channels);
+        let columns: Vec<Column> = unit.channels.iter().map(column).collect();
+        let mut log = Log::empty(columns.len());
+        for position in &positions {
+            log.begin_row(position.seq);
+            for (index, (column, value)) in columns.iter().zip(&position.values).enumerate() {
+                log.put(index, column, *value);
+            }
+        }
+        log = within_windows(log, &opened);
+        let (fit, held) = opened.windows.part(&log);
+        check_windows(&opened, &fit, &held)?;
+        let used: Vec<Feel> = positions
+            .iter()
+            .filter(|position| log.start_s.contains(&position.seq))
+            .map(|position| steady(position, environment.temperature_c))
+            .collect();
+        let starts_s = (0..used.len()).map(|row| row as f64).collect();
+        Ok(Subject {
+            twin: Twin::new(unit, environment, Scene::table(&used), starts_s)?,
+            accuracy: accuracy(&opened),
+            opened,
+            fit,
+            held,
+            masked: log.masked,
+            stream: log.stream,
+            unseen: 0,
+            thinned: 1,
+            gross,
+        })
+    }
+
+    /// Names of channels.
+    pub fn names(&self, channels: impl IntoIterator<Item = usize>) -> Vec<String> {
+        let name = |index: usize| self.twin.unit().channels.get(index).map(|channel| channel.name.clone());
+        channels.into_iter().filter_map(name).collect()
+    }
+
+    /// Names of the channels an effect touches.
+    pub fn touched(&self, active: &Active) -> Vec<String> {
+        self.names(active.cause.channels(self.twin.unit()))
+    }
+}
+
+fn accuracy(opened: &Opened) -> Accuracy {
+    Accuracy {
+        attitude_sigma_rad: opened.text.reference.attitude_sigma_rad,
+        position_sigma_m: opened.text.reference.position_sigma_m,
+        field_sigma_ut: opened.text.environment.field_sigma_ut,
+    }
+}
+
+fn check_windows(opened: &Opened, fit: &Fit, held: &Held) -> Result<(), CaseError> {
+    let absent = |key: &str| Err(CaseError::key(&opened.file, key, "holds no sample of the log"));
+    if fit.channels.iter().all(|series| series.rows.len() < 2) {
+        return absent("windows.fit");
+    }
+    if held.counts().iter().all(|count| *count < 2) {
+        return absent("windows.hold");
+    }
+    Ok(())
+}
+
+/// What a position feels like: the command, and nothing changes.
+fn steady(position: &Position, temperature_c: f64) -> Feel {
+    Feel {
+        t_s: 0.0,
+        rate_b: position.rate_b,
+        rate_dot_b: Vector3::zeros(),
+        force_b: position.force_b,
+        field_b_ut: Vector3::zeros(),
+        temperature_c,
+        temperature_rate: 0.0,
+        q_nb: UnitQuaternion::identity(),
+        position_n: Vector3::zeros(),
+    }
+}
+
+fn column(channel: &Channel) -> Column {
+    let is_magnetometer = channel.sensor == Kind::Magnetometer && channel.bits.is_some();
+    Column {
+        name: channel.name.clone(),
+        lsb: channel.lsb,
+        range: channel.range,
+        code_range: channel.bits.map(|bits| {
+            let half = 1i64 << (bits.clamp(1, 62) - 1);
+            [-half, half - 1]
+        }),
+        overflow_counts: is_magnetometer.then_some(MAGNETOMETER_OVERFLOW),
+    }
+}
+
+fn environment(opened: &Opened, unit: &UnitDescription) -> Result<Environment, CaseError> {
+    let given = &opened.text.environment;
+    let needs = |kind: Kind| unit.channels.iter().any(|channel| channel.sensor == kind);
+    let absent = |key: &str, sensors: &str| {
+        CaseError::key(
+            &opened.file,
+            format!("environment.{key}"),
+            format!("is absent; the unit's {sensors} need it"),
+        )
+    };
+    let gravity = given.gravity_m_s2.or((!needs(Kind::Accelerometer)).then_some(0.0));
+    let latitude_deg = given.latitude_deg.or((!needs(Kind::Gyro)).then_some(0.0));
+    let field_n_ut = given.field_n_ut.or((!needs(Kind::Magnetometer)).then_some([0.0; 3]));
+    let environment = Environment {
+        gravity: gravity.ok_or_else(|| absent("gravity_m_s2", "accelerometers"))?,
+        latitude: latitude_deg
+            .ok_or_else(|| absent("latitude_deg", "gyros"))?
+            .to_radians(),
+        field_n_ut: Vector3::from(field_n_ut.ok_or_else(|| absent("field_n_ut", "magnetometers"))?),
+        temperature_c: given.temperature_c.unwrap_or(25.0),
+    };
+    let checks = [
+        (
+            "gravity_m_s2",
+            (0.0..100.0).contains(&environment.gravity),
+            "must be in m/s2, 0 to 100",
+        ),
+        (
+            "latitude_deg",
+            environment.latitude.abs() <= std::f64::consts::FRAC_PI_2,
+            "must be in degrees, -90 to 90",
+        ),
+        (
+            "field_n_ut",
+            environment.field_n_ut.norm() < 1000.0,
+            "must be in microtesla, below 1000",
+        ),
+        (
+            "temperature_c",
+            (-100.0..200.0).contains(&environment.temperature_c),
+            "must be in degrees Celsius, -100 to 200",
+        ),
+        (
+            "field_sigma_ut",
+            (0.0..1000.0).contains(&given.field_sigma_ut),
+            "must be in microtesla, 0 or more",
+        ),
+    ];
+    match checks.iter().find(|(_, holds, _)| !holds) {
+        Some((key, _, problem)) => Err(CaseError::key(&opened.file, format!("environment.{key}"), *problem)),
+        None => Ok(environment),
+    }
+}
+
+/// Keeps the rows of a window: nothing outside them is predicted, fitted or judged.
+fn within_windows(log: Log, opened: &Opened) -> Log {
+    let spans: Vec<Span> = opened
+        .windows
+        .fit()
+        .iter()
+        .chain(opened.windows.hold())
+        .copied()
+        .collect();
+    keep_rows(log, |_, start_s| spans.iter().any(|span| span.contains(start_s)))
+}
+
+fn keep_rows(mut log: Log, wanted: impl Fn(usize, f64) -> bool) -> Log {
+    let mut new_row = Vec::with_capacity(log.start_s.len());
+    let mut kept = 0u32;
+    for (row, start_s) in log.start_s.iter().enumerate() {
+        let is_wanted = wanted(row, *start_s);
+        new_row.push(is_wanted.then_some(kept));
+        kept += u32::from(is_wanted);
+    }
+    for series in &mut log.channels {
+        *series = series.only(|row| new_row[row].is_some());
+        series
+            .rows
+            .iter_mut()
+            .for_each(|row| *row = new_row[*row as usize].unwrap_or(*row));
+    }
+    let mut is_kept = new_row.iter().map(Option::is_some);
+    log.start_s.retain(|_| is_kept.next().unwrap_or(false));
+    log
+}
+
+/// Share of the rows within a span.
+fn seen_share(log: &Log, (from_s, to_s): (f64, f64)) -> f64 {
+    let seen = log.start_s.iter().filter(|t_s| (from_s..=to_s).contains(*t_s)).count();
+    seen as f64 / log.start_s.len().max(1) as f64
+}
+
+/// Leaves out samples taken while the reference saw nothing; tells how many.
+fn drop_unseen(log: &mut Log, lost_s: &[(f64, f64)], unit: &UnitDescription) -> usize {
+    let mut dropped = 0;
+    for (series, channel) in log.channels.iter_mut().zip(&unit.channels) {
+        let before = series.rows.len();
+        let start_s = &log.start_s;
+        *series = series.only(|row| {
+            let t_s = start_s[row] + channel.slot_s;
+            let next = lost_s.partition_point(|(_, to_s)| *to_s <= t_s);
+            lost_s.get(next).is_none_or(|(from_s, _)| *from_s > t_s)
+        });
+        dropped += before - series.rows.len();
+    }
+    dropped
+}

@@ -1,0 +1,274 @@
+//! The causes of a verdict: what was chosen, put into an engineer's terms.
+//!
+//! In: an [`Attribution`] or a [`Scatter`]. Out: [`Cause`]s with the channels that hold their energy, when they show, their
+//! parameters with sigmas, and their probability against everything that could stand in their place.
+
+use twin::effect::Parameter;
+
+use crate::{
+    attribute::{Attribution, Chosen},
+    case::Subject,
+    evidence::probabilities,
+    library::Library,
+    problem::Problem,
+    regime,
+    scatter::Scatter,
+};
+
+/// Evidence is raised to one over this: see [`crate::evidence`]. A guess, not yet fitted:
+/// `TRIALS.md` says how far it holds.
+pub const TEMPERATURE: f64 = 2.0;
+
+/// Prior sigmas beyond which a parameter more likely stands for something else (gap method, pitfall 19).
+const SUSPICIOUS: f64 = 5.0;
+
+/// Share of an effect's energy below which a channel is not named.
+const NAMED_SHARE: f64 = 0.02;
+
+/// One parameter of a cause.
+#[derive(Clone, Debug)]
+pub struct Sized {
+    /// Which.
+    pub parameter: Parameter,
+    /// Best value.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+}
+
+/// An effect the log speaks for.
+#[derive(Clone, Debug)]
+pub struct Cause {
+    /// Name in the library.
+    pub effect: &'static str,
+    /// Where it is.
+    pub locality: String,
+    /// Channels that hold its energy, most first.
+    pub channels: Vec<usize>,
+    /// Probability of this effect here against all others and nothing.
+    pub probability: f64,
+    /// [nats] over the model without it.
+    pub gain: f64,
+    /// Its parameters.
+    pub parameters: Vec<Sized>,
+    /// Its share of the excess that the causes explain.
+    pub share: f64,
+    /// When it shows.
+    pub when: String,
+    /// How to be sure.
+    pub confirm_by: &'static str,
+    /// What it is physically.
+    pub physics: &'static str,
+    /// It is so large that it may stand for something else.
+    pub is_suspicious: bool,
+}
+
+/// The chosen effects as causes; their shares are still energies.
+pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<Cause> {
+    let unit = problem.twin.unit();
+    let feels = problem.twin.feels(0);
+    let model = found.model(library);
+    let cause = |(index, chosen): (usize, &Chosen)| {
+        let hypothesis = &library.hypotheses[chosen.hypothesis];
+        let mut others = model.clone();
+        others.remove(index);
+        let mut energy = vec![0.0; feels.len()];
+        let mut by_channel = Vec::new();
+        for channel in hypothesis.cause.channels(unit) {
+            let (with, without) = (problem.predict(channel, &model), problem.predict(channel, &others));
+            let of_row = |row: &u32| {
+                ((with[*row as usize] - without[*row as usize]) / problem.frames[channel].weight_sigma).powi(2)
+            };
+            let rows = &problem.frames[channel].series.rows;
+            rows.iter().for_each(|row| energy[*row as usize] += of_row(row));
+            by_channel.push((channel, rows.iter().map(of_row).sum::<f64>()));
+        }
+        by_channel.sort_by(|one, other| other.1.total_cmp(&one.1));
+        let total: f64 = by_channel.iter().map(|(_, energy)| energy).sum();
+        let own = hypothesis.effect();
+        let sized = |(index, parameter): (usize, &Parameter)| Sized {
+            parameter: parameter.clone(),
+            value: chosen.theta[index],
+            sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
+        };
+        let parameters: Vec<Sized> = hypothesis.parameters.iter().enumerate().map(sized).collect();
+        Cause {
+            effect: own,
+            locality: hypothesis.cause.locality.to_string(),
+            channels: by_channel
+                .iter()
+                .filter(|(_, energy)| *energy >= NAMED_SHARE * total)
+                .map(|(channel, _)| *channel)
+                .collect(),
+            probability: probability(library, chosen),
+            gain: chosen.gain,
+            is_suspicious: oversize(&chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
+            parameters,
+            share: total,
+            when: match hypothesis.span {
+                Some(span) => format!("from {:.1} to {:.1} s", span.from, span.to),
+                None => regime::when(&feels, &energy),
+            },
+            confirm_by: hypothesis.cause.effect.page().confirm_by,
+            physics: hypothesis.cause.effect.page().physics,
+        }
+    };
+    found.chosen.iter().enumerate().map(cause).collect()
+}
+
+/// An effect on the scatter as a cause; its share is still an energy.
+pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
+    let page = scatter.effect.page();
+    let unit = subject.twin.unit();
+    let mut parameters = Vec::new();
+    for (channel, theta) in scatter.channels.iter().zip(&scatter.thetas) {
+        for (symbol, value) in page.parameters.iter().zip(theta) {
+            let parameter = Parameter {
+                name: format!("{}_{}", symbol.name, unit.channels[*channel].name),
+                unit: symbol.unit,
+                prior_sigma: symbol.prior_sigma,
+                signed: symbol.signed,
+            };
+            // A scale of scatter fitted to n samples is known to one part in the root of 2n.
+            let samples = subject.fit.channels[*channel].rows.len().max(1) as f64;
+            parameters.push(Sized {
+                parameter,
+                value: *value,
+                sigma: value.abs() / (2.0 * samples).sqrt(),
+            });
+        }
+    }
+    let gain = scatter.gain / TEMPERATURE;
+    Cause {
+        effect: page.name,
+        locality: subject.names(scatter.channels.iter().copied()).join(" "),
+        channels: scatter.channels.clone(),
+        probability: 1.0 / (1.0 + (-gain).exp()),
+        gain: scatter.gain,
+        parameters,
+        share: 2.0 * scatter.gain,
+        when: "throughout".to_owned(),
+        confirm_by: page.confirm_by,
+        physics: page.physics,
+        is_suspicious: false,
+    }
+}
+
+/// Largest parameter in prior sigmas.
+fn oversize(theta: &nalgebra::DVector<f64>, parameters: &[Parameter]) -> f64 {
+    let sizes = theta
+        .iter()
+        .zip(parameters)
+        .map(|(value, parameter)| value.abs() / parameter.prior_sigma);
+    sizes.fold(0.0, f64::max)
+}
+
+/// Probability of a chosen effect at any place, against all others and nothing. Beyond [`SUSPICIOUS`] prior sigmas it is a
+/// proxy for something else at odds that rise with the square of its size: evidence cannot tell, for the effect that is
+/// meant is in no list.
+pub fn probability(library: &Library, chosen: &Chosen) -> f64 {
+    let hypothesis = &library.hypotheses[chosen.hypothesis];
+    let own: f64 = by_effect(library, &chosen.rivals)
+        .into_iter()
+        .filter(|(name, _)| *name == hypothesis.effect())
+        .map(|(_, p)| p)
+        .sum();
+    own * itself(oversize(&chosen.theta, &hypothesis.parameters))
+}
+
+/// Probability that a chosen effect or one of those it cannot be told from is there, whichever it is.
+pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
+    let hypothesis = &library.hypotheses[chosen.hypothesis];
+    let any: f64 = by_effect(library, &chosen.rivals).into_iter().map(|(_, p)| p).sum();
+    any * itself(oversize(&chosen.theta, &hypothesis.parameters))
+}
+
+/// Probability that an effect of so many prior sigmas is itself and no proxy.
+fn itself(size: f64) -> f64 {
+    let excess = size / SUSPICIOUS;
+    if excess > 1.0 {
+        1.0 / (1.0 + excess * excess)
+    } else {
+        1.0
+    }
+}
+
+/// Energies to shares, most first.
+pub fn share_out(causes: &mut [Cause]) {
+    let total: f64 = causes.iter().map(|cause| cause.share).sum();
+    causes
+        .iter_mut()
+        .for_each(|cause| cause.share = if total > 0.0 { cause.share / total } else { 0.0 });
+    causes.sort_by(|one, other| other.share.total_cmp(&one.share));
+}
+
+/// Probabilities of the effects among rivals, places added up; what is missing from one is "nothing".
+pub fn by_effect(library: &Library, rivals: &[(usize, f64)]) -> Vec<(&'static str, f64)> {
+    let mut gains: Vec<f64> = rivals.iter().map(|(_, gain)| *gain).collect();
+    gains.push(0.0);
+    let shares = probabilities(&gains, &vec![0.0; gains.len()], TEMPERATURE);
+    let mut sums: Vec<(&'static str, f64)> = Vec::new();
+    for ((hypothesis, _), share) in rivals.iter().zip(shares) {
+        let name = library.hypotheses[*hypothesis].effect();
+        match sums.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += share,
+            None => sums.push((name, share)),
+        }
+    }
+    sums
+}
+
+/// Effects that are not causes, with the probability that one of the causes is really they, or, of a refused one, that it
+/// is there after all.
+pub fn alternatives(library: &Library, found: &Attribution, refused: &[Chosen]) -> Vec<(&'static str, f64)> {
+    let name = |chosen: &Chosen| library.hypotheses[chosen.hypothesis].effect();
+    let causes: Vec<&str> = found.chosen.iter().map(name).collect();
+    let own = refused
+        .iter()
+        .map(|refused| (name(refused), probability(library, refused)));
+    let rivals = found.chosen.iter().chain(refused).flat_map(|chosen| {
+        let mut rivals = by_effect(library, &chosen.rivals);
+        rivals.retain(|(rival, _)| *rival != name(chosen));
+        rivals
+    });
+    let mut sums: Vec<(&'static str, f64)> = Vec::new();
+    for (name, share) in own.chain(rivals) {
+        if causes.contains(&name) || share < 0.005 {
+            continue;
+        }
+        match sums.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, most)) => *most = most.max(share),
+            None => sums.push((name, share)),
+        }
+    }
+    sums.sort_by(|one, other| other.1.total_cmp(&one.1));
+    sums
+}
+
+/// What each effect gained alone at its best place, best first.
+pub fn alone(library: &Library, found: &Attribution) -> Vec<(String, f64)> {
+    let mut best: Vec<(String, f64)> = Vec::new();
+    for (hypothesis, gain) in library.hypotheses.iter().zip(&found.alone) {
+        if !gain.is_finite() {
+            continue;
+        }
+        match best.iter_mut().find(|(name, _)| name == hypothesis.effect()) {
+            Some((_, most)) => *most = most.max(*gain),
+            None => best.push((hypothesis.effect().to_owned(), *gain)),
+        }
+    }
+    best.sort_by(|one, other| other.1.total_cmp(&one.1));
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_beyond_five_prior_sigmas_is_never_named() {
+        assert_eq!(itself(4.9), 1.0);
+        assert!(itself(5.1) < 0.5);
+        assert!(itself(50.0) < 0.01);
+    }
+}

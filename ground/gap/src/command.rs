@@ -1,0 +1,156 @@
+//! `ground gap`: what the twin of a unit lacks, from a case.
+//!
+//! A thin shell: it reads the case, shows how far the work is, prints the verdict and writes `verdict.json`, the page and
+//! the twin's updated `unit.toml`.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::{
+    case::{CaseError, Subject},
+    diagnose::{Diagnosis, diagnose},
+    next, page, terminal,
+    verdict::Verdict,
+};
+
+/// Finds what the twin of a unit lacks
+///
+/// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
+/// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ground gap cases/flight-7\n  ground gap limits cases/flight-7\n  ground gap cases/flight-7 --out verdicts/flight-7"
+)]
+pub struct Arguments {
+    /// What to say: all of it, or only where, why, shrink, next or limits
+    #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
+    pub words: Vec<String>,
+    /// Write verdict.json, index.html and unit.toml in DIR
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Leave an effect out of the library; may be given several times
+    #[arg(long, value_name = "EFFECT")]
+    pub withhold: Vec<String>,
+    /// Print verdict.json instead of the screen
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Why there is no verdict.
+#[derive(Debug, thiserror::Error)]
+pub enum GapError {
+    /// The case cannot be judged.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// A word before the case is none of those known.
+    #[error("\"{0}\" is none of: where, why, shrink, next, limits")]
+    Word(String),
+    /// An effect to leave out is not in the library.
+    #[error("--withhold {0}: no effect of that name is in the library")]
+    Effect(String),
+    /// A file cannot be written.
+    #[error("{file}: cannot be written: {source}")]
+    Write {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] chart::ChartError),
+    /// The verdict is not finite somewhere.
+    #[error("the verdict cannot be written: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Runs `ground gap`.
+///
+/// # Errors
+/// When the case cannot be judged or a file not written.
+pub fn run(arguments: &Arguments) -> Result<(), GapError> {
+    let (word, case) = match arguments.words.as_slice() {
+        [case] => ("all", case),
+        [word, case] => (word.as_str(), case),
+        _ => return Err(GapError::Word(arguments.words.join(" "))),
+    };
+    if !["all", "where", "why", "shrink", "next", "limits"].contains(&word) {
+        return Err(GapError::Word(word.to_owned()));
+    }
+    if let Some(stranger) = arguments
+        .withhold
+        .iter()
+        .find(|name| twin::effect::by_name(name).is_none())
+    {
+        return Err(GapError::Effect(stranger.clone()));
+    }
+    let subject = Subject::open(Path::new(case))?;
+    let bar = ProgressBar::new(100).with_style(
+        ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.enable_steady_tick(Duration::from_millis(100));
+    let diagnosis = diagnose(&subject, &arguments.withhold, &|what, share| {
+        bar.set_message(what);
+        bar.set_position((100.0 * share) as u64);
+    });
+    bar.set_message("next");
+    let advice = next::advice(&subject, &diagnosis);
+    bar.finish_and_clear();
+    let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice.clone()))?;
+    let said = match word {
+        _ if arguments.json => format!("{verdict}\n"),
+        "where" => terminal::places(&subject, &diagnosis),
+        "shrink" => terminal::shrink(&subject, &diagnosis),
+        "next" => format!("{advice}\n"),
+        "limits" => terminal::limits(&diagnosis),
+        _ => terminal::screen(&subject, &diagnosis, &advice),
+    };
+    print!("{said}");
+    if let Some(folder) = &arguments.out {
+        write_folder(folder, &subject, &diagnosis, &advice, &verdict)?;
+    }
+    Ok(())
+}
+
+/// Judges a case as [`run`] does and leaves verdict.json in its folder, silently: the analyst's part in a challenge.
+///
+/// # Errors
+/// When the case cannot be judged or the file not written.
+pub fn write_verdict(case: &Path) -> Result<(), GapError> {
+    let subject = Subject::open(case)?;
+    let diagnosis = diagnose(&subject, &[], &|_, _| ());
+    let advice = next::advice(&subject, &diagnosis);
+    let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice))?;
+    put(case, "verdict.json", &verdict)
+}
+
+fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {
+    let file = folder.join(name);
+    std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
+}
+
+fn write_folder(
+    folder: &Path,
+    subject: &Subject,
+    diagnosis: &Diagnosis,
+    advice: &str,
+    verdict: &str,
+) -> Result<(), GapError> {
+    std::fs::create_dir_all(folder).map_err(|source| GapError::Write {
+        file: folder.to_path_buf(),
+        source,
+    })?;
+    put(folder, "verdict.json", verdict)?;
+    put(folder, "index.html", &page::html(subject, diagnosis, advice)?)?;
+    let mut unit = subject.twin.unit().clone();
+    unit.effects.extend(diagnosis.known.iter().cloned());
+    put(folder, "unit.toml", &unit.text())?;
+    println!("{}", folder.join("index.html").display());
+    Ok(())
+}

@@ -1,0 +1,340 @@
+//! From a case to a diagnosis: every step of the gap's method in its order.
+//!
+//! In: a [`Subject`] and what to leave out of the library. Out: [`Diagnosis`]. The held-out samples are asked once, at the end,
+//! about a model that no longer changes; if its effects do not shrink their gap, they are withdrawn.
+
+use nalgebra::DVector;
+
+use crate::{
+    attribute::{Chosen, attribute},
+    case::Subject,
+    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, probability_of_any, share_out},
+    confusion,
+    held::{Finished, Shrink},
+    leftover::{self, Leftover, STRETCHES, View},
+    library::Library,
+    model::Model,
+    problem::Problem,
+    scatter::{Scatter, scatters},
+    sight, temper,
+};
+
+/// [nats] an effect on the scatter must gain.
+const SCATTER_MARGIN: f64 = 3.0;
+
+/// Probability from which an effect is named.
+const SAID: f64 = 0.5;
+
+/// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
+const MOST_CAUSES: usize = 3;
+
+/// Prior probability that a unit has something the library does not.
+const UNKNOWN_PRIOR: f64 = 0.05;
+
+/// Channels whose residuals are shown.
+const TRACES: usize = 6;
+
+/// Points of a trace: more are not told apart on a page.
+const POINTS: usize = 1500;
+
+/// One channel's residual on the fit windows.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Its channel.
+    pub name: String,
+    /// ([s], [sigma]) by the nominal twin.
+    pub before: Vec<(f64, f64)>,
+    /// ([s], [sigma]) with effect and calibration in.
+    pub after: Vec<(f64, f64)>,
+}
+
+/// What a case says.
+pub struct Diagnosis {
+    /// Root mean square residual on the fit windows, in sigma.
+    pub gap: f64,
+    /// Judgement of "calibration and noise are enough".
+    pub gate: Leftover,
+    /// Most share first; empty when the twin needs nothing or nothing can be said.
+    pub causes: Vec<Cause>,
+    /// Other effects with their probabilities, most first.
+    pub alternatives: Vec<(&'static str, f64)>,
+    /// Sets this motion cannot tell apart.
+    pub indistinguishable: Vec<Vec<&'static str>>,
+    /// Probability that something outside the library is needed.
+    pub none_of_these: f64,
+    /// What the causes leave.
+    pub leftover: Leftover,
+    /// The held-out gap before and after.
+    pub shrink: Shrink,
+    /// Effects that were withdrawn because they do not shrink it.
+    pub withdrawn: Vec<&'static str>,
+    /// [nats per effect] what each hypothesis gained alone; for the page.
+    pub alone: Vec<(String, f64)>,
+    /// Smallest size of each effect that this log would show.
+    pub limits: Vec<confusion::Limit>,
+    /// The effects as the unit's description would list them.
+    pub known: Vec<twin::predict::KnownEffect>,
+    /// Residuals of the channels that stand out most.
+    pub traces: Vec<Trace>,
+    /// Per channel, the gap in each of [`STRETCHES`] stretches of the fit windows.
+    pub cells: Vec<(String, Vec<f64>)>,
+    /// The pair most worth telling apart, for planning.
+    pub rivals: Option<confusion::Pair>,
+}
+
+/// Diagnoses a case. `progress` is told what goes on and how far it is, 0 to 1.
+pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Diagnosis {
+    let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
+    let gap = root_mean_square(&problem);
+    let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
+    let mut found = attribute(&problem, &mut library, &|share| progress("search", share));
+    let quiet = Model::around(&problem, &library, Vec::new());
+    let views = sight::views(&problem);
+    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
+    let first = Model::around(&problem, &library, found.model(&library));
+    let mut scatter = best_scatter(&problem, &first, withheld);
+    let mut sigmas_after = problem.sigmas.clone();
+    let loud = scatter.as_ref().map_or_else(
+        || vec![1.0; problem.frames.len()],
+        |scatter| factors(&problem, &first, scatter),
+    );
+    sigmas_after
+        .iter_mut()
+        .zip(&loud)
+        .for_each(|(sigma, factor)| *sigma *= factor);
+    let mut tempered = temper::factors(&first.fitted.rest);
+    tempered
+        .iter_mut()
+        .zip(&loud)
+        .filter(|(_, loud)| **loud != 1.0)
+        .for_each(|(tempered, _)| *tempered = 1.0);
+    let both: Vec<f64> = loud
+        .iter()
+        .zip(&tempered)
+        .map(|(loud, tempered)| loud * tempered)
+        .collect();
+    if both.iter().any(|factor| *factor != 1.0) {
+        // The noise as found, then everything else anew with it.
+        reweigh(&mut problem, &mut library, &both);
+        found = attribute(&problem, &mut library, &|share| progress("search", share));
+    }
+    let sought = distinct(&library, &found.chosen);
+    let (kept, mut refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
+        .into_iter()
+        .partition(|chosen| probability_of_any(&library, chosen) >= SAID);
+    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
+    let is_refused = gains(&refused) > gains(&kept);
+    found.chosen = kept;
+    // What is left is judged with the noise as described, or a misfit would excuse itself.
+    let back: Vec<f64> = tempered.iter().map(|factor| 1.0 / factor).collect();
+    reweigh(&mut problem, &mut library, &back);
+    let model = Model::around(&problem, &library, found.model(&library));
+    if scatter.is_some() {
+        scatter = best_scatter(&problem, &model, withheld);
+    }
+    progress("leftover", 0.0);
+    let scattered: Vec<usize> = scatter.iter().flat_map(|scatter| scatter.channels.clone()).collect();
+    let mut left = if found.chosen.is_empty() && scatter.is_none() {
+        gate.clone()
+    } else {
+        leftover::judge(&views, &model.joint, &model.fitted, &scattered)
+    };
+    let before: Vec<Vec<f64>> = (0..problem.frames.len())
+        .map(|channel| problem.predict(channel, &[]))
+        .collect();
+    let judge = |after: &[Vec<f64>], sigmas_after: &[f64]| {
+        subject.held.judge(Finished {
+            start_s: subject.twin.starts_s(),
+            sigmas: &problem.sigmas,
+            before: &before,
+            recalibrated: &quiet.predicted,
+            after,
+            sigmas_after,
+        })
+    };
+    let mut shrink = judge(&model.predicted, &sigmas_after);
+    let mut withdrawn = Vec::new();
+    let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
+    let has_effect = !found.chosen.is_empty() || scatter.is_some();
+    let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
+    if has_effect && (!is_smaller || is_patchwork || is_refused) {
+        withdrawn.extend(
+            found
+                .chosen
+                .iter()
+                .map(|chosen| library.hypotheses[chosen.hypothesis].effect()),
+        );
+        withdrawn.extend(scatter.iter().map(|scatter| scatter.effect.page().name));
+        refused.append(&mut found.chosen);
+        scatter = None;
+    }
+    if found.chosen.is_empty() && scatter.is_none() {
+        // Without the effects what is left is all there was.
+        left = gate.clone();
+        shrink = judge(&quiet.predicted, &problem.sigmas);
+    }
+    progress("confusion", 0.0);
+    let unknown = left.unknown(UNKNOWN_PRIOR);
+    let explained = explained_share(&quiet, &model, &problem);
+    let mut causes = causes_of(&problem, &library, &found);
+    causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
+    let trust = 1.0 - unknown * (1.0 - explained);
+    causes.iter_mut().for_each(|cause| cause.probability *= trust);
+    // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
+    let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
+        causes.into_iter().partition(|cause| cause.probability >= SAID);
+    share_out(&mut causes);
+    let mut alternatives = alternatives(&library, &found, &refused);
+    let trust_in_others = if found.chosen.is_empty() { 1.0 - unknown } else { trust };
+    alternatives
+        .iter_mut()
+        .for_each(|(_, probability)| *probability *= trust_in_others);
+    alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
+    alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
+    alternatives.dedup_by_key(|(name, _)| *name);
+    Diagnosis {
+        gap,
+        gate,
+        alternatives,
+        indistinguishable: confusion::sets(&library, &found),
+        none_of_these: unknown,
+        leftover: left,
+        shrink,
+        alone: alone(&library, &found),
+        limits: confusion::limits(&library),
+        known: model
+            .components
+            .iter()
+            .filter(|_| !causes.is_empty())
+            .map(|component| component.active.to_known())
+            .collect(),
+        rivals: confusion::pair(&library, &found),
+        traces: traces(&problem, &model),
+        cells: cells(&problem, &views),
+        causes,
+        withdrawn,
+    }
+}
+
+fn root_mean_square(problem: &Problem) -> f64 {
+    let (mut energy, mut samples) = (0.0, 0);
+    for (channel, frame) in problem.frames.iter().enumerate() {
+        let scale = frame.weight_sigma / problem.sigmas[channel];
+        energy += problem.residual(channel, &[]).norm_squared() * scale * scale;
+        samples += frame.series.rows.len();
+    }
+    (energy / samples.max(1) as f64).sqrt()
+}
+
+/// How many effects are chosen: packets lost at three instants are one.
+fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
+    let names: std::collections::BTreeSet<&str> = chosen
+        .iter()
+        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
+        .collect();
+    names.len()
+}
+
+/// Takes the noise of each channel for so many times what it was.
+fn reweigh(problem: &mut Problem, library: &mut Library, factors: &[f64]) {
+    if factors.iter().all(|factor| *factor == 1.0) {
+        return;
+    }
+    problem.reweigh(factors);
+    let inverse: Vec<f64> = factors.iter().map(|factor| 1.0 / factor).collect();
+    library.products.reweigh(problem, &inverse);
+}
+
+fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
+    let all = scatters(problem, &model.predicted, withheld);
+    all.into_iter().next().filter(|scatter| scatter.gain > SCATTER_MARGIN)
+}
+
+/// How much more each channel scatters than the twin has it; 1 where the effect is not.
+fn factors(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
+    let energies = model.energies();
+    let factor = |channel: usize| {
+        let samples = problem.frames[channel].series.rows.len().max(1) as f64;
+        let is_in = scatter.channels.contains(&channel);
+        if is_in {
+            (energies[channel] / samples).sqrt().clamp(0.1, 1000.0)
+        } else {
+            1.0
+        }
+    };
+    (0..problem.frames.len()).map(factor).collect()
+}
+
+/// Share of the excess over calibration and noise that the model explains.
+fn explained_share(quiet: &Model, model: &Model, problem: &Problem) -> f64 {
+    let (before, after): (Vec<f64>, Vec<f64>) = (quiet.energies(), model.energies());
+    let excess = |energies: &[f64], nuisance: &[DVector<f64>]| -> f64 {
+        let open: f64 = nuisance.iter().map(|values| values.norm_squared()).sum();
+        let samples: usize = problem.frames.iter().map(|frame| frame.series.rows.len()).sum();
+        (energies.iter().sum::<f64>() + open - samples as f64).max(0.0)
+    };
+    let (before, after) = (
+        excess(&before, &quiet.fitted.nuisance),
+        excess(&after, &model.fitted.nuisance),
+    );
+    if before > 0.0 {
+        (1.0 - after / before).clamp(0.0, 1.0)
+    } else {
+        1.0
+    }
+}
+
+/// Residuals of the channels whose gap is largest.
+fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
+    let twin = problem.twin;
+    let mut order: Vec<(usize, f64)> = (0..problem.frames.len())
+        .map(|channel| {
+            (
+                channel,
+                problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64,
+            )
+        })
+        .collect();
+    order.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let trace = |(channel, _): &(usize, f64)| {
+        let series = &problem.frames[*channel].series;
+        let nominal = problem.predict(*channel, &[]);
+        let step = series.rows.len().div_ceil(POINTS).max(1);
+        let points = |predicted: &[f64]| {
+            let pairs = series.rows.iter().zip(&series.values).step_by(step);
+            pairs
+                .map(|(row, value)| {
+                    (
+                        twin.starts_s()[*row as usize],
+                        (value - predicted[*row as usize]) / problem.sigmas[*channel],
+                    )
+                })
+                .collect()
+        };
+        Trace {
+            name: twin.unit().channels[*channel].name.clone(),
+            before: points(&nominal),
+            after: points(&model.predicted[*channel]),
+        }
+    };
+    order.iter().take(TRACES).map(trace).collect()
+}
+
+/// The gap of each channel in each stretch of the fit windows.
+fn cells(problem: &Problem, views: &[View]) -> Vec<(String, Vec<f64>)> {
+    let cell = |(channel, view): (usize, &View)| {
+        let mut sums = vec![(0.0, 0.0); STRETCHES];
+        let scale = problem.frames[channel].weight_sigma / problem.sigmas[channel];
+        for (phase, value) in view.phase.iter().zip(problem.residual(channel, &[]).iter()) {
+            let sum = &mut sums[((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)];
+            *sum = (sum.0 + (value * scale).powi(2), sum.1 + 1.0);
+        }
+        (
+            view.name.clone(),
+            sums.into_iter()
+                .map(|(energy, samples)| f64::sqrt(energy / samples))
+                .collect(),
+        )
+    };
+    views.iter().enumerate().map(cell).collect()
+}

@@ -1,0 +1,263 @@
+//! The held-out samples, and how far a finished model shrinks their gap.
+//!
+//! In: finished predictions of every row, made without these samples. Out: [`Shrink`], the gap before, after
+//! recalibration alone, and after effect and recalibration, in total and per channel, in sigma and in physical units,
+//! with an interval. [`Held`] gives scores and nothing else: its samples are private to this file, so no fit reaches them.
+//!
+//! The gap is the root mean square of the residual over the twin's own sigma, 1 for a perfect twin; the shrink is
+//! `100 (before - after) / (before - 1)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
+//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row.
+
+use rand_distr::Distribution;
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+use crate::log::Series;
+
+/// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
+pub const BLOCK_S: f64 = 10.0;
+
+/// Bootstrap samples: the 2.5 % quantile then stands on 25 of them.
+const RESAMPLES: usize = 1000;
+
+/// Fixed, so that one case gives one verdict.
+const SEED: u64 = 0x5eed_0004;
+
+/// Samples of the hold windows.
+#[derive(Clone, Debug)]
+pub struct Held {
+    channels: Vec<Series>,
+}
+
+/// Predictions of every row of the log, channel by channel in physical units, made without the held-out samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Finished<'a> {
+    /// [s] start of each row.
+    pub start_s: &'a [f64],
+    /// Standard deviation of a sample as the nominal twin has it, one a channel.
+    pub sigmas: &'a [f64],
+    /// By the nominal twin.
+    pub before: &'a [Vec<f64>],
+    /// With the calibration refitted, no effect.
+    pub recalibrated: &'a [Vec<f64>],
+    /// With effect and calibration fitted.
+    pub after: &'a [Vec<f64>],
+    /// Standard deviation of a sample with a noise-type effect in, one a channel.
+    pub sigmas_after: &'a [f64],
+}
+
+/// One channel's gap.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelShrink {
+    /// Held-out samples that are there.
+    pub samples: usize,
+    /// Gaps in sigma.
+    pub before: f64,
+    /// With the calibration refitted.
+    pub recalibrated: f64,
+    /// With effect and calibration fitted.
+    pub after: f64,
+    /// Root mean square residual in physical units before.
+    pub before_rms: f64,
+    /// And after.
+    pub after_rms: f64,
+}
+
+impl ChannelShrink {
+    /// Whether the model made it worse by more than chance: twice the standard deviation of a gap of so many samples.
+    pub fn is_worse(&self) -> bool {
+        self.samples > 0 && self.after - self.before > 2.0 / (2.0 * self.samples as f64).sqrt()
+    }
+}
+
+/// The held-out gap before and after.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shrink {
+    /// Gap of the nominal twin, sigma.
+    pub before: f64,
+    /// Gap with the calibration refitted, no effect.
+    pub recalibrated: f64,
+    /// Gap with effect and calibration fitted.
+    pub after: f64,
+    /// 100 (before - after) / (before - 1), or 0 where there is no gap to shrink.
+    pub percent: f64,
+    /// Its 95 % interval.
+    pub interval_percent: [f64; 2],
+    /// 95 % interval of what the effect takes off beyond recalibration, in sigma of the total gap.
+    pub beyond_recalibration: [f64; 2],
+    /// In the unit's channel order.
+    pub channels: Vec<ChannelShrink>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    samples: f64,
+    before: f64,
+    recalibrated: f64,
+    after: f64,
+}
+
+impl Sums {
+    fn add(&mut self, other: Sums) {
+        self.samples += other.samples;
+        self.before += other.before;
+        self.recalibrated += other.recalibrated;
+        self.after += other.after;
+    }
+
+    fn gap(self, energy: f64) -> f64 {
+        if self.samples > 0.0 {
+            (energy / self.samples).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    fn percent(self) -> f64 {
+        let (before, after) = (self.gap(self.before), self.gap(self.after));
+        // Below a hundredth of a sigma of excess the quotient is noise over noise.
+        if before - 1.0 > 0.01 {
+            100.0 * (before - after) / (before - 1.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Held {
+    /// Takes the samples over.
+    pub(crate) fn new(channels: Vec<Series>) -> Self {
+        Held { channels }
+    }
+
+    /// Samples of each channel: how many, not which.
+    pub fn counts(&self) -> Vec<usize> {
+        self.channels.iter().map(|series| series.rows.len()).collect()
+    }
+
+    /// Judges finished predictions. Rows the reference did not see (a prediction that is not finite) are left out.
+    pub fn judge(&self, finished: Finished) -> Shrink {
+        let first_s = finished.start_s.first().copied().unwrap_or(0.0);
+        let last_s = finished.start_s.last().copied().unwrap_or(0.0);
+        let mut blocks = vec![Sums::default(); ((last_s - first_s) / BLOCK_S) as usize + 1];
+        let mut channels = Vec::new();
+        for (index, series) in self.channels.iter().enumerate() {
+            let (sigma, sigma_after) = (finished.sigmas[index], finished.sigmas_after[index]);
+            let mut sums = Sums::default();
+            let mut rms = [0.0; 2];
+            for (row, value) in series.rows.iter().zip(&series.values) {
+                let row = *row as usize;
+                let errors = [&finished.before, &finished.recalibrated, &finished.after].map(|p| value - p[index][row]);
+                if errors.iter().any(|error| !error.is_finite()) {
+                    continue;
+                }
+                let one = Sums {
+                    samples: 1.0,
+                    before: (errors[0] / sigma).powi(2),
+                    recalibrated: (errors[1] / sigma).powi(2),
+                    after: (errors[2] / sigma_after).powi(2),
+                };
+                sums.add(one);
+                blocks[((finished.start_s[row] - first_s) / BLOCK_S) as usize].add(one);
+                rms[0] += errors[0] * errors[0];
+                rms[1] += errors[2] * errors[2];
+            }
+            channels.push(ChannelShrink {
+                samples: sums.samples as usize,
+                before: sums.gap(sums.before),
+                recalibrated: sums.gap(sums.recalibrated),
+                after: sums.gap(sums.after),
+                before_rms: sums.gap(rms[0]),
+                after_rms: sums.gap(rms[1]),
+            });
+        }
+        blocks.retain(|block| block.samples > 0.0);
+        let mut total = Sums::default();
+        blocks.iter().for_each(|block| total.add(*block));
+        let (interval_percent, beyond_recalibration) = bootstrap(&blocks);
+        Shrink {
+            before: total.gap(total.before),
+            recalibrated: total.gap(total.recalibrated),
+            after: total.gap(total.after),
+            percent: total.percent(),
+            interval_percent,
+            beyond_recalibration,
+            channels,
+        }
+    }
+}
+
+/// 95 % intervals of the percentage and of what the effect takes off beyond recalibration.
+fn bootstrap(blocks: &[Sums]) -> ([f64; 2], [f64; 2]) {
+    let Ok(pick) = rand_distr::Uniform::new(0, blocks.len()) else {
+        return ([0.0; 2], [0.0; 2]);
+    };
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let (mut percents, mut beyond) = (Vec::new(), Vec::new());
+    for _ in 0..RESAMPLES {
+        let mut sums = Sums::default();
+        for _ in 0..blocks.len() {
+            sums.add(blocks[pick.sample(&mut random)]);
+        }
+        percents.push(sums.percent());
+        beyond.push(sums.gap(sums.recalibrated) - sums.gap(sums.after));
+    }
+    (central_95(percents), central_95(beyond))
+}
+
+fn central_95(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+    [at(0.025), at(0.975)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROWS: usize = 3000;
+
+    /// [s]
+    const CYCLE_S: f64 = 0.2;
+
+    /// Rounding of sums over some thousand terms.
+    const ROUNDING: f64 = 1e-9;
+
+    fn judged(before: f64, recalibrated: f64, after: f64) -> Shrink {
+        // Residuals of +-1 sigma around the perfect twin: its gap is exactly 1.
+        let series = Series {
+            rows: (0..ROWS as u32).collect(),
+            values: (0..ROWS).map(|row| if row % 2 == 0 { 1.0 } else { -1.0 }).collect(),
+        };
+        let start_s: Vec<f64> = (0..ROWS).map(|row| row as f64 * CYCLE_S).collect();
+        let level = |value: f64| vec![vec![value; ROWS]];
+        Held::new(vec![series]).judge(Finished {
+            start_s: &start_s,
+            sigmas: &[1.0],
+            before: &level(before),
+            recalibrated: &level(recalibrated),
+            after: &level(after),
+            sigmas_after: &[1.0],
+        })
+    }
+
+    #[test]
+    fn a_perfect_model_removes_the_whole_excess() {
+        let shrink = judged(2.0, 1.0, 0.0);
+        assert!((shrink.before - 5f64.sqrt()).abs() < ROUNDING);
+        assert!((shrink.percent - 100.0).abs() < ROUNDING, "{}", shrink.percent);
+        assert!(shrink.beyond_recalibration[0] > 0.0);
+    }
+
+    #[test]
+    fn a_model_that_makes_it_worse_says_so() {
+        let shrink = judged(1.0, 1.0, 2.0);
+        assert!(shrink.percent < 0.0 && shrink.interval_percent[1] < 0.0);
+        assert!(shrink.channels[0].is_worse());
+        assert!(shrink.beyond_recalibration[1] < 0.0);
+    }
+
+    #[test]
+    fn rows_the_reference_did_not_see_are_left_out() {
+        assert_eq!(judged(f64::NAN, 0.0, 0.0).channels[0].samples, 0);
+    }
+}

@@ -1,0 +1,89 @@
+//! Residuals with and without something in them.
+
+use super::*;
+use crate::joint::Columns;
+
+const SAMPLES: usize = 600;
+const CHANNELS: usize = 3;
+
+/// Three gyros, each with an open bias of five sigma of noise.
+fn scene() -> (Vec<View>, Joint) {
+    let phase: Vec<f64> = (0..SAMPLES).map(|row| row as f64 / SAMPLES as f64).collect();
+    let view = |channel: usize| View {
+        name: format!("g{channel}"),
+        kind: 1,
+        axis_b: Vector3::ith(channel, 1.0),
+        phase: phase.clone(),
+        motion: DMatrix::from_fn(SAMPLES, 2, |row, column| {
+            (row as f64 * 0.01 * (column + 1) as f64).sin()
+        }),
+    };
+    let columns = Columns {
+        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
+        effects: DMatrix::zeros(SAMPLES, 0),
+    };
+    (
+        (0..CHANNELS).map(view).collect(),
+        Joint::new(vec![columns; CHANNELS], &[]),
+    )
+}
+
+fn noise(seed: u64) -> Vec<DVector<f64>> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut channel = || DVector::from_fn(SAMPLES, |_, _| StandardNormal.sample(&mut random));
+    (0..CHANNELS).map(|_| channel()).collect()
+}
+
+fn judged(explained: &[usize], change: impl Fn(usize, &mut DVector<f64>)) -> Leftover {
+    let (views, joint) = scene();
+    let mut residuals = noise(7);
+    residuals
+        .iter_mut()
+        .enumerate()
+        .for_each(|(channel, residual)| change(channel, residual));
+    judge(&views, &joint, &joint.fit(&residuals), explained)
+}
+
+#[test]
+fn noise_alone_is_enough() {
+    let left = judged(&[], |_, _| {});
+    assert!(left.p > 0.05, "{left:?}");
+    assert!(left.unknown(0.05) < 0.06);
+}
+
+#[test]
+fn a_slow_wave_in_one_channel_is_found_there() {
+    let left = judged(&[], |channel, residual| {
+        if channel == 1 {
+            residual
+                .iter_mut()
+                .enumerate()
+                .for_each(|(row, value)| *value += 0.7 * (row as f64 * 0.05).sin());
+        }
+    });
+    assert!(left.p < 0.01, "{left:?}");
+    assert_eq!(left.aspects[0].channel, Some(1));
+    assert!(left.unknown(0.05) > 0.9);
+}
+
+#[test]
+fn what_hides_in_the_calibration_is_found_by_its_size() {
+    let left = judged(&[], |channel, residual| {
+        if channel == 2 {
+            residual.add_scalar_mut(5.0 * 8.0);
+        }
+    });
+    assert!(left.p < 0.01, "{left:?}");
+    assert!(left.aspects[0].what.contains("calibration"), "{:?}", left.aspects);
+}
+
+#[test]
+fn what_another_effect_explains_no_longer_counts() {
+    let louder = |channel: usize, residual: &mut DVector<f64>| {
+        if channel == 0 {
+            *residual *= 2.0;
+        }
+    };
+    assert!(judged(&[], louder).p < 0.01);
+    assert!(judged(&[0], louder).p > 0.05);
+}

@@ -1,0 +1,165 @@
+//! Every hypothesis of the effect library on one case, and its columns.
+//!
+//! In: the [`Problem`]. Out: a [`Hypothesis`] for each effect, place and variant, with the columns of its parameters
+//! at zero. Places share columns (one gyro's bias is the same column whether the gyro stands alone or among the four), so
+//! a column is made once. Prior odds: half for "nothing", half shared equally by the effects, and an effect's share equally
+//! by its places and variants (half to the widest places); so looking in more places costs what it should.
+
+use nalgebra::DVector;
+use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter};
+
+use crate::{
+    evidence::Screen,
+    problem::{Component, Problem},
+    products::Products,
+    windows::Span,
+};
+
+/// An effect at a place.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// Which and where.
+    pub cause: Cause,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Where the columns of its parameters stand.
+    pub places: Vec<usize>,
+    /// Logarithm of its prior odds against nothing.
+    pub log_prior: f64,
+    /// When it is on; `None` for always.
+    pub span: Option<Span>,
+}
+
+impl Hypothesis {
+    /// Name of its effect.
+    pub fn effect(&self) -> &'static str {
+        self.cause.effect.page().name
+    }
+
+    /// It, with these parameters.
+    pub fn active(&self, theta: &DVector<f64>) -> Active {
+        Active {
+            cause: self.cause.clone(),
+            theta: theta.iter().copied().collect(),
+        }
+    }
+
+    /// It, when it is on.
+    pub fn component(&self, theta: &DVector<f64>) -> Component {
+        Component {
+            active: self.active(theta),
+            span: self.span,
+        }
+    }
+}
+
+/// A column of the library: for each channel it touches, its values in units of noise.
+pub type Entries = Vec<(usize, DVector<f64>)>;
+
+/// All of them.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// In the order of the effect library.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Columns, first those of the reference.
+    pub products: Products,
+    /// Prior sigma of each column's parameter.
+    pub prior_sigmas: Vec<f64>,
+    /// How many columns are the reference's.
+    pub reference: usize,
+}
+
+impl Library {
+    /// Makes the columns; `withheld` names effects to leave out; `progress` is told how far it is, from 0 to 1.
+    pub fn new(problem: &Problem, withheld: &[String], progress: &dyn Fn(f64)) -> Self {
+        let unit = problem.twin.unit();
+        let starts_s = problem.twin.starts_s();
+        let mut library = Library {
+            hypotheses: Vec::new(),
+            products: Products::default(),
+            prior_sigmas: problem.reference.iter().map(|column| column.sigma).collect(),
+            reference: problem.reference.len(),
+        };
+        for column in problem.reference_columns() {
+            library.products.push(problem, column);
+        }
+        let is_offered = |name: &str| withheld.iter().all(|withheld| withheld != name);
+        let offered: Vec<_> = LIBRARY
+            .iter()
+            .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))
+            .collect();
+        for (done, effect) in offered.iter().enumerate() {
+            let (localities, variants) = (effect.localities(unit), effect.variants(starts_s));
+            let widest = localities.iter().filter(|locality| is_wide(locality)).count();
+            let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
+            for locality in &localities {
+                for variant in &variants {
+                    let places = if widest == 0 || widest == localities.len() {
+                        localities.len()
+                    } else if is_wide(locality) {
+                        2 * widest
+                    } else {
+                        2 * (localities.len() - widest)
+                    };
+                    let log_prior = -((LIBRARY.len() * places * variants.len()).max(1) as f64).ln();
+                    let cause = Cause {
+                        effect: **effect,
+                        locality: locality.clone(),
+                        variant: *variant,
+                    };
+                    let parameters = cause.parameters(unit);
+                    let width = effect.page().parameters.len().max(1);
+                    let find = |index: usize, known: &[(Vec<usize>, usize, f64, usize)]| {
+                        let touched = cause.touched_by(index, unit);
+                        let same = |entry: &&(Vec<usize>, usize, f64, usize)| {
+                            entry.0 == touched && entry.1 == index % width && entry.2 == *variant
+                        };
+                        known.iter().find(same).map(|entry| entry.3)
+                    };
+                    let all_known = (0..parameters.len()).all(|index| find(index, &known).is_some());
+                    if !all_known {
+                        let zero = Active {
+                            cause: cause.clone(),
+                            theta: vec![0.0; parameters.len()],
+                        };
+                        let columns = problem.twin.jacobian(&[zero], 0);
+                        for (index, column) in columns.iter().enumerate() {
+                            if find(index, &known).is_none() {
+                                let place = library.products.push(problem, problem.in_noise(column, None));
+                                known.push((cause.touched_by(index, unit), index % width, *variant, place));
+                                library.prior_sigmas.push(column.sigma);
+                            }
+                        }
+                    }
+                    let places: Vec<usize> = (0..parameters.len()).filter_map(|index| find(index, &known)).collect();
+                    if !places.is_empty() || effect.page().nature == Nature::Discrete {
+                        library.hypotheses.push(Hypothesis {
+                            cause,
+                            parameters,
+                            places,
+                            log_prior,
+                            span: None,
+                        });
+                    }
+                }
+            }
+            progress((done + 1) as f64 / offered.len() as f64);
+        }
+        library
+    }
+
+    /// Normal equations of some columns, given the scores of all.
+    pub fn screen(&self, places: &[usize], scores: &[f64]) -> Screen {
+        self.products.screen(places, scores, &self.prior_sigmas)
+    }
+
+    /// Whether a hypothesis has no parameters to fit.
+    pub fn is_discrete(&self, hypothesis: usize) -> bool {
+        self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
+    }
+}
+
+/// Whether a place is all there is: a cause behind a whole kind of sensor is as likely as one in any single place.
+fn is_wide(locality: &Locality) -> bool {
+    matches!(locality, Locality::Unit | Locality::Common | Locality::All)
+}

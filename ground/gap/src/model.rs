@@ -1,0 +1,88 @@
+//! A finished model: effects, calibration and reference fitted together, and what it predicts for every row of the log.
+
+use nalgebra::DVector;
+
+use crate::{
+    joint::{Fitted, Joint},
+    library::{Entries, Library},
+    problem::{Component, Problem, calibration},
+};
+
+/// Effects with everything else refitted around them.
+pub struct Model {
+    /// The effects.
+    pub components: Vec<Component>,
+    /// The fit, for simulating it.
+    pub joint: Joint,
+    /// What it found: the reference's and the effects' parameters, each channel's calibration, what is left.
+    pub fitted: Fitted,
+    /// Per channel, readings at every row with effects, calibration and reference in.
+    pub predicted: Vec<Vec<f64>>,
+}
+
+impl Model {
+    /// Refits calibration and reference around effects whose parameters `theta` are the best already.
+    pub fn around(problem: &Problem, library: &Library, components: Vec<Component>) -> Self {
+        let mut slopes: Vec<Entries> = (0..library.reference)
+            .map(|place| library.products.column(place).clone())
+            .collect();
+        let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
+        let mut values = vec![0.0; library.reference];
+        for (index, component) in components.iter().enumerate() {
+            let parameters = component.active.cause.parameters(problem.twin.unit());
+            if parameters.is_empty() {
+                continue;
+            }
+            slopes.extend(problem.slopes(&components, index));
+            sigmas.extend(parameters.iter().map(|parameter| parameter.prior_sigma));
+            values.extend(&component.active.theta);
+        }
+        let columns = problem.columns(&slopes);
+        let values = DVector::from_vec(values);
+        let about_zero: Vec<DVector<f64>> = columns
+            .iter()
+            .enumerate()
+            .map(|(channel, columns)| problem.residual(channel, &components) + &columns.effects * &values)
+            .collect();
+        let joint = Joint::new(columns, &sigmas);
+        let fitted = joint.fit(&about_zero);
+        let predicted = (0..problem.frames.len())
+            .map(|channel| readings(problem, &components, &fitted, channel))
+            .collect();
+        Model {
+            components,
+            joint,
+            fitted,
+            predicted,
+        }
+    }
+
+    /// The energy of what is left, per channel.
+    pub fn energies(&self) -> Vec<f64> {
+        self.fitted.rest.iter().map(|rest| rest.norm_squared()).collect()
+    }
+}
+
+/// Readings of one channel at every row.
+fn readings(problem: &Problem, components: &[Component], fitted: &Fitted, channel: usize) -> Vec<f64> {
+    let mut readings = problem.predict(channel, components);
+    let columns = calibration(problem.twin, channel);
+    let calibration = columns
+        .iter()
+        .zip(fitted.nuisance[channel].iter())
+        .map(|(column, value)| (column, value * column.sigma));
+    let reference = problem
+        .reference
+        .iter()
+        .zip(fitted.parameters.iter())
+        .map(|(column, value)| (column, *value));
+    for (column, value) in calibration.chain(reference) {
+        if let Some((_, values)) = column.entries.iter().find(|(index, _)| *index == channel) {
+            readings
+                .iter_mut()
+                .zip(values)
+                .for_each(|(reading, slope)| *reading += slope * value);
+        }
+    }
+    readings
+}

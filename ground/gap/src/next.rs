@@ -1,0 +1,187 @@
+//! The next experiment: which motion, how long, tells apart what this log could not.
+//!
+//! In: the cause and its likeliest rival, with the sizes found. Out: of a catalogue of motions the one that separates them
+//! most a minute, and the error of a decision between the two before and after it. The twin flies each motion with the
+//! unit's own channels; two effects differ there by `m` nats ([`crate::confusion`]) and are confused with probability
+//! `Q(sqrt(m/2))`.
+
+use nalgebra::DVector;
+use twin::{
+    effect::{Active, Cause, by_name},
+    motion::{Motion, RateTable, RotationTest, Still, Tumble},
+    predict::{Accuracy, Scene, Twin},
+};
+
+use crate::{
+    case::Subject, confusion::Pair, diagnose::Diagnosis, log::Series, problem::Problem, products::Products,
+    windows::Fit,
+};
+
+/// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
+const LONGEST_S: f64 = 600.0;
+
+/// [s] step at which a motion is tabulated.
+const STEP_S: f64 = 0.01;
+
+/// [nats] at which two effects count as told apart: 1 % errors.
+const ENOUGH: f64 = 11.0;
+
+/// A motion that can be ordered.
+struct Experiment {
+    name: &'static str,
+    motion: fn() -> Box<dyn Motion>,
+}
+
+const CATALOGUE: [Experiment; 5] = [
+    Experiment {
+        name: "rest in one attitude (the twin's motion \"still\")",
+        motion: || Box::new(Still::level()),
+    },
+    Experiment {
+        name: "steady rates of both signs about many axes (\"rate-table\")",
+        motion: || Box::new(RateTable::calibration()),
+    },
+    Experiment {
+        name: "turning about all axes at once (\"tumble\")",
+        motion: || Box::new(Tumble::new()),
+    },
+    Experiment {
+        name: "steps about one axis at a time (\"rotation-1\")",
+        motion: || Box::new(RotationTest::first()),
+    },
+    Experiment {
+        name: "combined attitude steps (\"rotation-2\")",
+        motion: || Box::new(RotationTest::second()),
+    },
+];
+
+/// Advice in words.
+pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
+    let confirm = diagnosis.causes.first().map(|cause| cause.confirm_by);
+    let Some(pair) = &diagnosis.rivals else {
+        return match confirm {
+            Some(confirm) => format!("Nothing is left to tell apart. To be sure: {confirm}"),
+            None if diagnosis.none_of_these > 0.5 => {
+                "Repeat this log: what the library does not know shows whether it returns with the motion, the temperature or the clock.".to_owned()
+            }
+            None => "None is needed for what this log can show; for what it cannot, see its detection limits.".to_owned(),
+        };
+    };
+    let names = (pair.own.0.effect.page().name, pair.rival.effect.page().name);
+    let before = error(pair.nats);
+    if pair.nats > ENOUGH {
+        return format!(
+            "{} and {} are apart already ({:.1e} errors). To be sure: {}",
+            names.0,
+            names.1,
+            before,
+            confirm.unwrap_or_default()
+        );
+    }
+    let tried = CATALOGUE.iter().filter_map(|experiment| {
+        let (nats, minutes) = separation(subject, pair, (experiment.motion)().as_ref())?;
+        Some((nats / minutes, nats, minutes, experiment.name))
+    });
+    let best = tried.max_by(|one, other| one.0.total_cmp(&other.0));
+    match best {
+        Some((_, nats, minutes, name)) if nats > pair.nats.max(1.0) => format!(
+            "To tell {} from {}: {name}, {minutes:.0} min; a decision between them errs with {:.1} % instead of {:.1} %.",
+            names.0,
+            names.1,
+            100.0 * error(nats),
+            100.0 * before
+        ),
+        _ => {
+            let other = by_name(names.1)
+                .map(|effect| effect.page().confirm_by)
+                .unwrap_or_default();
+            format!(
+                "No motion tells {} from {}. Change something else: {} Or: {other}",
+                names.0,
+                names.1,
+                confirm.unwrap_or_default()
+            )
+        }
+    }
+}
+
+/// Probability of deciding wrongly between two hypotheses so many nats apart: `Q(sqrt(m/2))`.
+fn error(nats: f64) -> f64 {
+    let x = (nats.max(0.0) / 2.0).sqrt();
+    0.5 * erfc(x / std::f64::consts::SQRT_2)
+}
+
+/// Complementary error function of a positive number, to 1.2e-7 (Press et al., Numerical Recipes, 6.2).
+fn erfc(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.5 * x);
+    const TERMS: [f64; 10] = [
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
+    ];
+    let sum = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
+    t * (-x * x + sum).exp()
+}
+
+/// Nats between the two on a motion, and its minutes; `None` where one of them cannot be there.
+fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f64, f64)> {
+    let unit = subject.twin.unit().clone();
+    let cycle_s = unit.cycle_s.unwrap_or(0.1);
+    let to_s = motion.duration_s().unwrap_or(LONGEST_S).min(LONGEST_S);
+    let starts_s: Vec<f64> = (0..(to_s / cycle_s) as usize).map(|row| row as f64 * cycle_s).collect();
+    let rows = starts_s.len();
+    let environment = *subject.twin.environment();
+    let scene = Scene::new(motion, &environment, 0.0, to_s, STEP_S);
+    let channels = unit.channels.len();
+    let twin = Twin::new(unit, environment, scene, starts_s).ok()?;
+    let all = Series {
+        rows: (0..rows as u32).collect(),
+        values: vec![0.0; rows],
+    };
+    let fit = Fit {
+        channels: vec![all; channels],
+    };
+    let problem = Problem::new(&twin, &fit, &Accuracy::default());
+    let mut products = Products::default();
+    let mut sigmas = Vec::new();
+    let mut add = |cause: &Cause| -> Vec<usize> {
+        let width = cause.parameters(twin.unit()).len();
+        let zero = Active {
+            cause: cause.clone(),
+            theta: vec![0.0; width],
+        };
+        let columns = twin.jacobian(&[zero], 0);
+        columns
+            .iter()
+            .map(|column| {
+                sigmas.push(column.sigma);
+                products.push(&problem, problem.in_noise(column, None))
+            })
+            .collect()
+    };
+    let (own, rival) = (add(&pair.own.0), add(&pair.rival));
+    let places: Vec<usize> = own.iter().chain(&rival).copied().collect();
+    let screen = products.screen(&places, &vec![0.0; places.len()], &sigmas);
+    let theta = DVector::from_vec(pair.own.1.clone());
+    let (share, energy) = screen.imitation(&own, &theta, &rival)?;
+    Some((0.5 * energy * (1.0 - share), to_s / 60.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eleven_nats_are_one_percent_and_three_are_eleven() {
+        assert!((error(11.0) - 0.0095).abs() < 2e-4, "{}", error(11.0));
+        assert!((error(3.0) - 0.110).abs() < 2e-3, "{}", error(3.0));
+        assert!((error(0.0) - 0.5).abs() < 1e-6);
+    }
+}

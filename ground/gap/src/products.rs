@@ -1,0 +1,108 @@
+//! Inner products of columns with the calibration marginalised, each made when first asked for.
+//!
+//! In: columns in units of noise, channel by channel. Out: `e'P f` and `e'P r`. A screen needs each hypothesis' own products
+//! and those with what is already chosen, which is a thousandth of all pairs of a library of two thousand columns.
+
+use std::{cell::RefCell, collections::HashMap};
+
+use nalgebra::DVector;
+
+use crate::{evidence::Screen, library::Entries, problem::Problem};
+
+/// Columns and the products known so far.
+#[derive(Clone, Debug, Default)]
+pub struct Products {
+    columns: Vec<Entries>,
+    /// For each column and channel `L^-1 N'e`, so that `e'P f = e'f - open_e'open_f`.
+    open: Vec<Entries>,
+    known: RefCell<HashMap<(usize, usize), f64>>,
+}
+
+impl Products {
+    /// Adds a column; returns its place.
+    pub fn push(&mut self, problem: &Problem, column: Entries) -> usize {
+        self.open.push(open_part(problem, &column));
+        self.columns.push(column);
+        self.columns.len() - 1
+    }
+
+    /// Replaces a column.
+    pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
+        self.open[place] = open_part(problem, &column);
+        self.columns[place] = column;
+        self.known
+            .borrow_mut()
+            .retain(|(one, other), _| *one != place && *other != place);
+    }
+
+    /// After the weights of the problem's channels changed by these factors.
+    pub fn reweigh(&mut self, problem: &Problem, factors: &[f64]) {
+        for (place, column) in self.columns.iter_mut().enumerate() {
+            column
+                .iter_mut()
+                .for_each(|(channel, values)| *values *= factors[*channel]);
+            self.open[place] = open_part(problem, column);
+        }
+        self.known.borrow_mut().clear();
+    }
+
+    /// A column.
+    pub fn column(&self, place: usize) -> &Entries {
+        &self.columns[place]
+    }
+
+    /// Columns there are.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// `e'P f`.
+    pub fn product(&self, one: usize, other: usize) -> f64 {
+        let key = (one.min(other), one.max(other));
+        if let Some(known) = self.known.borrow().get(&key) {
+            return *known;
+        }
+        let value = inner(&self.columns[one], &self.columns[other]) - inner(&self.open[one], &self.open[other]);
+        self.known.borrow_mut().insert(key, value);
+        value
+    }
+
+    /// `e'P r` of every column, for one residual a channel.
+    pub fn scores(&self, problem: &Problem, residuals: &[DVector<f64>]) -> Vec<f64> {
+        let all: Entries = residuals.iter().cloned().enumerate().collect();
+        let open = open_part(problem, &all);
+        let score = |(column, own): (&Entries, &Entries)| inner(column, &all) - inner(own, &open);
+        self.columns.iter().zip(&self.open).map(score).collect()
+    }
+
+    /// Normal equations of some columns.
+    pub fn screen(&self, places: &[usize], scores: &[f64], prior_sigmas: &[f64]) -> Screen {
+        let mut screen = Screen::zeros(places.iter().map(|place| prior_sigmas[*place]).collect());
+        for (row, one) in places.iter().enumerate() {
+            screen.score[row] = scores[*one];
+            for (column, other) in places.iter().enumerate() {
+                screen.information[(row, column)] = self.product(*one, *other);
+            }
+        }
+        screen
+    }
+}
+
+fn open_part(problem: &Problem, column: &Entries) -> Entries {
+    column
+        .iter()
+        .map(|(channel, values)| (*channel, problem.frames[*channel].open_part(values)))
+        .collect()
+}
+
+fn inner(one: &Entries, other: &Entries) -> f64 {
+    let on = |channel: usize| other.iter().find(|(index, _)| *index == channel);
+    one.iter()
+        .filter_map(|(channel, values)| on(*channel).map(|(_, others)| values.dot(others)))
+        .sum()
+}

@@ -1,0 +1,156 @@
+//! Effects that change how readings scatter and not what they are: noise, stale samples, coarse steps, bursts.
+//!
+//! In: the [`Problem`] and what a model predicts with its calibration. Out: the [`Scatter`] that makes the log likeliest, with
+//! the channels it is in. They are judged after the deterministic effects, whose misfit would look like noise, and those are
+//! then searched anew with the noise as found ([`crate::problem::Problem::reweigh`]).
+//!
+//! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
+//! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
+
+use twin::effect::{Effect, LIBRARY, Nature, Scope, View, most_likely};
+
+use crate::problem::Problem;
+
+/// An effect on the scatter, where it is and how large.
+#[derive(Clone)]
+pub struct Scatter {
+    /// Which.
+    pub effect: &'static dyn Effect,
+    /// Its variant.
+    pub variant: f64,
+    /// In which channels.
+    pub channels: Vec<usize>,
+    /// Parameters of each of them.
+    pub thetas: Vec<Vec<f64>>,
+    /// [nats] over the nominal scatter, prices paid.
+    pub gain: f64,
+}
+
+/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
+const ODD: f64 = 2.0;
+
+/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
+/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+fn is_odd(view: &View) -> bool {
+    let sigma = view.channel.sigma();
+    let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
+    let samples = standard.len().max(1) as f64;
+    let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
+    let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
+    let root = samples.sqrt();
+    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
+        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
+        || alike.abs() * root > ODD
+}
+
+/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
+/// would otherwise swallow any effect the library does not have, and be believed.
+const COLOURED: f64 = 0.2;
+
+/// Effects that stand for white noise, and for its outliers.
+const WHITE: [&str; 2] = ["noise-level", "shock"];
+
+/// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
+/// and these must not make the rest of the log look alike.
+const CUT: f64 = 2.0;
+
+/// Median of the absolute value of a standard normal variable.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
+
+/// Whether neighbouring residuals are alike.
+fn is_coloured(view: &View) -> bool {
+    let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let mut sizes: Vec<f64> = rest.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return false;
+    }
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let most = (CUT * median / MEDIAN_OF_NORMAL).max(f64::MIN_POSITIVE);
+    rest.iter_mut().for_each(|value| *value = value.clamp(-most, most));
+    let energy: f64 = rest.iter().map(|value| value * value).sum();
+    let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    alike > COLOURED * energy
+}
+
+/// Every effect on the scatter that gains anything, best first. `predicted` holds every row of the log.
+pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) -> Vec<Scatter> {
+    let twin = problem.twin;
+    let unit = twin.unit();
+    let instants: Vec<Vec<f64>> = (0..unit.channels.len()).map(|index| twin.instants_s(index)).collect();
+    let measured: Vec<Vec<f64>> = problem
+        .frames
+        .iter()
+        .map(|frame| {
+            let mut rows = vec![f64::NAN; twin.starts_s().len()];
+            frame
+                .series
+                .rows
+                .iter()
+                .zip(&frame.series.values)
+                .for_each(|(row, value)| rows[*row as usize] = *value);
+            rows
+        })
+        .collect();
+    let view = |index: &usize| View {
+        channel: &unit.channels[*index],
+        t_s: &instants[*index],
+        predicted: &predicted[*index],
+        measured: &measured[*index],
+    };
+    let odd: Vec<bool> = (0..unit.channels.len()).map(|index| is_odd(&view(&index))).collect();
+    let mut found = Vec::new();
+    for effect in LIBRARY {
+        let page = effect.page();
+        if page.nature != Nature::Spread || withheld.iter().any(|name| name == page.name) {
+            continue;
+        }
+        let concerned: Vec<usize> = (0..unit.channels.len())
+            .filter(|index| page.sensors.contains(&unit.channels[*index].sensor))
+            .collect();
+        let blocks: Vec<Vec<usize>> = match page.scope {
+            Scope::Channel => concerned.iter().map(|index| vec![*index]).collect(),
+            Scope::Plate => unit
+                .groups()
+                .iter()
+                .map(|group| {
+                    concerned
+                        .iter()
+                        .copied()
+                        .filter(|index| unit.channels[*index].group == *group)
+                        .collect()
+                })
+                .collect(),
+            Scope::Unit => vec![concerned],
+        };
+        let variants = effect.variants(twin.starts_s());
+        for variant in &variants {
+            let mut scatter = Scatter {
+                effect: *effect,
+                variant: *variant,
+                channels: Vec::new(),
+                thetas: Vec::new(),
+                gain: -((LIBRARY.len() * variants.len()) as f64).ln(),
+            };
+            for block in blocks.iter().filter(|block| block.iter().any(|index| odd[*index])) {
+                let views: Vec<View> = block.iter().map(view).collect();
+                let samples: usize = block.iter().map(|index| problem.frames[*index].series.rows.len()).sum();
+                if WHITE.contains(&page.name) && views.iter().any(is_coloured) {
+                    continue;
+                }
+                let (theta, gain) = most_likely(*effect, *variant, &views);
+                let price = 0.5 * (samples.max(1) as f64).ln() * theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
+                if gain > price {
+                    scatter.gain += gain - price;
+                    scatter.channels.extend(block);
+                    scatter.thetas.extend(block.iter().map(|_| theta.clone()));
+                }
+            }
+            if !scatter.channels.is_empty() && scatter.gain > 0.0 {
+                found.push(scatter);
+            }
+        }
+    }
+    found.sort_by(|one, other| other.gain.total_cmp(&one.gain));
+    found
+}

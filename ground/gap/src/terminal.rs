@@ -1,0 +1,267 @@
+//! The verdict on one screen.
+
+use std::fmt::Write;
+
+use crate::{case::Subject, diagnose::Diagnosis};
+
+/// Parameters of a cause that are printed; the rest is in the files.
+const PRINTED: usize = 4;
+
+/// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
+const REMAINS: f64 = 2.5;
+
+/// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
+const HELPED: f64 = 0.8;
+
+/// Detection limits that are printed.
+const LIMITS: usize = 4;
+
+/// The whole screen.
+pub fn screen(subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write(&mut text, subject, diagnosis, next_experiment);
+    text
+}
+
+/// Where the gap is: channels, shares, regimes, and what was left out.
+pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    for cause in &diagnosis.causes {
+        let names = subject.names(cause.channels.iter().copied()).join(" ");
+        let _ = writeln!(text, "{:>4.0} %  {names}\n        {}", 100.0 * cause.share, cause.when);
+    }
+    for aspect in diagnosis.leftover.aspects.iter().take(6) {
+        let _ = writeln!(text, "  left  {} ({:.1} sigma)", aspect.what, aspect.size);
+    }
+    text
+}
+
+/// How far it shrinks, channel by channel.
+pub fn shrink(subject: &Subject, diagnosis: &Diagnosis) -> String {
+    let shrink = &diagnosis.shrink;
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}",
+        shrink.before, shrink.recalibrated, shrink.after
+    );
+    let _ = writeln!(
+        text,
+        "shrink        {:.1} % [{:.1}, {:.1}] of the way to 1",
+        shrink.percent, shrink.interval_percent[0], shrink.interval_percent[1]
+    );
+    let _ = writeln!(
+        text,
+        "channel    before recal.  after       rms before        rms after"
+    );
+    for (channel, own) in subject.twin.unit().channels.iter().zip(&shrink.channels) {
+        let worse = if own.is_worse() { "  worse" } else { "" };
+        let _ = writeln!(
+            text,
+            "{:10} {:6.3} {:6.3} {:6.3}   {:14.6} {:16.6}{worse}",
+            channel.name, own.before, own.recalibrated, own.after, own.before_rms, own.after_rms
+        );
+    }
+    text
+}
+
+/// How large each effect could be and not be seen.
+pub fn limits(diagnosis: &Diagnosis) -> String {
+    let mut text =
+        String::from("a marginal signal-to-noise ratio of 5 on this log, at the place where it shows least\n");
+    for limit in &diagnosis.limits {
+        let _ = writeln!(
+            text,
+            "{:28} {:10.3e} {:12} {} at {} ({:.2} of its usual size)",
+            limit.effect, limit.size, limit.unit, limit.parameter, limit.locality, limit.priors
+        );
+    }
+    text
+}
+
+/// What was put right in a table, and channels that no effect helps.
+fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
+    let gross = &subject.gross;
+    for one in &gross.contradicted {
+        let reading = one
+            .reading
+            .map_or("left out: no exchange of axes or signs agrees".to_owned(), |reading| {
+                format!("read as {}", reading.words())
+            });
+        writeln!(text, "COMMAND {} contradicts the data; {reading}", one.seq)?;
+    }
+    for rows in &gross.otherwise {
+        let rows: Vec<String> = rows.iter().map(f64::to_string).collect();
+        writeln!(
+            text,
+            "        or, as well supported, these are wrong: {}",
+            rows.join(", ")
+        )?;
+    }
+    if !gross.wiring.is_empty() {
+        writeln!(text, "WIRING  {}", gross.wiring)?;
+        let inverted = subject.names(gross.inverted.iter().copied());
+        writeln!(
+            text,
+            "        {} other readings fit as well; inverted in all of the simplest: {}",
+            gross.as_good,
+            inverted.join(" ")
+        )?;
+    }
+    for (channel, repeat) in unexplained(subject, diagnosis) {
+        let name = &subject.twin.unit().channels[channel].name;
+        writeln!(
+            text,
+            "LEFT    {name}: scale drift or none of these; held out {:.1} sigma, repeats of a command differ by {:.2} %",
+            diagnosis.shrink.channels[channel].after,
+            100.0 * repeat
+        )?;
+    }
+    Ok(())
+}
+
+/// Channels of a table whose held-out gap remains and that no cause helps beyond recalibration, with the change between
+/// repeats.
+fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
+    let is_left = |channel: usize| {
+        let own = &diagnosis.shrink.channels[channel];
+        own.after > REMAINS && own.after > HELPED * own.recalibrated
+    };
+    let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
+    repeats.map(|repeat| (repeat.channel, repeat.change)).collect()
+}
+
+fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -> std::fmt::Result {
+    let shrink = &diagnosis.shrink;
+    writeln!(text, "{}  {}", subject.opened.text.name, subject.opened.text.about)?;
+    writeln!(
+        text,
+        "GAP     {:.3} sigma where 1 is perfect; calibration and noise alone: p {:.3}",
+        diagnosis.gap, diagnosis.gate.p
+    )?;
+    let (missing, clipped) = subject
+        .masked
+        .iter()
+        .fold((0, 0), |sum, one| (sum.0 + one.missing, sum.1 + one.clipped));
+    let stream = subject.stream;
+    writeln!(
+        text,
+        "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
+        stream.lost, stream.repeated, stream.rejected, subject.unseen, subject.thinned
+    )?;
+    gross(text, subject, diagnosis)?;
+    if diagnosis.causes.is_empty() {
+        let said = if diagnosis.none_of_these > 0.5 {
+            "NONE OF THESE: nothing in the library explains what is there"
+        } else {
+            "NO EFFECT beyond calibration and noise"
+        };
+        writeln!(text, "CAUSE   {said}")?;
+    }
+    for cause in &diagnosis.causes {
+        writeln!(
+            text,
+            "CAUSE   {} at {}, probability {:.3}, {:.0} % of what is explained",
+            cause.effect,
+            cause.locality,
+            cause.probability,
+            100.0 * cause.share
+        )?;
+        writeln!(text, "        {}", cause.physics)?;
+        for sized in cause.parameters.iter().take(PRINTED) {
+            writeln!(
+                text,
+                "        {} = {:.4e} +- {:.1e} {}",
+                sized.parameter.name,
+                sized.value,
+                1.96 * sized.sigma,
+                sized.parameter.unit
+            )?;
+        }
+        if cause.parameters.len() > PRINTED {
+            writeln!(text, "        and {} more parameters", cause.parameters.len() - PRINTED)?;
+        }
+        if cause.is_suspicious {
+            writeln!(
+                text,
+                "        more than five times its usual size: it may stand for something else"
+            )?;
+        }
+        writeln!(
+            text,
+            "        where {}; when {}",
+            subject.names(cause.channels.iter().copied()).join(" "),
+            cause.when
+        )?;
+        writeln!(text, "        confirm: {}", cause.confirm_by)?;
+    }
+    if !diagnosis.withdrawn.is_empty() {
+        writeln!(
+            text,
+            "        withdrawn (no shrink on held-out data, or too many at once): {}",
+            diagnosis.withdrawn.join(", ")
+        )?;
+    }
+    let others: Vec<String> = diagnosis
+        .alternatives
+        .iter()
+        .take(3)
+        .map(|(name, probability)| format!("{name} {probability:.3}"))
+        .collect();
+    if !others.is_empty() {
+        writeln!(text, "OR      {}", others.join(", "))?;
+    }
+    for set in &diagnosis.indistinguishable {
+        writeln!(text, "        this motion cannot tell apart: {}", set.join(", "))?;
+    }
+    writeln!(
+        text,
+        "NONE    something outside the library is needed with probability {:.3}",
+        diagnosis.none_of_these
+    )?;
+    for aspect in diagnosis
+        .leftover
+        .aspects
+        .iter()
+        .take(3)
+        .filter(|_| diagnosis.none_of_these > 0.5)
+    {
+        writeln!(text, "        left: {} ({:.1} sigma)", aspect.what, aspect.size)?;
+    }
+    writeln!(
+        text,
+        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibration alone {:.3}); {:.1} % [{:.1}, {:.1}]",
+        shrink.before,
+        shrink.after,
+        shrink.recalibrated,
+        shrink.percent,
+        shrink.interval_percent[0],
+        shrink.interval_percent[1]
+    )?;
+    let units = &subject.twin.unit().channels;
+    let worse: Vec<&str> = units
+        .iter()
+        .zip(&shrink.channels)
+        .filter(|(_, own)| own.is_worse())
+        .map(|(channel, _)| channel.name.as_str())
+        .collect();
+    if !worse.is_empty() {
+        writeln!(text, "        worse: {}", worse.join(" "))?;
+    }
+    if diagnosis.causes.is_empty() {
+        let weakest: Vec<String> = diagnosis
+            .limits
+            .iter()
+            .rev()
+            .take(LIMITS)
+            .map(|limit| format!("{} {:.2e} {}", limit.effect, limit.size, limit.unit))
+            .collect();
+        writeln!(
+            text,
+            "LIMITS  would be seen from: {}; all with `limits`",
+            weakest.join(", ")
+        )?;
+    }
+    writeln!(text, "NEXT    {next_experiment}")
+}

@@ -1,0 +1,188 @@
+//! `verdict.json`, as the gap case's format has it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::{case::Subject, diagnose::Diagnosis};
+
+/// The whole file.
+#[derive(Debug, Serialize)]
+pub struct Verdict {
+    case: String,
+    format: &'static str,
+    gap: Gap,
+    #[serde(rename = "where")]
+    places: Vec<Place>,
+    causes: Vec<Cause>,
+    alternatives: Vec<Alternative>,
+    indistinguishable: Vec<Vec<&'static str>>,
+    none_of_these: f64,
+    next_experiment: String,
+    shrink: Shrink,
+}
+
+#[derive(Debug, Serialize)]
+struct Gap {
+    before: f64,
+    floor: f64,
+    units: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Place {
+    channels: Vec<String>,
+    share: f64,
+    when: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Cause {
+    effect: &'static str,
+    channels: Vec<String>,
+    probability: f64,
+    parameters: BTreeMap<String, Parameter>,
+}
+
+#[derive(Debug, Serialize)]
+struct Parameter {
+    value: f64,
+    sigma: f64,
+    unit: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Alternative {
+    effect: &'static str,
+    probability: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Shrink {
+    hold_before: f64,
+    hold_recalibrated: f64,
+    hold_after: f64,
+    percent: f64,
+    interval_percent: [f64; 2],
+}
+
+/// Rounds to so many decimals: what is beyond is noise, and a verdict is read.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let factor = 10f64.powi(decimals);
+    (value * factor).round() / factor
+}
+
+impl Verdict {
+    /// Of a diagnosis.
+    pub fn new(subject: &Subject, diagnosis: &Diagnosis, next_experiment: String) -> Self {
+        let mut places: Vec<Place> = diagnosis
+            .causes
+            .iter()
+            .map(|cause| Place {
+                channels: subject.names(cause.channels.iter().copied()),
+                share: rounded(cause.share, 3),
+                when: cause.when.clone(),
+            })
+            .collect();
+        if places.is_empty() && diagnosis.none_of_these > 0.5 {
+            places.extend(unexplained(subject, diagnosis));
+        }
+        Verdict {
+            case: subject.opened.text.name.clone(),
+            format: "gap-verdict/1",
+            gap: Gap {
+                before: rounded(diagnosis.gap, 4),
+                floor: 1.0,
+                units: "sigma",
+            },
+            places,
+            causes: gross_causes(subject)
+                .chain(diagnosis.causes.iter().map(|cause| of_cause(subject, cause)))
+                .collect(),
+            alternatives: diagnosis
+                .alternatives
+                .iter()
+                .map(|(effect, probability)| Alternative {
+                    effect,
+                    probability: rounded(*probability, 4),
+                })
+                .collect(),
+            indistinguishable: diagnosis.indistinguishable.clone(),
+            none_of_these: rounded(diagnosis.none_of_these, 4),
+            next_experiment,
+            shrink: Shrink {
+                hold_before: rounded(diagnosis.shrink.before, 4),
+                hold_recalibrated: rounded(diagnosis.shrink.recalibrated, 4),
+                hold_after: rounded(diagnosis.shrink.after, 4),
+                percent: rounded(diagnosis.shrink.percent, 2),
+                interval_percent: diagnosis.shrink.interval_percent.map(|value| rounded(value, 2)),
+            },
+        }
+    }
+}
+
+/// What was put right in a table. Contradictions of others that are as well supported share the probability.
+fn gross_causes(subject: &Subject) -> impl Iterator<Item = Cause> {
+    let gross = &subject.gross;
+    let everything = 0..subject.twin.unit().channels.len();
+    let commands = gross.contradicted.iter().map(|one| {
+        let kept = move |axis: usize| one.reading.map_or(0.0, |reading| f64::from(reading.sign[axis]));
+        let parameter = move |(axis, name): (usize, &str)| {
+            let value = kept(axis);
+            (
+                format!("row {} {name}", one.seq),
+                Parameter {
+                    value,
+                    sigma: 0.0,
+                    unit: "1",
+                },
+            )
+        };
+        ["x", "y", "z"].into_iter().enumerate().map(parameter)
+    });
+    let parameters: BTreeMap<String, Parameter> = commands.flatten().collect();
+    let commands = (!parameters.is_empty()).then(|| Cause {
+        effect: "reference-sign",
+        channels: subject.names(everything),
+        probability: rounded(1.0 / (1.0 + gross.otherwise.len() as f64), 4),
+        parameters,
+    });
+    commands.into_iter()
+}
+
+fn of_cause(subject: &Subject, cause: &crate::cause::Cause) -> Cause {
+    let parameters = cause.parameters.iter().map(|sized| {
+        let parameter = Parameter {
+            value: sized.value,
+            sigma: sized.sigma,
+            unit: sized.parameter.unit,
+        };
+        (sized.parameter.name.clone(), parameter)
+    });
+    Cause {
+        effect: cause.effect,
+        channels: subject.names(cause.channels.iter().copied()),
+        probability: rounded(cause.probability, 4),
+        parameters: parameters.collect(),
+    }
+}
+
+/// Where an unexplained residual shows: channels by the square of how far they stand out.
+fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Option<Place> {
+    let mut sizes: BTreeMap<usize, f64> = BTreeMap::new();
+    for aspect in &diagnosis.leftover.aspects {
+        if let Some(channel) = aspect.channel {
+            let size = sizes.entry(channel).or_default();
+            *size = size.max(aspect.size);
+        }
+    }
+    let most = sizes.values().copied().fold(0.0, f64::max);
+    let mut channels: Vec<(usize, f64)> = sizes.into_iter().filter(|(_, size)| *size > 0.5 * most).collect();
+    channels.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let first = diagnosis.leftover.aspects.first()?;
+    Some(Place {
+        channels: subject.names(channels.into_iter().map(|(channel, _)| channel)),
+        share: 1.0,
+        when: first.what.clone(),
+    })
+}

@@ -1,0 +1,68 @@
+//! Cases with known answers, read where they are: they are not part of the project.
+
+use std::path::{Path, PathBuf};
+
+use gap::{case::Subject, diagnose::diagnose};
+
+/// The folder of a practice case; `None`, with a message, where there is none.
+fn practice(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/practice")
+        .join(name);
+    if !folder.join("case.toml").is_file() {
+        println!("skipped: {} is not here", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+fn check(name: &str, effect: Option<&str>) {
+    let Some(folder) = practice(name) else { return };
+    let diagnosis = diagnose(&Subject::open(&folder).expect("opens"), &[], &|_, _| {});
+    let named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect).collect();
+    assert_eq!(named, effect.into_iter().collect::<Vec<_>>(), "{name}");
+    assert!(diagnosis.none_of_these < 0.5, "{name}: {}", diagnosis.none_of_these);
+    if effect.is_some() {
+        assert!(
+            diagnosis.shrink.percent > 90.0,
+            "{name}: {:?}",
+            diagnosis.shrink.percent
+        );
+    }
+}
+
+#[test]
+fn a_displaced_unit_on_a_centrifuge_is_named() {
+    check("P13", Some("lever-arm"));
+}
+
+#[test]
+fn low_bits_cut_off_are_named() {
+    check("P02", Some("coarse-quantisation"));
+}
+
+#[test]
+fn a_healthy_unit_is_given_no_cause() {
+    check("P12", None);
+}
+
+/// Sixteen sequences on a rate table, as printed (thesis 000, tables 7.3 and 7.4).
+#[test]
+fn a_printed_table_yields_its_wrong_commands_its_inverted_gyro_and_the_sagnac_sine() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases/siqueira-table-7-4");
+    if !folder.join("case.toml").is_file() {
+        println!("skipped: {} is not here", folder.display());
+        return;
+    }
+    let subject = Subject::open(&folder).expect("opens");
+    let wrong: Vec<f64> = subject.gross.contradicted.iter().map(|one| one.seq).collect();
+    assert_eq!(wrong, [7.0, 8.0, 11.0, 12.0, 15.0]);
+    assert_eq!(subject.names(subject.gross.inverted.iter().copied()), ["sd04"]);
+    let diagnosis = diagnose(&subject, &[], &|_, _| {});
+    assert_eq!(
+        diagnosis.causes.first().map(|cause| cause.effect),
+        Some("gyro-sine-response")
+    );
+    let screen = gap::terminal::screen(&subject, &diagnosis, "");
+    assert!(screen.contains("lme02: scale drift or none of these"), "{screen}");
+}

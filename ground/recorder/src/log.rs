@@ -1,0 +1,235 @@
+//! What a raw image or a dump holds: records by key.
+//!
+//! In: the bytes of a chip (528 a page, block after block) or of a dump (packets and `%` frames, however mixed with other
+//! text). Out: a [`Log`]. Every whole record of every epoch counts, from either half of whichever page, in place or not;
+//! a key found twice must hold the same. Refuses what is larger than any chip of this class or its dump
+//! ([`LIMIT`]), so that memory and time are bounded by it, whatever the content claims.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use emems::{
+    flight_log::{
+        dump::{self, DUMP_BYTES, DUMP_START},
+        page::{self, Kind, Stamp},
+        record::{self, BootHeader, Content, Entry, Key, RecordBytes, RecordError},
+        superblock,
+    },
+    nand::{MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes},
+    packet::PACKET_BYTES,
+};
+
+/// [bytes] the largest file that is read: a K9F1208's image has 69 million, a dump of it 49 million.
+pub const LIMIT: u64 = 128 << 20;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Log {
+    /// Packet records.
+    pub packets: BTreeMap<Key, Entry>,
+    /// Boot headers.
+    pub headers: BTreeMap<Key, BootHeader>,
+    /// The epoch of the newest superblock: older ones were erased by command.
+    pub epoch: Option<u16>,
+    /// How good the medium was.
+    pub damage: Damage,
+}
+
+/// How good the medium was.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Damage {
+    /// Pages or frames that hold something.
+    pub used: u64,
+    /// Bits corrected.
+    pub corrected: u64,
+    /// Halves of pages that no code puts right, torn pages included.
+    pub lost: u64,
+    /// Pages that say they belong elsewhere.
+    pub astray: u64,
+    /// Records that differ from another with the same key; the one found first is kept.
+    pub conflicts: BTreeSet<Key>,
+    /// Versions of records of a newer format: they are left out.
+    pub newer: BTreeSet<u8>,
+}
+
+/// Why a file is not read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LogError {
+    /// It is larger than a chip.
+    #[error("{0} bytes are more than any chip of this class or a dump of it ({LIMIT})")]
+    TooLarge(u64),
+    /// The log is of a newer format.
+    #[error("the log is of format version {0}, newer than this program: update it")]
+    Newer(u8),
+}
+
+/// Whether the bytes are a raw image: a superblock or a page of the log stands in some page's place.
+pub fn is_image(bytes: &[u8]) -> bool {
+    let pages = bytes.as_chunks::<PAGE_BYTES>().0.iter().enumerate();
+    pages
+        .into_iter()
+        .any(|(number, bytes)| matches!(stamp_of(number, bytes), Stamp::Ours(_)))
+}
+
+/// What these bytes hold: an image or a dump, whichever they are.
+///
+/// # Errors
+/// When they are too many, or a superblock says that the format is newer.
+pub fn read(bytes: &[u8]) -> Result<Log, LogError> {
+    if bytes.len() as u64 > LIMIT {
+        return Err(LogError::TooLarge(bytes.len() as u64));
+    }
+    if is_image(bytes) {
+        read_image(bytes)
+    } else {
+        Ok(read_dump(bytes))
+    }
+}
+
+fn address(number: usize) -> PageAddress {
+    PageAddress {
+        // An image of more blocks than fit is longer than `LIMIT`.
+        block: (number / usize::from(PAGES_PER_BLOCK)) as u16,
+        page: (number % usize::from(PAGES_PER_BLOCK)) as u8,
+    }
+}
+
+fn stamp_of(number: usize, bytes: &PageBytes) -> Stamp {
+    page::stamp(page::spare(bytes), address(number))
+}
+
+fn read_image(image: &[u8]) -> Result<Log, LogError> {
+    let mut log = Log::default();
+    let mut newest = None;
+    for (number, bytes) in image.as_chunks::<PAGE_BYTES>().0.iter().enumerate() {
+        if page::is_blank(bytes) {
+            continue;
+        }
+        log.damage.used += 1;
+        let stamp = stamp_of(number, bytes);
+        log.damage.astray += u64::from(matches!(stamp, Stamp::Astray(..)));
+        let mut bytes = *bytes;
+        let whole = page::correct(&mut bytes);
+        for (half, wrong) in whole.into_iter().enumerate() {
+            let Ok(wrong) = wrong else {
+                log.damage.lost += 1;
+                continue;
+            };
+            log.damage.corrected += u64::from(wrong);
+            let bytes = page::record(&bytes, half);
+            match superblock::decode(bytes) {
+                Ok(superblock) => {
+                    if newest.is_none_or(|number| number < superblock.number) {
+                        newest = Some(superblock.number);
+                        log.epoch = Some(superblock.epoch);
+                    }
+                }
+                Err(superblock::SuperblockError::Newer(version)) => return Err(LogError::Newer(version)),
+                Err(superblock::SuperblockError::Damaged) => {
+                    let of_superblock = matches!(stamp, Stamp::Ours(tag) if tag.kind == Kind::Superblock);
+                    log.damage.lost += u64::from(!log.take(bytes) && !of_superblock);
+                }
+            }
+        }
+    }
+    Ok(log)
+}
+
+fn read_dump(bytes: &[u8]) -> Log {
+    let mut log = Log::default();
+    for (_, record) in frames(bytes) {
+        log.damage.used += 1;
+        log.take(&record);
+    }
+    log
+}
+
+/// The page and the record of every whole frame of a dump.
+pub fn frames(bytes: &[u8]) -> impl Iterator<Item = (u32, RecordBytes)> {
+    let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == DUMP_START);
+    starts.filter_map(|(at, _)| {
+        let rest = &bytes[at..(at + DUMP_BYTES).min(bytes.len())];
+        let end = rest.iter().position(|byte| *byte == b'\n')?;
+        let packet = at
+            .checked_sub(PACKET_BYTES)
+            .and_then(|from| bytes[from..at].first_chunk());
+        dump::decode(&rest[..=end], packet)
+    })
+}
+
+impl Log {
+    /// Takes a record; whether it is one.
+    fn take(&mut self, bytes: &RecordBytes) -> bool {
+        match record::decode(bytes) {
+            Ok((key, Content::Packet(entry))) => {
+                if self.packets.entry(key).or_insert_with(|| entry.clone()) != &entry {
+                    self.damage.conflicts.insert(key);
+                }
+            }
+            Ok((key, Content::Header(header))) => {
+                if self.headers.entry(key).or_insert_with(|| header.clone()) != &header {
+                    self.damage.conflicts.insert(key);
+                }
+            }
+            Err(RecordError::Newer(version)) => {
+                self.damage.newer.insert(version);
+            }
+            Err(RecordError::Magic | RecordError::Checksum | RecordError::Type(_)) => return false,
+        }
+        true
+    }
+
+    /// The epoch that counts: the newest superblock's, or the newest record's.
+    pub fn newest_epoch(&self) -> Option<u16> {
+        self.epoch
+            .or_else(|| self.packets.last_key_value().map(|(key, _)| key.epoch))
+    }
+
+    /// Stretches of records that are missing within a boot: first and last that is, and when the record before began
+    /// [us]. Records are numbered from 1 without a gap, but for copies and headers.
+    pub fn gaps(&self) -> Vec<Gap> {
+        let mut gaps = Vec::new();
+        let mut before: Option<(Key, u64)> = None;
+        for (key, entry) in &self.packets {
+            let same_boot = before.filter(|(last, _)| (last.epoch, last.boot) == (key.epoch, key.boot));
+            let expected = match same_boot {
+                Some((last, _)) => last.seq + 1,
+                // A boot that was erased over begins where it was.
+                None => self.first_of_boot(*key),
+            };
+            // A header stands among the records where a log was opened again.
+            let missing = (expected..key.seq).filter(|seq| !self.headers.contains_key(&Key { seq: *seq, ..*key }));
+            let (mut missing, first) = (missing.clone(), missing.into_iter().next());
+            if let Some(first) = first {
+                gaps.push(Gap {
+                    first: Key { seq: first, ..*key },
+                    last: missing.next_back().unwrap_or(first),
+                    after_us: same_boot.map(|(_, start_us)| start_us),
+                });
+            }
+            before = Some((*key, entry.start_us));
+        }
+        gaps
+    }
+
+    fn first_of_boot(&self, key: Key) -> u32 {
+        let headers = self.headers.range(Key { seq: 0, ..key }..key);
+        headers.last().map_or(key.seq, |(header, _)| header.seq + 1)
+    }
+}
+
+/// Records that are missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// The first.
+    pub first: Key,
+    /// Number of the last.
+    pub last: u32,
+    /// [us] when the record before them began, in its boot.
+    pub after_us: Option<u64>,
+}
+
+const _: () =
+    assert!(LIMIT / PAGE_BYTES as u64 / (PAGES_PER_BLOCK as u64) < u16::MAX as u64 && MAIN_BYTES < PAGE_BYTES);
+
+#[cfg(test)]
+mod tests;

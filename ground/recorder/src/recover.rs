@@ -1,0 +1,225 @@
+//! `ground recover`: a raw image or a dump, as tables, with all that is missing.
+//!
+//! In: the file. Out: CSV on standard output or in a file; boots, gaps and damage on standard error. Refuses a file
+//! larger than a chip and a newer format; otherwise whatever is readable is recovered.
+
+use std::{
+    fs::{self, File},
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    log::{self, LIMIT, Log, LogError},
+    table,
+};
+
+/// Gaps that are listed one by one.
+const GAPS_LISTED: usize = 100;
+
+/// Recovers records from a raw NAND image or a dump of the recorder
+///
+/// Reads every page (528 bytes each) of an image, or every frame of what `ground dump` or an umbilical's recording kept,
+/// corrects what can be corrected, and writes a row for each record. Boots, gaps and damage go to standard error.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv"
+)]
+pub struct Arguments {
+    /// Raw image of the chip, or a dump
+    pub file: PathBuf,
+    /// Values in counts instead of SI
+    #[arg(long)]
+    pub counts: bool,
+    /// Records of older epochs too: erased by command, but not overwritten yet
+    #[arg(long)]
+    pub all_epochs: bool,
+    /// Write the table to FILE instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Why nothing was recovered.
+#[derive(Debug, thiserror::Error)]
+pub enum RecoverError {
+    /// The file cannot be read.
+    #[error("{path}: {source}", path = path.display())]
+    Read {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is no log.
+    #[error("{path}: {source}", path = path.display())]
+    Log {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: LogError,
+    },
+    /// The output cannot be written.
+    #[error("the output cannot be written: {0}")]
+    Output(#[from] io::Error),
+}
+
+/// Runs `ground recover`.
+///
+/// # Errors
+/// When the file cannot be read or is no log, or the output cannot be written.
+pub fn run(arguments: &Arguments) -> Result<(), RecoverError> {
+    let path = &arguments.file;
+    let log = log::read(&content(path)?).map_err(|source| RecoverError::Log {
+        path: path.clone(),
+        source,
+    })?;
+    let mut remarks = BufWriter::new(io::stderr().lock());
+    match &arguments.out {
+        Some(out) => write(&log, arguments, &mut BufWriter::new(File::create(out)?), &mut remarks)?,
+        None => write(&log, arguments, &mut BufWriter::new(io::stdout().lock()), &mut remarks)?,
+    }
+    Ok(())
+}
+
+/// The file, unless it is too large to be a log; nothing of such a file is read.
+fn content(path: &Path) -> Result<Vec<u8>, RecoverError> {
+    let fail = |source| RecoverError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let length = fs::metadata(path).map_err(fail)?.len();
+    if length > LIMIT {
+        return Err(RecoverError::Log {
+            path: path.to_owned(),
+            source: LogError::TooLarge(length),
+        });
+    }
+    fs::read(path).map_err(fail)
+}
+
+fn write(log: &Log, arguments: &Arguments, rows: &mut dyn Write, remarks: &mut dyn Write) -> io::Result<()> {
+    let newest = log.newest_epoch();
+    writeln!(rows, "{}", table::header())?;
+    let (mut written, mut older) = (0_u64, 0_u64);
+    for (key, entry) in &log.packets {
+        if arguments.all_epochs || Some(key.epoch) == newest {
+            writeln!(rows, "{}", table::row(*key, entry, !arguments.counts))?;
+            written += 1;
+        } else {
+            older += 1;
+        }
+    }
+    rows.flush()?;
+    for (key, header) in &log.headers {
+        writeln!(
+            remarks,
+            "epoch {} boot {}: unit {}, firmware {}, calibration {}, a packet every {} ms, opened at {:.3} s",
+            key.epoch,
+            key.boot,
+            or_none(&header.unit),
+            or_none(&header.firmware),
+            or_none(&header.calibration),
+            f64::from(header.period_us) * 1e-3,
+            header.opened_us as f64 * 1e-6
+        )?;
+    }
+    let gaps = log.gaps();
+    for gap in gaps.iter().take(GAPS_LISTED) {
+        let key = gap.first;
+        let after = gap
+            .after_us
+            .map_or(String::new(), |us| format!(", after {:.3} s", us as f64 * 1e-6));
+        writeln!(
+            remarks,
+            "epoch {} boot {}: records {} to {} are missing{after}",
+            key.epoch, key.boot, key.seq, gap.last
+        )?;
+    }
+    if gaps.len() > GAPS_LISTED {
+        writeln!(remarks, "and {} more gaps", gaps.len() - GAPS_LISTED)?;
+    }
+    for key in log.damage.conflicts.iter().take(GAPS_LISTED) {
+        writeln!(
+            remarks,
+            "epoch {} boot {} record {} stands there twice with different content; the first is used",
+            key.epoch, key.boot, key.seq
+        )?;
+    }
+    for version in &log.damage.newer {
+        writeln!(
+            remarks,
+            "records of newer format {version} were left out: update this program"
+        )?;
+    }
+    let damage = &log.damage;
+    writeln!(remarks, "records    {written}, {older} of older epochs left out")?;
+    writeln!(remarks, "gaps       {}", gaps.len())?;
+    writeln!(
+        remarks,
+        "medium     {} pages used, {} bits corrected, {} halves lost, {} pages astray",
+        damage.used, damage.corrected, damage.lost, damage.astray
+    )?;
+    remarks.flush()
+}
+
+fn or_none(name: &str) -> &str {
+    if name.is_empty() { "none" } else { name }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn a_file_larger_than_a_chip_is_refused_unread() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let path = place.path().join("claims.bin");
+        // Ten gigabytes that take no room.
+        File::create(&path)
+            .and_then(|file| file.set_len(10 << 30))
+            .expect("sparse file");
+        let error = content(&path).expect_err("too large");
+        assert!(
+            error.to_string().contains("10737418240 bytes are more than any chip"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_chip_full_of_random_bytes_is_read_in_bounded_time() {
+        let begun = Instant::now();
+        let mut state = 1_u64;
+        let image: Vec<u8> = (0..4096 * 32 * 528 / 8)
+            .flat_map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state ^ state >> 29).to_le_bytes()
+            })
+            .collect();
+        let log = log::read(&image).expect("read");
+        assert!(log.packets.is_empty());
+        assert!(
+            begun.elapsed().as_secs() < 60,
+            "ten seconds alone, and a margin for company"
+        );
+    }
+
+    #[test]
+    fn what_is_missing_is_said() {
+        let (mut rows, mut remarks) = (Vec::new(), Vec::new());
+        let arguments = Arguments {
+            file: "none".into(),
+            counts: true,
+            all_epochs: false,
+            out: None,
+        };
+        write(&Log::default(), &arguments, &mut rows, &mut remarks).expect("written");
+        let remarks = String::from_utf8(remarks).expect("text");
+        assert!(
+            remarks.contains("records    0, 0 of older epochs left out"),
+            "{remarks}"
+        );
+        assert_eq!(String::from_utf8(rows).expect("text").lines().count(), 1);
+    }
+}

@@ -1,0 +1,129 @@
+//! The flight log under power cuts: every operation, every way to tear, one after another and at random.
+//!
+//! The per-change set is what runs here without asking. The long sets:
+//! `EMEMS_RUNS=1000000 cargo host-test --test recorder_cuts many_cuts -- --nocapture`, with `EMEMS_SEED` to go elsewhere.
+
+use std::collections::BTreeSet;
+
+use emems::nand::{PAGES_PER_BLOCK, PageAddress};
+use host_tests::recorder::{Flown, Tally, campaign, draws};
+use twin::part::nand::{Cells, TEARS, Wear};
+
+/// Blocks of the chip of a short flight: four for the superblock, room for a block each boot and the records.
+const BLOCKS: u16 = 14;
+
+/// Records of a short flight: four blocks and a half.
+const RECORDS: u32 = 150;
+
+/// Records of a flight cut twice: two blocks and a bit.
+const RECORDS_OF_PAIRS: u32 = 70;
+
+/// Operations of a boot besides its records: superblock, header, erases, with a margin that only adds flights without
+/// a cut.
+const MORE_OPERATIONS: u64 = 15;
+
+fn asked(name: &str, otherwise: u64) -> u64 {
+    let value = std::env::var(name).ok().and_then(|text| text.parse().ok());
+    let value = value.unwrap_or(otherwise);
+    println!("{name}={value}");
+    value
+}
+
+fn check(tally: Tally, least: u64) {
+    assert!(tally.runs >= least, "{tally:?}");
+    assert!(tally.is_clean(), "{tally:?}");
+}
+
+/// A chip with some records of an earlier boot, so that there is something to lose.
+fn used(seed: u64) -> Flown {
+    let mut flown = Flown::on(Cells::new(BLOCKS, &[1, 6], seed));
+    flown.boot(5 + seed as u32 % 40, None);
+    flown
+}
+
+#[test]
+fn a_cut_at_any_operation_in_any_way_loses_nothing() {
+    let operations = u64::from(RECORDS) + MORE_OPERATIONS;
+    let (tears, seeds) = (TEARS.len() as u64, 20);
+    let tally = campaign(operations * tears * seeds, |flight| {
+        let tear = TEARS[(flight % tears) as usize];
+        let after = 1 + flight / tears % operations;
+        let mut flown = used(flight / tears / operations);
+        flown.boot(RECORDS, Some((after, tear)));
+        flown.boot(8, None);
+        flown.judge(&BTreeSet::new())
+    });
+    check(tally, 23_000);
+}
+
+#[test]
+fn a_second_cut_soon_after_the_first_loses_nothing() {
+    let operations = u64::from(RECORDS_OF_PAIRS) + MORE_OPERATIONS;
+    let (tears, soon) = (TEARS.len() as u64, 12);
+    let tally = campaign(operations * soon * tears * 5, |flight| {
+        let mut draw = draws(asked_once(), flight);
+        let first = TEARS[(flight % tears) as usize];
+        let second = TEARS[draw(tears) as usize];
+        let after = 1 + flight / tears % operations;
+        let then = 1 + flight / tears / operations % soon;
+        let mut flown = Flown::on(Cells::new(BLOCKS, &[5], flight));
+        flown.boot(RECORDS_OF_PAIRS, Some((after, first)));
+        flown.boot(RECORDS_OF_PAIRS, Some((then, second)));
+        flown.boot(8, None);
+        flown.judge(&BTreeSet::new())
+    });
+    check(tally, 40_000);
+}
+
+fn asked_once() -> u64 {
+    static SEED: std::sync::OnceLock<u64> = std::sync::OnceLock::new();
+    *SEED.get_or_init(|| asked("EMEMS_SEED", 1))
+}
+
+#[test]
+fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
+    let runs = asked("EMEMS_RUNS", 20_000);
+    let tally = campaign(runs, |flight| {
+        let mut draw = draws(asked_once(), flight);
+        let blocks = 40;
+        let mut chip = Cells::new(blocks, &[draw(blocks.into()) as u16 / 8 * 8 + 7], flight);
+        chip.befalls.flips_per_thousand = 50;
+        for _ in 0..draw(4) {
+            let wear = [
+                Wear::ProgramFails,
+                Wear::EraseFails,
+                Wear::ProgramDoesNothing,
+                Wear::EraseDoesNothing,
+            ][draw(4) as usize];
+            let worn = (draw(blocks.into()) as u16, draw(60) as u32, wear);
+            chip.befalls.worn.push(worn);
+        }
+        let mut flown = Flown::on(chip);
+        for _ in 0..1 + draw(12) {
+            let tear = TEARS[draw(TEARS.len() as u64) as usize];
+            flown.boot(60, Some((1 + draw(50), tear)));
+        }
+        flown.boot(8, None);
+        flown.judge(&BTreeSet::new())
+    });
+    check(tally, runs);
+}
+
+#[test]
+fn one_page_destroyed_after_a_cut_takes_at_most_the_newest_record_with_it() {
+    let tally = campaign(asked("EMEMS_RUNS", 20_000), |flight| {
+        let mut draw = draws(asked_once(), flight);
+        let mut flown = used(flight);
+        let tear = TEARS[draw(TEARS.len() as u64) as usize];
+        flown.boot(RECORDS_OF_PAIRS, Some((1 + draw(70), tear)));
+        flown.boot(1 + draw(9) as u32, None);
+        let newest = flown.acknowledged.last_key_value().map(|(key, _)| *key);
+        let page = draw(u64::from(PAGES_PER_BLOCK)) as u8;
+        let block = 4 + draw(u64::from(BLOCKS) - 4) as u16;
+        if ![1, 6].contains(&block) {
+            flown.chip.destroy(PageAddress { block, page });
+        }
+        flown.judge(&newest.into_iter().collect())
+    });
+    check(tally, 20_000);
+}

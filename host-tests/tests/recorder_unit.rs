@@ -1,0 +1,290 @@
+//! The recorder in the unit: what the umbilical orders, and what resets, cuts and a dead chip do to it.
+
+use std::collections::BTreeSet;
+
+use emems::{
+    flight_log::{
+        LOG_START,
+        dump::{self, DUMP_START},
+        page,
+        record::{self, Content, Key},
+    },
+    nand::{K9F1208_BLOCKS, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress},
+    packet::{self, PACKET_BYTES},
+};
+use host_tests::{Flight, Flown, MS, S, world};
+use twin::{
+    part::{Nanos, nand::Cells},
+    run::Fault,
+};
+
+/// [ns] lift-off of the rocket motion.
+const LIFT_OFF: Nanos = 30 * S;
+
+/// [ns] from a reset to the first record that is durable: two packets may be missing.
+const BACK: Nanos = 400 * MS;
+
+fn rocket() -> Flight {
+    Flight::ideal(world("rocket"))
+}
+
+fn still() -> Flight {
+    Flight::ideal(world("still"))
+}
+
+/// In FLIGHT and recording from 2 s on, without lift-off.
+fn recording() -> Flight {
+    still().say(S, b"G_MVG_MV").say(2 * S, b"G_MG")
+}
+
+/// Packets on the chip, by key.
+fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
+    let mut found = std::collections::BTreeMap::new();
+    for block in LOG_START..LOG_START + 20 {
+        for page in 0..PAGES_PER_BLOCK {
+            let mut bytes = chip.read(PageAddress { block, page });
+            let whole = page::correct(&mut bytes);
+            for half in (0..2).filter(|half| whole[*half].is_ok()) {
+                if let Ok((key, Content::Packet(entry))) = record::decode(page::record(&bytes, half)) {
+                    found.insert(key, entry.packet);
+                }
+            }
+        }
+    }
+    found.into_iter().collect()
+}
+
+fn counters(logged: &[(Key, [u8; PACKET_BYTES])]) -> Vec<u16> {
+    let counter = |(_, packet): &(Key, [u8; PACKET_BYTES])| packet::decode(packet).expect("a whole packet").counter;
+    logged.iter().map(counter).collect()
+}
+
+/// What a dump said: pages and records.
+fn dumped(flown: &Flown) -> Vec<(u32, Content)> {
+    let bytes = &flown.umbilical;
+    let mut dumped = Vec::new();
+    for (at, _) in bytes.iter().enumerate().filter(|(_, byte)| **byte == DUMP_START) {
+        let end = bytes[at..].iter().position(|byte| *byte == b'\n');
+        let frame = &bytes[at..at + end.map_or(0, |end| end + 1)];
+        let packet = at
+            .checked_sub(PACKET_BYTES)
+            .and_then(|from| bytes[from..at].first_chunk());
+        if let Some((page, record)) = dump::decode(frame, packet) {
+            dumped.push((page, record::decode(&record).expect("a whole record").1));
+        }
+    }
+    dumped
+}
+
+/// Every packet that telemetry sent between the first and the last one in the log is in the log.
+fn check_no_gap_but_at(flown: &Flown, resets: &[Nanos]) {
+    let logged = logged(flown.nand.clone().expect("a chip"));
+    let kept: BTreeSet<_> = logged.iter().map(|(_, packet)| *packet).collect();
+    let is_kept = |reading| kept.contains(&packet::encode(reading));
+    let begun = flown.packets.iter().skip_while(|(_, reading)| !is_kept(reading));
+    let missing: Vec<_> = begun.filter(|(_, reading)| !is_kept(reading)).collect();
+    assert!(!kept.is_empty());
+    for (at, reading) in missing {
+        let excused =
+            resets.iter().any(|reset| (*reset..*reset + BACK).contains(at)) || flown.report.flown - at < 50 * MS;
+        assert!(excused, "packet {} at {at} was sent and not kept", reading.counter);
+    }
+}
+
+#[test]
+fn recording_begins_at_g_mg() {
+    let flown = recording().say(4 * S, b"G_ST").fly(5 * S);
+    assert!(flown.replied("G_ST recorder: last record"), "{:?}", flown.replies());
+    assert!(logged(flown.nand.clone().expect("a chip")).len() >= 14);
+    check_no_gap_but_at(&flown, &[]);
+}
+
+#[test]
+fn recording_begins_at_lift_off_with_the_packet_that_shows_it() {
+    let flown = rocket().fly(LIFT_OFF + 3 * S);
+    let logged = logged(flown.nand.clone().expect("a chip"));
+    let shows = flown
+        .packets
+        .iter()
+        .find(|(_, reading)| reading.lift_off)
+        .expect("lift-off")
+        .1;
+    let first = counters(&logged)[0];
+    assert!(first <= shows.counter, "{first} {}", shows.counter);
+    check_no_gap_but_at(&flown, &[]);
+}
+
+#[test]
+fn a_power_cut_in_flight_ends_in_flight_and_recording() {
+    for (number, after) in [0, 37, 81, 123, 160, 199].into_iter().enumerate() {
+        let strikes = LIFT_OFF + 5 * S + after * MS;
+        let flown = rocket()
+            .fault(strikes, Fault::PowerCut(number))
+            .say(strikes + S, b"G_ST")
+            .fly(strikes + 3 * S);
+        assert!(
+            flown.replied("G_ST FLIGHT task none recording 1"),
+            "{:?}",
+            flown.replies()
+        );
+        // Power-on: the gyros take 250 ms to answer before the first cycle.
+        check_no_gap_but_at(&flown, &[strikes]);
+        let boots: BTreeSet<u32> = logged(flown.nand.clone().expect("a chip"))
+            .iter()
+            .map(|(key, _)| key.boot)
+            .collect();
+        assert_eq!(boots.len(), 2);
+    }
+}
+
+#[test]
+fn a_power_cut_without_lift_off_resumes_from_the_log_alone() {
+    let strikes = 5 * S + 77 * MS;
+    let flown = recording()
+        .fault(strikes, Fault::PowerCut(3))
+        .say(strikes + S, b"G_ST")
+        .fly(strikes + 2 * S);
+    assert!(
+        flown.replied("G_ST FLIGHT task none recording 1"),
+        "{:?}",
+        flown.replies()
+    );
+    let after_landing = recording()
+        .say(4 * S, b"G_MEG_ME")
+        .fault(strikes, Fault::PowerCut(3))
+        .say(strikes + S, b"G_ST")
+        .fly(strikes + 2 * S);
+    assert!(
+        after_landing.replied("G_ST WAIT task none recording 0"),
+        "G_ME leaves FLIGHT for good"
+    );
+}
+
+#[test]
+fn a_reset_in_flight_is_followed_by_a_durable_record_within_400_ms() {
+    let strikes = LIFT_OFF + 5 * S + 77 * MS;
+    let flown = rocket().fault(strikes, Fault::Reset).fly(strikes + BACK);
+    let boots: BTreeSet<u32> = logged(flown.nand.clone().expect("a chip"))
+        .iter()
+        .map(|(key, _)| key.boot)
+        .collect();
+    assert_eq!(boots.len(), 2, "a record of the second boot");
+}
+
+/// F15, in the unit.
+#[test]
+fn a_dead_or_absent_chip_costs_neither_packets_nor_the_console() {
+    let dies = rocket().fault(LIFT_OFF + S, Fault::NandDead(true));
+    let flown = dies.say(LIFT_OFF + 3 * S, b"G_DLG_ST").fly(LIFT_OFF + 6 * S);
+    assert!(flown.replied("recorder: the NAND stays busy"), "{:?}", flown.replies());
+    assert!(flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS));
+    assert!(
+        flown
+            .derived
+            .iter()
+            .all(|frame| frame.health.contains(emems::derived::Health::RECORDER_REFUSED))
+    );
+    let absent = recording().fault(0, Fault::NandAbsent).say(3 * S, b"G_ST").fly(4 * S);
+    assert!(
+        absent.replied("recorder: no K9F1208 answers: identity FF FF"),
+        "{:?}",
+        absent.replies()
+    );
+    assert!(absent.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS));
+}
+
+#[test]
+fn a_chip_that_comes_back_is_used_again() {
+    let flown = recording()
+        .fault(4 * S, Fault::NandDead(true))
+        .fault(6 * S, Fault::NandDead(false))
+        .fly(12 * S);
+    let kept = counters(&logged(flown.nand.clone().expect("a chip")));
+    let last = flown.packets.last().expect("packets").1.counter;
+    assert!(kept.last().expect("records") + 1 >= last, "{kept:?} {last}");
+    assert!(flown.packets.len() > 50);
+}
+
+/// F20: nothing is begun once the supply fails.
+#[test]
+fn f20_a_failing_supply_begins_no_operation() {
+    let fails = 4 * S + 30 * MS;
+    let flown = recording().fault(fails, Fault::SupplyFailing(true)).fly(fails + 2 * S);
+    assert!(
+        flown.replied("recorder: the supply is failing"),
+        "{:?}",
+        flown.replies()
+    );
+    let kept = counters(&logged(flown.nand.clone().expect("a chip")));
+    let sent_before = flown.packets.iter().filter(|(at, _)| *at < fails).count() as u16;
+    assert!(*kept.last().expect("records") <= sent_before, "{kept:?} {sent_before}");
+}
+
+/// F19: a dump that was interrupted goes on at any page, and changes nothing.
+#[test]
+fn f19_a_dump_goes_on_where_it_was_interrupted() {
+    let flight = || recording().say(8 * S, b"G_MEG_ME").say(9 * S, b"G_Ml");
+    let whole = dumped(&flight().fly(14 * S));
+    assert!(matches!(whole.first(), Some((0, Content::Header(_)))), "{whole:?}");
+    let pages: BTreeSet<u32> = whole.iter().map(|(page, _)| *page).collect();
+    assert!(pages.len() > 25 && whole.len() >= pages.len() - 1, "{pages:?}");
+    let interrupted = flight()
+        .say(9 * S + 500 * MS, b"G_Mt")
+        .say(10 * S, b"G_LR00000AFFFFFF")
+        .fly(14 * S);
+    let resumed: BTreeSet<u32> = dumped(&interrupted).iter().map(|(page, _)| *page).collect();
+    assert!(
+        resumed.is_superset(&(10..*pages.last().expect("pages")).collect()),
+        "{resumed:?}"
+    );
+    assert!(interrupted.replied("dump ends at page"), "{:?}", interrupted.replies());
+}
+
+/// F16, in the unit.
+#[test]
+fn a_full_recorder_says_so_and_packets_go_on() {
+    let mut flight = recording();
+    // All blocks but two begin with a page of this log.
+    let chip = &mut flight.plant.nand.cells;
+    let tag = page::Tag {
+        kind: page::Kind::Log,
+        epoch: 0,
+        boot: 0,
+    };
+    for block in LOG_START..K9F1208_BLOCKS - 2 {
+        let at = PageAddress { block, page: 0 };
+        let mut bytes = [0; PAGE_BYTES];
+        page::compose(&mut bytes, &[0; 256], &[0; 256]);
+        page::address(&mut bytes, at, tag);
+        chip.program(at, &bytes);
+    }
+    let flown = flight.say(18 * S, b"G_DL").say(19 * S, b"G_ST").fly(21 * S);
+    assert!(flown.replied("recorder: full"), "{:?}", flown.replies());
+    assert!(
+        flown
+            .derived
+            .iter()
+            .all(|frame| frame.health.contains(emems::derived::Health::RECORDER_REFUSED))
+    );
+    assert!(flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS));
+}
+
+#[test]
+fn an_erase_empties_the_log_in_free_time_and_packets_go_on() {
+    let flown = recording()
+        .say(4 * S, b"G_MEG_ME")
+        .say(5 * S, b"G_MAG_CA")
+        .say(30 * S, b"G_ST")
+        .fly(31 * S);
+    assert!(flown.replied("G_MA done: recorder is empty"), "{:?}", flown.replies());
+    assert!(flown.replied("G_ST recorder 0 of"), "{:?}", flown.replies());
+    assert!(flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS));
+    assert!(logged(flown.nand.clone().expect("a chip")).is_empty());
+}
+
+#[test]
+fn lift_off_during_an_erase_is_recorded_all_the_same() {
+    let flown = rocket().say(LIFT_OFF - S, b"G_MAG_CA").fly(LIFT_OFF + 4 * S);
+    assert!(logged(flown.nand.clone().expect("a chip")).len() >= 18);
+    check_no_gap_but_at(&flown, &[]);
+}

@@ -1,0 +1,254 @@
+//! A cycle to an attitude: calibration, redundancy and fault isolation, TRIAD, Kalman filter. The whole step.
+//!
+//! In: a [`Sample`] and its [`Increments`], which is what a packet and its derived frame hold between them. Out: an
+//! [`Estimate`]. In this order:
+//!
+//! ```text
+//! counts --calibration--> along 28 axes --faults--> force_b, field_b, rate_b, health --triad--> attitude of this cycle
+//! increments --turn--> rotation through the same calibration -----------.
+//! force_b and field_b at the mean slot times of the sensors used --------+--kalman--> attitude, bias, covariance
+//!                                             faults <--- gyro bias ----'
+//! ```
+//!
+//! The step is a function of the state and its arguments, in f32, with the arithmetic of `libm` alone: a host that is given
+//! the same cycles from the start computes the same bits as the unit did.
+//!
+//! Refuses nothing. A cycle that repeats or goes back in time gives vectors and TRIAD, and the filter leaves it out; see
+//! [`kalman`](crate::kalman) for gaps.
+
+mod site;
+#[cfg(test)]
+mod tests;
+mod turn;
+
+use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
+
+pub use site::Site;
+
+use crate::{
+    attitude::{self, dcm_bn},
+    calibration::{Axis, Ranges, Set, Temperatures},
+    faults::{Monitor, SensorHealth, Vectors},
+    flight_log::record,
+    increments::Increments,
+    kalman::{Filter, Outcome, Sampled, Step},
+    redundancy::{Known, Solution},
+    sample::{Kind, NO_SLOT, SENSORS, Sample},
+    triad::{Sighting, triad},
+    unit::Settings,
+};
+
+/// What a cycle says of the attitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Estimate {
+    /// [m/s2] calibrated specific force at the centre of rotation, in b.
+    pub force_b: [f32; 3],
+    /// [uT] calibrated field, in b.
+    pub field_b_ut: [f32; 3],
+    /// [rad/s] calibrated inertial rate, in b; the filter's bias is not taken off.
+    pub rate_b: [f32; 3],
+    /// Which axes were not used, and what is not isolable.
+    pub sensors: SensorHealth,
+    /// TRIAD's q_nb of this cycle, scalar first; `None` unless both vectors are whole and force is near one g.
+    pub triad_nb: Option<[f32; 4]>,
+    /// The filter's q_nb at [`Increments::end_us`], scalar first; `None` until it has aligned itself.
+    pub q_nb: Option<[f32; 4]>,
+    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD.
+    pub covariance_n: [f32; 6],
+    /// [rad/s] gyro bias in b.
+    pub bias_b: [f32; 3],
+    /// [rad/s] standard deviation of each of its components.
+    pub bias_sd: [f32; 3],
+}
+
+impl Estimate {
+    /// Of a cycle of which nothing is known.
+    pub const NOTHING: Estimate = Estimate {
+        force_b: [0.0; 3],
+        field_b_ut: [0.0; 3],
+        rate_b: [0.0; 3],
+        sensors: SensorHealth(0),
+        triad_nb: None,
+        q_nb: None,
+        covariance_n: [0.0; 6],
+        bias_b: [0.0; 3],
+        bias_sd: [0.0; 3],
+    };
+
+    /// What the flight log keeps of it; `None` without an attitude.
+    pub fn kept(&self) -> Option<record::Estimate> {
+        let q_nb = self.q_nb?;
+        let [nn, ne, nd, ee, ed, dd] = self.covariance_n;
+        let covariance_n = Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd);
+        let dcm = dcm_bn(&attitude::from_parts(q_nb)?);
+        let covariance_b = dcm * covariance_n * dcm.transpose();
+        let [x, y, z] = [0, 1, 2].map(|axis| ComplexField::sqrt(covariance_b[(axis, axis)].max(0.0)));
+        let [bias_x, bias_y, bias_z] = self.bias_sd;
+        Some(record::Estimate {
+            q_nb,
+            bias_b: self.bias_b,
+            sigma: [x, y, z, bias_x, bias_y, bias_z],
+            sensors: self.sensors,
+        })
+    }
+}
+
+/// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.
+const NEAR_ONE_G: f32 = 0.1;
+
+/// Everything the step remembers.
+#[derive(Clone, Debug)]
+pub struct Estimator {
+    set: Set,
+    temperatures: Temperatures,
+    monitor: Monitor,
+    filter: Filter,
+    last_us: Option<u64>,
+}
+
+impl Estimator {
+    /// With a parameter set, at a site. A new set makes a new estimator: what was learnt was learnt through the old one.
+    pub fn new(set: Set, site: &Site) -> Self {
+        Estimator {
+            temperatures: Temperatures::default(),
+            monitor: Monitor::new(&set),
+            filter: Filter::new(site.params(&set)),
+            last_us: None,
+            set,
+        }
+    }
+
+    /// Of a unit with these settings and the compiled-in parameters.
+    pub fn of(settings: &Settings) -> Self {
+        Estimator::new(Set::nominal(Ranges::of(settings)), &settings.site)
+    }
+
+    /// The filter as it stands.
+    pub fn filter(&self) -> &Filter {
+        &self.filter
+    }
+
+    /// Takes a cycle.
+    pub fn step(&mut self, sample: &Sample, increments: &Increments) -> Estimate {
+        self.step_in_full(sample, increments).0
+    }
+
+    /// Takes a cycle; the filter's records of it too.
+    pub fn step_in_full(&mut self, sample: &Sample, increments: &Increments) -> (Estimate, Outcome) {
+        let reading = &sample.reading;
+        self.temperatures.note(reading);
+        let measured = self.set.apply(reading, &self.temperatures);
+        let since_us = self.last_us.map(|last_us| sample.start_us.saturating_sub(last_us));
+        self.last_us = Some(sample.start_us);
+        // Zero is a gap to the monitor: there is no cycle before the first.
+        let dt_s = since_us.unwrap_or_default() as f32 * 1e-6;
+        let vectors = self.monitor.step(&self.set, reading, &measured, dt_s);
+        let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
+        let turned = turn::turn(&self.set, &self.temperatures, increments, believed);
+        let force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
+        let field = self.sampled(sample, Kind::Magnetometer, &vectors.field_b_ut);
+        let outcome = self.filter.step(&Step {
+            // Without a fast sample since the cycle before, the cycle itself is when the rotation is missing.
+            at_us: if turned.covered_s > 0.0 {
+                increments.end_us
+            } else {
+                sample.start_us
+            },
+            covered_s: turned.covered_s,
+            angle_b: turned.angle_b,
+            angle_variance: turned.variance,
+            rate_b: vectors.rate_b.vector_b,
+            saturated: turned.saturated,
+            acc: force,
+            mag: field,
+            lift_off: reading.lift_off,
+        });
+        if self.filter.aligned && !outcome.innovations.is_empty() {
+            let sd = ComplexField::sqrt(self.filter.bias_covariance_b().trace() / 3.0);
+            self.monitor.know_bias(self.filter.bias_b, sd);
+        }
+        (self.estimate(&vectors), outcome)
+    }
+
+    fn estimate(&self, vectors: &Vectors) -> Estimate {
+        let p = self.filter.attitude_covariance_n();
+        let bias = self.filter.bias_covariance_b();
+        Estimate {
+            force_b: vectors.force_b.vector_b.into(),
+            field_b_ut: vectors.field_b_ut.vector_b.into(),
+            rate_b: vectors.rate_b.vector_b.into(),
+            sensors: vectors.health,
+            triad_nb: self.triad(vectors).map(parts),
+            q_nb: self.filter.aligned.then(|| parts(self.filter.attitude())),
+            covariance_n: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
+            bias_b: self.filter.bias_b.into(),
+            bias_sd: [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0))),
+        }
+    }
+
+    /// A whole vector at the mean of its sensors' slot times, with its white noise: what is systematic is the filter's own
+    /// business.
+    fn sampled(&self, sample: &Sample, kind: Kind, solution: &Solution) -> Option<Sampled> {
+        if solution.known != Known::All {
+            return None;
+        }
+        let (mut slots_us, mut sensors) = (0_u64, 0_u64);
+        for (sensor, slot_us) in SENSORS.iter().zip(sample.slots_us) {
+            let used = sensor.kind == kind && solution.used >> (3 * sensor.plate) & 0b111 != 0;
+            if used && slot_us != NO_SLOT {
+                slots_us += u64::from(slot_us);
+                sensors += 1;
+            }
+        }
+        Some(Sampled {
+            value_b: solution.vector_b,
+            variance: white(self.set.axes(kind), solution.used),
+            at_us: sample
+                .start_us
+                .saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
+        })
+    }
+
+    fn triad(&self, vectors: &Vectors) -> Option<UnitQuaternion<f32>> {
+        let gravity = self.filter.params.gravity;
+        let off = ComplexField::abs(vectors.force_b.vector_b.norm() - gravity);
+        // A comparison with NaN is false.
+        let near = off < NEAR_ONE_G * gravity;
+        if !near {
+            return None;
+        }
+        let (sin, cos) = ComplexField::sin_cos(self.filter.reference.declination);
+        let down = sighting(&vectors.force_b, -1.0, Vector3::z())?;
+        let north = sighting(&vectors.field_b_ut, 1.0, Vector3::new(cos, sin, 0.0))?;
+        triad(&down, &north).ok().map(|found| found.q_nb)
+    }
+}
+
+/// A whole vector as a direction.
+fn sighting(solution: &Solution, sign: f32, known_n: Vector3<f32>) -> Option<Sighting> {
+    let seen_b = solution.vector_b * sign;
+    (solution.known == Known::All).then(|| Sighting {
+        seen_b,
+        known_n,
+        seen_sd: ComplexField::sqrt(mean_variance(&solution.covariance_b)) / seen_b.norm(),
+        known_sd: 0.0,
+    })
+}
+
+/// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.
+fn white(axes: &[Axis], used: u16) -> f32 {
+    let of = axes.iter().enumerate().filter(|(k, _)| used >> k & 1 == 1);
+    let sum: f32 = of.map(|(_, axis)| axis.noise * axis.noise).sum();
+    let count = used.count_ones() as f32;
+    3.0 * sum / (count * count)
+}
+
+fn mean_variance(covariance: &Matrix3<f32>) -> f32 {
+    covariance.trace() / 3.0
+}
+
+/// Scalar first.
+fn parts(q: UnitQuaternion<f32>) -> [f32; 4] {
+    [q.w, q.i, q.j, q.k]
+}

@@ -1,0 +1,162 @@
+extern crate std;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{
+    increments::Channel,
+    sample::{NOT_READ, Reading, SENSOR_COUNT},
+};
+
+/// [us] from cycle to cycle.
+const PERIOD_US: u64 = 200_000;
+
+/// Level and at rest in the laboratory, facing magnetic north: counts of the nominal unit, which flicker by one as what
+/// repeats itself is held to be frozen.
+fn resting(counter: u16) -> (Sample, Increments) {
+    let (force_b, field_b) = (Vector3::new(0.0, 0.0, -9.7864), Vector3::new(18.35, 0.0, -14.2));
+    let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+    let counts =
+        |axis: &Axis, vector_b: &Vector3<f32>| ComplexField::round(axis.axis_b.dot(vector_b) / axis.scale) as i16;
+    let triads = |axes: &[Axis; 12], vector_b: &Vector3<f32>| -> [[i16; 3]; 4] {
+        let flicker = |k: usize| (usize::from(counter) * (k + 1)) as i16 % 3 - 1;
+        core::array::from_fn(|plate| {
+            core::array::from_fn(|k| counts(&axes[3 * plate + k], vector_b) + flicker(3 * plate + k))
+        })
+    };
+    let start_us = PERIOD_US * (u64::from(counter) + 1);
+    let sample = Sample {
+        reading: Reading {
+            errors: crate::sample::Errors(0),
+            acc_p: triads(&set.acc, &force_b),
+            mag_p: triads(&set.mag, &field_b),
+            gyro: core::array::from_fn(|k| (usize::from(counter) * (k + 2)) as i16 % 3 - 1),
+            gyro_temperature: [0; 4],
+            temperature: [400; 4],
+            ..Reading::unread(counter)
+        },
+        start_us,
+        slots_us: core::array::from_fn(|slot| 250 * slot as u32),
+    };
+    let still = Channel {
+        integral_counts_s: 0.0,
+        least: 0,
+        most: 0,
+        count: 20,
+    };
+    let increments = Increments {
+        angle_b: [0.0; 3],
+        covered_us: PERIOD_US as u32,
+        end_us: start_us - 2_500,
+        gyro: [still; 4],
+    };
+    (sample, increments)
+}
+
+/// [rad] a magnetometer's count and a half of 0.09 uT on each of twelve axes, of 18 uT.
+const FLICKER: f32 = 0.01;
+
+/// [rad] heading of a magnetic compass needle east of north, from an estimate level to half a degree.
+fn heading(q: [f32; 4]) -> f32 {
+    2.0 * nalgebra::RealField::atan2(q[3], q[0])
+}
+
+#[test]
+fn at_rest_triad_has_the_attitude_at_once_and_the_filter_after_its_first_window() {
+    let mut estimator = Estimator::of(&Settings::NOMINAL);
+    let declination = Site::LABORATORY.declination_deg.to_radians();
+    for counter in 0..10 {
+        let (sample, increments) = resting(counter);
+        let estimate = estimator.step(&sample, &increments);
+        // A count and a half of either sensor on each axis.
+        assert!((heading(estimate.triad_nb.expect("two vectors")) - declination).abs() < FLICKER);
+        assert_eq!(estimate.q_nb.is_some(), counter >= 4, "{counter}");
+        assert_eq!(estimate.sensors, SensorHealth(0));
+        if let Some(q_nb) = estimate.q_nb {
+            assert!((heading(q_nb) - declination).abs() < FLICKER);
+        }
+    }
+}
+
+#[test]
+fn a_plate_that_was_not_read_is_in_the_health_and_has_no_part_in_the_slot_times() {
+    let estimator = Estimator::of(&Settings::NOMINAL);
+    let (mut sample, increments) = resting(0);
+    sample.reading.acc_p[0] = [NOT_READ; 3];
+    sample.slots_us[0] = NO_SLOT;
+    let estimate = estimator.clone().step(&sample, &increments);
+    assert_eq!(estimate.sensors, SensorHealth(0b111));
+    let measured = estimator.set.apply(&sample.reading, &estimator.temperatures);
+    let force_b = estimator
+        .monitor
+        .clone()
+        .step(&estimator.set, &sample.reading, &measured, 0.2)
+        .force_b;
+    let sampled = estimator
+        .sampled(&sample, Kind::Accelerometer, &force_b)
+        .expect("three plates");
+    // Slots 1, 2 and 3 at 250, 500 and 750 us.
+    assert_eq!(sampled.at_us, sample.start_us + 500);
+    // 0.045 m/s2 of one axis over the root of three plates.
+    assert!((ComplexField::sqrt(sampled.variance) - 0.045 / 1.732).abs() < 1e-4);
+}
+
+#[test]
+fn in_free_fall_triad_has_no_vertical() {
+    let mut estimator = Estimator::of(&Settings::NOMINAL);
+    let (mut sample, increments) = resting(0);
+    sample.reading.acc_p = [[0; 3]; 4];
+    assert_eq!(estimator.step(&sample, &increments).triad_nb, None);
+}
+
+fn is_finite(estimate: &Estimate) -> bool {
+    let vectors = [
+        estimate.force_b,
+        estimate.field_b_ut,
+        estimate.rate_b,
+        estimate.bias_b,
+        estimate.bias_sd,
+    ];
+    let attitudes = [estimate.triad_nb.unwrap_or_default(), estimate.q_nb.unwrap_or_default()];
+    let mut all = vectors
+        .as_flattened()
+        .iter()
+        .chain(attitudes.as_flattened())
+        .chain(&estimate.covariance_n);
+    all.all(|number| number.is_finite())
+}
+
+prop_compose! {
+    fn hostile()(
+        acc_p: [[i16; 3]; 4], mag_p: [[i16; 3]; 4], gyro: [i16; 4], gyro_temperature: [i16; 4], temperature: [i16; 4],
+        lift_off: bool, start_us: u64, slots_us: [u32; SENSOR_COUNT], angles: [u32; 3], integrals: [u32; 4],
+        ends: [(i16, i16, u8); 4], covered_us: u32, end_us: u64, sane: bool, counter in 10..40_u16,
+    ) -> (Sample, Increments) {
+        let (resting, still) = resting(counter);
+        let reading = Reading { acc_p, mag_p, gyro, gyro_temperature, temperature, lift_off, ..resting.reading };
+        let gyro = core::array::from_fn(|k| Channel {
+            integral_counts_s: f32::from_bits(integrals[k]), least: ends[k].0, most: ends[k].1, count: ends[k].2,
+        });
+        let increments = Increments { angle_b: angles.map(f32::from_bits), covered_us, end_us, gyro };
+        // Half of them with sound times, so that they get as far as the filter.
+        match sane {
+            true => (Sample { reading, ..resting }, Increments { gyro, ..still }),
+            false => (Sample { reading, start_us, slots_us }, increments),
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn whatever_comes_in_the_estimate_stays_finite(cycles in proptest::collection::vec(hostile(), 1..20)) {
+        let mut estimator = Estimator::of(&Settings::NOMINAL);
+        for counter in 0..6 {
+            let (sample, increments) = resting(counter);
+            estimator.step(&sample, &increments);
+        }
+        for (sample, increments) in cycles {
+            let estimate = estimator.step(&sample, &increments);
+            prop_assert!(is_finite(&estimate), "{:?}", estimate);
+        }
+    }
+}

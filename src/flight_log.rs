@@ -1,0 +1,383 @@
+//! The flight log: records on a NAND that are there afterwards, whatever was cut when.
+//!
+//! In: an [`Entry`] a cycle. Out: its [`Key`] once it is durable; after a start, what the unit was doing; pages for a
+//! dump. The log is a function of the chip and its calls: it reads no clock and waits for nothing but the chip.
+//!
+//! ```text
+//! blocks 0..4     superblock, two good blocks in turn           superblock.rs
+//! blocks 4..      records, ascending, bad blocks left out       page.rs, record.rs
+//! ```
+//!
+//! 1. A page is programmed once, with a record and a copy of the one before: a lost page takes only the newest with it.
+//! 2. A block belongs to one boot. Bits that a cut tore may read differently each time, so nothing is programmed into a
+//!    block whose erase was not completed since this start, and no key is used twice.
+//! 3. The first thing a boot changes is the superblock, and only then an old block: what a torn superblock seems to
+//!    say is made true before anything follows from it.
+//! 4. Appending is done when the page has been read back. A block that fails is retired in the superblock, and the
+//!    record goes to the next one.
+//! 5. Erasing the log is one more in the superblock's epoch; blocks are erased later, in free time, and each again just
+//!    before it is used. A block that carries the running epoch is never erased, whatever the search for the end said.
+//! 6. A full log says so and stops.
+//!
+//! Refuses: another chip or none, a newer format (named), foreign content (until it is erased by command), more bad
+//! blocks than the chip's data sheet allows.
+
+mod blocks;
+pub mod dump;
+mod mount;
+pub mod page;
+pub mod record;
+pub mod superblock;
+
+use core::fmt;
+
+pub use self::mount::Resumed;
+use self::{
+    page::Kind,
+    record::{BootHeader, Entry, Key, RecordBytes},
+    superblock::Superblock,
+};
+use crate::nand::{Nand, NandError, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes};
+
+/// Blocks kept for the superblock: two in use, two for when those wear out.
+pub const LOG_START: u16 = 4;
+
+/// Blocks tried for one page before the chip is given up: the data sheet allows 80 of 4096 to fail in a life.
+const ATTEMPTS: usize = 4;
+
+/// Why the log refuses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum LogError {
+    /// The chip does not do what it is asked.
+    Nand(NandError),
+    /// [`FlightLog::mount`] was not called, or did not succeed.
+    NotMounted,
+    /// The log was written by a newer firmware, in this format version.
+    Newer(u8),
+    /// The chip holds something that is no log.
+    Foreign,
+    /// No room is left; nothing was overwritten.
+    Full,
+    /// More bad blocks than a chip within its specified life has.
+    Worn,
+}
+
+impl From<NandError> for LogError {
+    fn from(error: NandError) -> Self {
+        LogError::Nand(error)
+    }
+}
+
+impl From<superblock::TooManyBadBlocks> for LogError {
+    fn from(_: superblock::TooManyBadBlocks) -> Self {
+        LogError::Worn
+    }
+}
+
+impl fmt::Display for LogError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LogError::Nand(error) => error.fmt(f),
+            LogError::NotMounted => f.write_str("not mounted"),
+            LogError::Newer(version) => write!(f, "log of newer format {version}: update the firmware"),
+            LogError::Foreign => f.write_str("NAND holds something else: G_MA makes it a log"),
+            LogError::Full => f.write_str("full"),
+            LogError::Worn => f.write_str("too many bad blocks"),
+        }
+    }
+}
+
+impl core::error::Error for LogError {}
+
+/// How the log stands. Pages are counted from its first block; each holds one new record.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Status {
+    /// Pages that are used or were passed over.
+    pub used: u32,
+    /// Pages in all.
+    pub capacity: u32,
+    /// Bad blocks.
+    pub bad_blocks: u16,
+    /// Bits corrected since the start.
+    pub corrected: u32,
+    /// Half pages that were beyond correction since the start, torn ones included.
+    pub uncorrectable: u32,
+    /// Pages were read that belong elsewhere: an address line is stuck, or a program went astray.
+    pub astray: bool,
+    /// Blocks that are still to be erased in free time.
+    pub erasing: Option<u32>,
+    /// The newest record, and when its cycle began [us].
+    pub last: Option<(Key, u64)>,
+}
+
+/// The log on a chip.
+pub struct FlightLog<N> {
+    chip: N,
+    header: BootHeader,
+    state: State,
+    superblock: Superblock,
+    /// The block with the newest superblock, and its next page if the block was erased since this start.
+    home: (u16, Option<u8>),
+    /// This boot has its number.
+    opened: bool,
+    /// This boot has its header in the log.
+    begun: bool,
+    /// The next page, in a block erased since this start.
+    head: Option<PageAddress>,
+    /// The block after it, erased ahead of time.
+    ahead: Option<u16>,
+    /// No block from here on is used.
+    next_block: u16,
+    erase_next: Option<u16>,
+    seq: u32,
+    /// The record of the newest page, or found newest at mount; how many of `last` and `second` are set.
+    last: RecordBytes,
+    /// The one before it, found at mount.
+    second: RecordBytes,
+    carried: u8,
+    /// A page to be programmed.
+    page: PageBytes,
+    /// A page that was read.
+    back: PageBytes,
+    status: Status,
+}
+
+/// What may be done.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Mounted,
+    /// Only an erase makes it a log.
+    Erasable,
+    Unmounted,
+}
+
+impl<N: Nand> FlightLog<N> {
+    /// The log on this chip; every boot that records begins with `header`. Nothing is sent to the chip.
+    pub fn new(chip: N, header: BootHeader) -> Self {
+        FlightLog {
+            chip,
+            header,
+            state: State::Unmounted,
+            superblock: Superblock::default(),
+            home: (0, None),
+            opened: false,
+            begun: false,
+            head: None,
+            ahead: None,
+            next_block: LOG_START,
+            erase_next: None,
+            seq: 0,
+            last: [0; record::RECORD_BYTES],
+            second: [0; record::RECORD_BYTES],
+            carried: 0,
+            page: [0; PAGE_BYTES],
+            back: [0; PAGE_BYTES],
+            status: Status::default(),
+        }
+    }
+
+    /// Keeps an entry. `Ok` means it is durable. Takes one program of a page, and an erase where
+    /// [`FlightLog::free_time`] had no chance to do it ahead; the first of a boot writes superblock and header first.
+    pub async fn append(&mut self, entry: &Entry) -> Result<Key, LogError> {
+        self.mounted()?;
+        let outcome = self.try_append(entry).await;
+        self.stop_if_unsure(&outcome);
+        outcome
+    }
+
+    async fn try_append(&mut self, entry: &Entry) -> Result<Key, LogError> {
+        if !self.begun {
+            self.begin(entry.start_us).await?;
+        }
+        let key = self.next_key();
+        let record = record::encode_entry(key, entry);
+        page::compose(&mut self.page, &record, &self.last);
+        self.put_page().await?;
+        self.last = record;
+        self.status.last = Some((key, entry.start_us));
+        Ok(key)
+    }
+
+    /// A bounded part of what is better done before it is needed (one erase at most); whether there is more.
+    pub async fn free_time(&mut self) -> Result<bool, LogError> {
+        self.mounted()?;
+        let outcome = self.try_free_time().await;
+        self.stop_if_unsure(&outcome);
+        outcome
+    }
+
+    async fn try_free_time(&mut self) -> Result<bool, LogError> {
+        if self.begun && self.ahead.is_none() {
+            self.ahead = match self.erased_block().await {
+                Ok(block) => Some(block),
+                Err(LogError::Full) => None,
+                Err(error) => return Err(error),
+            };
+            if self.ahead.is_some() {
+                return Ok(self.erase_next.is_some());
+            }
+        }
+        // In flight the time belongs to the log, which erases what it needs itself.
+        let Some(next) = self.erase_next.filter(|_| !self.superblock.flight) else {
+            return Ok(false);
+        };
+        self.erase_next = match self.free_block(next.max(self.next_block)).await? {
+            Some(block) => {
+                self.erase(block).await?;
+                Some(block + 1)
+            }
+            None => None,
+        };
+        Ok(self.erase_next.is_some())
+    }
+
+    /// Keeps the mode for the next start.
+    pub async fn keep_mode(&mut self, flight: bool, recording: bool) -> Result<(), LogError> {
+        self.mounted()?;
+        if (self.superblock.flight, self.superblock.recording) == (flight, recording) {
+            return Ok(());
+        }
+        (self.superblock.flight, self.superblock.recording) = (flight, recording);
+        let outcome = self.save().await;
+        self.stop_if_unsure(&outcome);
+        outcome
+    }
+
+    /// Makes the log empty; [`FlightLog::free_time`] erases its blocks. Cut anywhere, the old log is whole or gone.
+    pub async fn start_erase(&mut self) -> Result<(), LogError> {
+        if self.state == State::Unmounted {
+            return Err(LogError::NotMounted);
+        }
+        self.superblock.epoch = self.superblock.epoch.checked_add(1).ok_or(LogError::Worn)?;
+        self.superblock.first_block = LOG_START;
+        self.open();
+        self.begun = false;
+        self.head = None;
+        self.ahead = None;
+        self.next_block = LOG_START;
+        self.carried = 0;
+        self.status.last = None;
+        self.state = State::Mounted;
+        self.erase_next = Some(LOG_START);
+        let outcome = self.save().await;
+        self.stop_if_unsure(&outcome);
+        outcome
+    }
+
+    /// Reads page `number` of the log for a dump, counted from its first block: the whole records of the running epoch
+    /// in it. Works until the chip itself fails; pages from [`Status::used`] on are blank.
+    pub async fn read(&mut self, number: u32) -> Result<[Option<&RecordBytes>; 2], LogError> {
+        self.mounted()?;
+        let at = self.page_number(number).ok_or(LogError::Full)?;
+        self.chip.read(at, &mut self.back).await?;
+        let whole = self.whole_records();
+        Ok(core::array::from_fn(|half| {
+            whole[half].map(|_| page::record(&self.back, half))
+        }))
+    }
+
+    /// How it stands.
+    pub fn status(&self) -> Status {
+        let per_block = u32::from(PAGES_PER_BLOCK);
+        let blocks = self.chip.blocks();
+        let log_bad = |end| u32::from(self.superblock.bad.count(LOG_START..end));
+        let end = match self.head {
+            Some(at) => at.row(),
+            None => u32::from(self.next_block - u16::from(self.ahead.is_some())) * per_block,
+        };
+        Status {
+            used: end.saturating_sub(u32::from(LOG_START) * per_block),
+            capacity: (u32::from(blocks.saturating_sub(LOG_START)) - log_bad(blocks)) * per_block,
+            bad_blocks: self.superblock.bad.count(0..blocks),
+            erasing: self.erase_next.map(|next| u32::from(blocks.saturating_sub(next))),
+            ..self.status
+        }
+    }
+
+    fn mounted(&self) -> Result<(), LogError> {
+        if self.state == State::Mounted {
+            Ok(())
+        } else {
+            Err(LogError::NotMounted)
+        }
+    }
+
+    /// After a failure of the chip nobody knows what it holds: only a new mount may tell.
+    fn stop_if_unsure<T>(&mut self, outcome: &Result<T, LogError>) {
+        if let Err(LogError::Nand(_)) = outcome {
+            self.state = State::Unmounted;
+        }
+    }
+
+    fn next_key(&mut self) -> Key {
+        let key = Key {
+            epoch: self.superblock.epoch,
+            boot: self.superblock.boot,
+            seq: self.seq,
+        };
+        // Taken even if the record does not come to be: half of it may.
+        self.seq += 1;
+        key
+    }
+
+    /// Gives this boot its number; the caller saves it.
+    fn open(&mut self) {
+        if !self.opened {
+            self.superblock.boot = self.superblock.boot.saturating_add(1);
+            self.opened = true;
+        }
+    }
+
+    /// Writes superblock and header of this boot, and with them the two newest records of the boots before: their last
+    /// pages may be torn, and then these are the only copies.
+    async fn begin(&mut self, now_us: u64) -> Result<(), LogError> {
+        let first = self.free_block(self.next_block).await?.ok_or(LogError::Full)?;
+        if !self.opened || self.superblock.first_block != first {
+            self.open();
+            self.superblock.first_block = first;
+            self.save().await?;
+        }
+        self.header.opened_us = now_us;
+        let key = self.next_key();
+        let header = record::encode_header(key, &self.header);
+        let newest = if self.carried > 0 { &self.last } else { &header };
+        page::compose(&mut self.page, &header, newest);
+        self.put_page().await?;
+        if self.carried < 2 {
+            self.second = header;
+        }
+        page::compose(&mut self.page, &self.second, &header);
+        self.put_page().await?;
+        self.last = self.second;
+        self.begun = true;
+        Ok(())
+    }
+
+    /// Programs the composed page, wherever it holds.
+    async fn put_page(&mut self) -> Result<(), LogError> {
+        for _ in 0..ATTEMPTS {
+            let at = match (self.head.take(), self.ahead.take()) {
+                (Some(at), ahead) => {
+                    self.ahead = ahead;
+                    at
+                }
+                (None, Some(block)) => PageAddress { block, page: 0 },
+                (None, None) => PageAddress {
+                    block: self.erased_block().await?,
+                    page: 0,
+                },
+            };
+            let tag = self.tag(Kind::Log);
+            page::address(&mut self.page, at, tag);
+            if self.program(at).await? {
+                let page = at.page + 1;
+                self.head = (page < PAGES_PER_BLOCK).then_some(PageAddress { page, ..at });
+                return Ok(());
+            }
+            self.retire(at.block).await?;
+        }
+        Err(LogError::Worn)
+    }
+}

@@ -1,0 +1,292 @@
+//! Mounting: what a chip holds after whatever happened to it. Reads only.
+//!
+//! In: the chip. Out: what the unit was doing ([`Resumed`]), where the log goes on, the two newest records. Typically
+//! some 60 reads: the superblock's pages, a search over the blocks of the newest boot (they ascend without a gap but for
+//! bad ones), the newest page. Any doubt in the superblock, and every block's first page is looked at: 4092 reads of a
+//! spare area, 70 ms. A chip never used has its factory marks read in both pages where they may stand, before any erase.
+
+use embassy_futures::yield_now;
+
+use super::{
+    FlightLog, LOG_START, LogError, State,
+    page::{self, Kind, Stamp},
+    record,
+    superblock::{self, Superblock, SuperblockError},
+};
+use crate::nand::{Nand, PAGES_PER_BLOCK, PageAddress};
+
+/// Blocks below the newest boot's first that are looked at for the boot before: boots that left nothing but a torn page
+/// used the same block again, so that the next one below is live unless it was retired.
+const LOOK_BACK: u16 = 8;
+
+/// Pages at the start of a boot that repeat records of the boots before, out of the order of their keys.
+const COPIES_OF_OLDER: u8 = 2;
+
+/// Blocks read between two chances for the rest of the unit.
+const STRIDE: u16 = 16;
+
+/// Boots that a lost superblock may have counted without leaving a record.
+const UNSEEN_BOOTS: u32 = 16;
+
+/// What the unit was doing, as the chip tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Resumed {
+    /// It was in FLIGHT.
+    pub flight: bool,
+    /// It was recording.
+    pub recording: bool,
+}
+
+/// What the superblock's blocks hold.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Found {
+    /// The newest save, both copies, and nothing torn.
+    Sure,
+    /// A save, but a newer one may be lost.
+    Doubtful,
+    /// None.
+    Nothing,
+}
+
+impl<N: Nand> FlightLog<N> {
+    /// Finds out what the chip holds. Nothing is changed on it.
+    pub async fn mount(&mut self) -> Result<Resumed, LogError> {
+        self.forget();
+        let outcome = self.find_all().await;
+        if outcome == Err(LogError::Foreign) {
+            self.state = State::Erasable;
+        }
+        outcome?;
+        self.state = State::Mounted;
+        Ok(Resumed {
+            flight: self.superblock.flight,
+            recording: self.superblock.recording,
+        })
+    }
+
+    fn forget(&mut self) {
+        self.state = State::Unmounted;
+        self.superblock = Superblock::default();
+        self.home = (LOG_START - 1, None);
+        (self.opened, self.begun) = (false, false);
+        (self.head, self.ahead, self.erase_next) = (None, None, None);
+        (self.next_block, self.seq, self.carried) = (LOG_START, 0, 0);
+        self.status.last = None;
+    }
+
+    async fn find_all(&mut self) -> Result<(), LogError> {
+        self.chip.identify().await?;
+        let head = match self.find_superblock().await? {
+            Found::Sure => match self.search_head().await? {
+                Some(head) => Some(head),
+                None if self.superblock.first_block <= LOG_START => None,
+                None => self.scan(true).await?,
+            },
+            found => {
+                let head = self.scan(found == Found::Doubtful).await?;
+                if found == Found::Doubtful || head.is_some() {
+                    self.superblock.boot = self.superblock.boot.saturating_add(UNSEEN_BOOTS);
+                }
+                head
+            }
+        };
+        let Some(head) = head else {
+            return Ok(());
+        };
+        self.next_block = head + 1;
+        self.find_newest(head).await
+    }
+
+    /// Reads the superblock's blocks.
+    async fn find_superblock(&mut self) -> Result<Found, LogError> {
+        let mut found = Found::Nothing;
+        let mut copies = 0;
+        let mut torn = [false; LOG_START as usize];
+        for block in 0..LOG_START.min(self.chip.blocks()) {
+            for page in 0..PAGES_PER_BLOCK {
+                let at = PageAddress { block, page };
+                self.chip.read(at, &mut self.back).await?;
+                if page::is_blank(&self.back) {
+                    break;
+                }
+                let ours = matches!(page::stamp(page::spare(&self.back), at),
+                    Stamp::Ours(tag) if tag.kind == Kind::Superblock);
+                let whole = self.corrected();
+                let mut readable = false;
+                for half in (0..2).filter(|half| whole[*half]) {
+                    match superblock::decode(page::record(&self.back, half)) {
+                        Ok(superblock) => {
+                            readable = true;
+                            if found == Found::Nothing || superblock.number > self.superblock.number {
+                                self.superblock = superblock;
+                                self.home = (block, None);
+                                found = Found::Doubtful;
+                                copies = 0;
+                            }
+                        }
+                        Err(SuperblockError::Newer(version)) => return Err(LogError::Newer(version)),
+                        Err(SuperblockError::Damaged) => {}
+                    }
+                    if readable {
+                        break;
+                    }
+                }
+                copies += u32::from(readable && self.home.0 == block);
+                torn[usize::from(block)] |= !(readable && ours);
+            }
+        }
+        // What a retired block holds is no news.
+        let torn = (0..LOG_START).any(|block| torn[usize::from(block)] && !self.superblock.bad.contains(block));
+        Ok(match found {
+            Found::Doubtful if copies >= 2 && !torn => Found::Sure,
+            found => found,
+        })
+    }
+
+    /// The last live block, sought among those of the newest boot.
+    async fn search_head(&mut self) -> Result<Option<u16>, LogError> {
+        let first = self.superblock.first_block.max(LOG_START);
+        let end = self.chip.blocks();
+        let Some(mut low) = self.good(first..end) else {
+            return Ok(None);
+        };
+        if !self.is_live(low).await? {
+            for block in (LOG_START.max(first.saturating_sub(LOOK_BACK))..first).rev() {
+                if !self.superblock.bad.contains(block) && self.is_live(block).await? {
+                    return Ok(Some(block));
+                }
+            }
+            return Ok(None);
+        }
+        let (mut high, mut step) = (end, 1);
+        // Twice as far each time, until a block is not live; then halfway between.
+        while let Some(block) = low.checked_add(step).and_then(|from| self.good(from..end)) {
+            if !self.is_live(block).await? {
+                high = block;
+                break;
+            }
+            low = block;
+            step = step.saturating_mul(2);
+        }
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            match self.good(middle..high) {
+                Some(block) if self.is_live(block).await? => low = block,
+                _ => high = middle,
+            }
+        }
+        Ok(Some(low))
+    }
+
+    fn good(&self, mut blocks: core::ops::Range<u16>) -> Option<u16> {
+        blocks.find(|block| !self.superblock.bad.contains(*block))
+    }
+
+    /// Looks at every block; the last one of the newest epoch. Without a superblock it makes a new one of what it finds.
+    async fn scan(&mut self, superblock: bool) -> Result<Option<u16>, LogError> {
+        let mut newest: Option<(u16, u16)> = None;
+        let mut foreign = false;
+        for block in 0..self.chip.blocks() {
+            if block % STRIDE == 0 {
+                yield_now().await;
+            }
+            if self.superblock.bad.contains(block) {
+                continue;
+            }
+            let (mut stamp, marked) = self.stamp(block, 0).await?;
+            if marked && !superblock {
+                self.superblock.bad.insert(block)?;
+                continue;
+            }
+            if block < LOG_START {
+                continue;
+            }
+            if stamp == Stamp::Garbage {
+                stamp = self.stamp(block, 1).await?.0;
+                foreign |= stamp == Stamp::Garbage;
+            }
+            if let Stamp::Ours(tag) = stamp
+                && tag.kind == Kind::Log
+                && newest.is_none_or(|newest| newest <= (tag.epoch, block))
+            {
+                newest = Some((tag.epoch, block));
+            }
+        }
+        let newest = newest.filter(|(epoch, _)| *epoch >= self.superblock.epoch);
+        if let Some((epoch, _)) = newest {
+            self.superblock.epoch = epoch;
+        } else if !superblock {
+            if foreign {
+                return Err(LogError::Foreign);
+            }
+            self.read_second_marks().await?;
+        }
+        Ok(newest.map(|(_, block)| block))
+    }
+
+    /// The factory marks in second pages, of a chip that was never used.
+    async fn read_second_marks(&mut self) -> Result<(), LogError> {
+        for block in 0..self.chip.blocks() {
+            if block % STRIDE == 0 {
+                yield_now().await;
+            }
+            if self.stamp(block, 1).await?.1 {
+                self.superblock.bad.insert(block)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
+    /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
+    /// may be torn too. What they say of the mode counts if there is no superblock.
+    async fn find_newest(&mut self, head: u16) -> Result<(), LogError> {
+        let mut newest = [record::Key::default(); 2];
+        for block in (head.saturating_sub(LOOK_BACK).max(LOG_START)..=head).rev() {
+            if !self.superblock.bad.contains(block) && self.find_newest_in(block, &mut newest).await? {
+                break;
+            }
+        }
+        if self.carried > 0 {
+            let (flight, time_us) = record::mode_and_time(&self.last);
+            self.status.last = Some((newest[0], time_us));
+            if self.superblock.number == 0 {
+                (self.superblock.flight, self.superblock.recording) = (flight, flight);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the search is over.
+    async fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
+        for page in (0..PAGES_PER_BLOCK).rev() {
+            let at = PageAddress { block, page };
+            if self.stamp(block, page).await?.0 == Stamp::Blank {
+                continue;
+            }
+            self.chip.read(at, &mut self.back).await?;
+            for (half, key) in self.whole_records().into_iter().enumerate() {
+                let Some(key) = key else { continue };
+                self.superblock.boot = self.superblock.boot.max(key.boot);
+                let bytes = page::record(&self.back, half);
+                if !record::is_packet(bytes) {
+                    continue;
+                }
+                if self.carried == 0 || key > newest[0] {
+                    (self.second, self.last) = (self.last, *bytes);
+                    *newest = [key, newest[0]];
+                    self.carried = (self.carried + 1).min(2);
+                } else if key < newest[0] && (self.carried == 1 || key > newest[1]) {
+                    self.second = *bytes;
+                    newest[1] = key;
+                    self.carried = 2;
+                }
+            }
+            if self.carried == 2 && page >= COPIES_OF_OLDER {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}

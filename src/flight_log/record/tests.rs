@@ -1,0 +1,126 @@
+extern crate std;
+
+use super::*;
+
+/// Kept to a sixteen-bit fraction.
+const QUATERNION_TOLERANCE: f32 = 0.51 / 32_767.0;
+/// Kept to eight significant bits, cut.
+const SIGMA_TOLERANCE: f32 = 1.0 / 128.0;
+
+const KEY: Key = Key {
+    epoch: 3,
+    boot: 0x0102_0304,
+    seq: 70_000,
+};
+
+fn entry() -> Entry {
+    let mut slots_us = core::array::from_fn(|slot| 260 * slot as u32);
+    slots_us[5] = NO_SLOT;
+    Entry {
+        start_us: 86_400_000_123,
+        packet: core::array::from_fn(|at| at as u8),
+        slots_us,
+        flight: true,
+        health: Health(0x20).with(Health::RECORDING),
+        estimate: None,
+    }
+}
+
+#[test]
+fn a_packet_record_says_what_it_was_given() {
+    assert_eq!(
+        decode(&encode_entry(KEY, &entry())),
+        Ok((KEY, Content::Packet(entry())))
+    );
+}
+
+#[test]
+fn the_packet_stands_verbatim_where_the_page_says() {
+    let bytes = encode_entry(KEY, &entry());
+    assert_eq!(bytes[24..180], entry().packet);
+    assert_eq!(bytes[..4], [0xE7, 0x4D, 1, 1]);
+    assert_eq!(bytes[4..14], [0x70, 0x11, 0x01, 0, 4, 3, 2, 1, 3, 0]);
+}
+
+#[test]
+fn an_estimate_is_kept_to_its_resolution() {
+    let given = Estimate {
+        q_nb: [0.5, -0.5, 0.707, -1.0],
+        bias_b: [1e-3, -2.5e-4, 0.0],
+        sigma: [0.01, 0.02, 0.5, 1e-5, 2e-5, 3e-5],
+        sensors: SensorHealth(0x8000_0007),
+    };
+    let with_estimate = Entry {
+        estimate: Some(given),
+        ..entry()
+    };
+    let Ok((
+        _,
+        Content::Packet(Entry {
+            estimate: Some(got), ..
+        }),
+    )) = decode(&encode_entry(KEY, &with_estimate))
+    else {
+        panic!("no estimate came back");
+    };
+    assert_eq!((got.bias_b, got.sensors), (given.bias_b, given.sensors));
+    for axis in 0..4 {
+        assert!(
+            (got.q_nb[axis] - given.q_nb[axis]).abs() <= QUATERNION_TOLERANCE,
+            "{got:?}"
+        );
+    }
+    for axis in 0..6 {
+        let cut = (given.sigma[axis] - got.sigma[axis]) / given.sigma[axis];
+        assert!((0.0..=SIGMA_TOLERANCE).contains(&cut), "{got:?}");
+    }
+}
+
+#[test]
+fn slot_times_beyond_the_field_stay_times() {
+    let mut late = entry();
+    late.slots_us[0] = 400_000;
+    let Ok((_, Content::Packet(got))) = decode(&encode_entry(KEY, &late)) else {
+        panic!("no packet came back");
+    };
+    assert_eq!(got.slots_us[0], 4 * (u32::from(u16::MAX) - 1));
+}
+
+#[test]
+fn a_header_says_what_it_was_given_and_describes_the_log() {
+    let name = |text: &str| Name::try_from(text).expect("a short name");
+    let header = BootHeader {
+        opened_us: 77,
+        firmware: name("0.1.0"),
+        unit: name("FM-2"),
+        calibration: name("sixteen-letters!"),
+        period_us: 20_000,
+    };
+    let bytes = encode_header(KEY, &header);
+    assert_eq!(decode(&bytes), Ok((KEY, Content::Header(header))));
+    let text = std::string::String::from_utf8_lossy(&bytes[76..252]).into_owned();
+    assert!(text.trim_end_matches('\0').ends_with("crc32@252"), "{text}");
+}
+
+#[test]
+fn every_one_bit_error_is_refused() {
+    for bit in 0..8 * RECORD_BYTES {
+        let mut bytes = encode_entry(KEY, &entry());
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        assert!(decode(&bytes).is_err(), "bit {bit}");
+    }
+}
+
+#[test]
+fn a_newer_version_is_named_and_erased_bytes_are_no_record() {
+    let mut bytes = encode_entry(KEY, &entry());
+    bytes[2] = 2;
+    seal(&mut bytes);
+    assert_eq!(key(&bytes), Err(RecordError::Newer(2)));
+    assert_eq!(key(&[0xFF; RECORD_BYTES]), Err(RecordError::Magic));
+    assert_eq!(key(&[0; RECORD_BYTES]), Err(RecordError::Magic));
+    let mut bytes = encode_entry(KEY, &entry());
+    bytes[3] = 9;
+    seal(&mut bytes);
+    assert_eq!(decode(&bytes), Err(RecordError::Type(9)));
+}

@@ -1,0 +1,189 @@
+//! The superblock: what must be known before the log is read.
+//!
+//! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
+//! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording), `6-7` epoch, `8-11` its own number,
+//! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-247` their numbers ascending,
+//! `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
+
+use heapless::Vec;
+
+use super::record::{CRC, RECORD_BYTES, RecordBytes};
+
+/// The version this code writes and the newest it reads.
+pub const VERSION: u8 = 1;
+
+/// Bad blocks that fit: the data sheet allows 80 of 4096 over the chip's life.
+pub const BAD_BLOCKS: usize = 112;
+
+const MAGIC: [u8; 4] = *b"eMSB";
+const CHECKED: usize = RECORD_BYTES - 4;
+const LIST: usize = 20;
+
+/// Blocks that are not used, ascending.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BadBlocks(Vec<u16, BAD_BLOCKS>);
+
+/// There is no room for another bad block: the chip is beyond its specified life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyBadBlocks;
+
+impl BadBlocks {
+    /// Whether `block` is bad.
+    pub fn contains(&self, block: u16) -> bool {
+        self.0.binary_search(&block).is_ok()
+    }
+
+    /// Remembers `block`.
+    pub fn insert(&mut self, block: u16) -> Result<(), TooManyBadBlocks> {
+        match self.0.binary_search(&block) {
+            Ok(_) => Ok(()),
+            Err(place) => self.0.insert(place, block).map_err(|_| TooManyBadBlocks),
+        }
+    }
+
+    /// How many are in `blocks`.
+    pub fn count(&self, blocks: core::ops::Range<u16>) -> u16 {
+        self.0.iter().filter(|block| blocks.contains(block)).count() as u16
+    }
+
+    /// Their numbers, ascending.
+    pub fn as_slice(&self) -> &[u16] {
+        &self.0
+    }
+}
+
+/// What must be known before the log is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Superblock {
+    /// Which save this is: the highest counts.
+    pub number: u32,
+    /// How often the log was erased: records of other epochs are not of this log.
+    pub epoch: u16,
+    /// The newest boot that wrote to the log; its number is not used again.
+    pub boot: u32,
+    /// Where that boot began.
+    pub first_block: u16,
+    /// The unit is in FLIGHT.
+    pub flight: bool,
+    /// Packets are being recorded.
+    pub recording: bool,
+    /// Blocks that are not used.
+    pub bad: BadBlocks,
+}
+
+/// Why bytes are not a superblock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SuperblockError {
+    /// Damaged, or something else.
+    Damaged,
+    /// Written by a newer firmware.
+    Newer(u8),
+}
+
+/// Its 256 bytes.
+pub fn encode(superblock: &Superblock) -> RecordBytes {
+    let mut bytes = [0; RECORD_BYTES];
+    let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
+    put(0, &MAGIC);
+    put(
+        4,
+        &[
+            VERSION,
+            u8::from(superblock.flight) | u8::from(superblock.recording) << 1,
+        ],
+    );
+    put(6, &superblock.epoch.to_le_bytes());
+    put(8, &superblock.number.to_le_bytes());
+    put(12, &superblock.boot.to_le_bytes());
+    put(16, &superblock.first_block.to_le_bytes());
+    put(18, &(superblock.bad.0.len() as u16).to_le_bytes());
+    for (index, block) in superblock.bad.0.iter().enumerate() {
+        put(LIST + 2 * index, &block.to_le_bytes());
+    }
+    let crc = CRC.checksum(&bytes[..CHECKED]);
+    bytes[CHECKED..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+/// The superblock in these bytes.
+pub fn decode(bytes: &RecordBytes) -> Result<Superblock, SuperblockError> {
+    if bytes[..4] != MAGIC || bytes[CHECKED..] != CRC.checksum(&bytes[..CHECKED]).to_le_bytes() {
+        return Err(SuperblockError::Damaged);
+    }
+    if bytes[4] > VERSION {
+        return Err(SuperblockError::Newer(bytes[4]));
+    }
+    let word = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let long = |at: usize| u32::from(word(at)) | u32::from(word(at + 2)) << 16;
+    let mut bad = BadBlocks::default();
+    let count = usize::from(word(18));
+    if count > BAD_BLOCKS {
+        return Err(SuperblockError::Damaged);
+    }
+    for index in 0..count {
+        bad.insert(word(LIST + 2 * index))
+            .map_err(|_| SuperblockError::Damaged)?;
+    }
+    Ok(Superblock {
+        number: long(8),
+        epoch: word(6),
+        boot: long(12),
+        first_block: word(16),
+        flight: bytes[5] & 1 != 0,
+        recording: bytes[5] & 2 != 0,
+        bad,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn superblock() -> Superblock {
+        let mut bad = BadBlocks::default();
+        for block in [4000, 1, 77, 77] {
+            bad.insert(block).expect("room");
+        }
+        Superblock {
+            number: 0x0001_0002,
+            epoch: 5,
+            boot: 0x0003_0004,
+            first_block: 99,
+            flight: true,
+            recording: false,
+            bad,
+        }
+    }
+
+    #[test]
+    fn a_superblock_says_what_it_was_given() {
+        assert_eq!(decode(&encode(&superblock())), Ok(superblock()));
+        assert_eq!(superblock().bad.as_slice(), [1, 77, 4000]);
+    }
+
+    #[test]
+    fn a_full_list_of_bad_blocks_is_kept_and_refuses_another() {
+        let mut full = superblock();
+        full.bad = BadBlocks(Vec::from_iter(0..BAD_BLOCKS as u16));
+        assert_eq!(full.bad.insert(500), Err(TooManyBadBlocks));
+        assert_eq!(decode(&encode(&full)), Ok(full));
+    }
+
+    #[test]
+    fn every_one_bit_error_is_refused() {
+        for bit in 0..8 * RECORD_BYTES {
+            let mut bytes = encode(&superblock());
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            assert!(decode(&bytes).is_err(), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn a_newer_version_is_named() {
+        let mut bytes = encode(&superblock());
+        bytes[4] = 9;
+        let crc = CRC.checksum(&bytes[..CHECKED]);
+        bytes[CHECKED..].copy_from_slice(&crc.to_le_bytes());
+        assert_eq!(decode(&bytes), Err(SuperblockError::Newer(9)));
+    }
+}
