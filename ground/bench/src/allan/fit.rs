@@ -13,6 +13,10 @@
 //! deviations from zero or if it does not make up [`VISIBLE`] of the variance at [`OCTAVES`] averaging times: a slope
 //! that short is a guess. Refused terms of [`KEPT`] standard deviations stay in the fit all the same: left out, they would
 //! pass into the coefficients of the others.
+//!
+//! How often 95 % intervals held the truth in 1,000 simulated records of 8,192 samples: quantisation, angle and rate random
+//! walk together 94.2, 94.6 and 94.7 %; angle random walk alone 92.8 %, a little too seldom, because choosing terms takes
+//! some of its variance; bias instability over a little angle random walk 81.3 %: its interval is too narrow by a third.
 
 use nalgebra::{DMatrix, DVector};
 

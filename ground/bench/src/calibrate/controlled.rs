@@ -325,7 +325,7 @@ fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradi
     } else if report.wrong.is_empty() {
         report
             .next
-            .push("compare with the last set: ground calibrate diff".into());
+            .push("compare with the last set: ground calibration diff".into());
     }
     report
 }

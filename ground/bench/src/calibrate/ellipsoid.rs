@@ -148,7 +148,7 @@ fn describe(found: &Ellipsoid, points: &[Vector3<f64>], arguments: &Arguments) -
         report.remarks.push(format!("{share:.0} % of the sphere was covered"));
         report
             .next
-            .push("compare with the last set: ground calibrate diff".into());
+            .push("compare with the last set: ground calibration diff".into());
     }
     report.picture(Figure::map("Points on the sphere", &coverage.map()));
     let relative = found
