@@ -109,6 +109,7 @@ pub struct Estimator {
 
 impl Estimator {
     /// With a parameter set, at a site. A new set makes a new estimator: what was learnt was learnt through the old one.
+    #[inline(never)]
     pub fn new(set: Set, site: &Site) -> Self {
         Estimator {
             temperatures: Temperatures::default(),
@@ -120,6 +121,9 @@ impl Estimator {
     }
 
     /// Of a unit with these settings and the compiled-in parameters.
+    ///
+    /// Not inlined, as the others here: what they build on the way would lie on the stack under all that the unit does.
+    #[inline(never)]
     pub fn of(settings: &Settings) -> Self {
         Estimator::new(Set::nominal(Ranges::of(settings)), &settings.site)
     }
@@ -135,6 +139,7 @@ impl Estimator {
     }
 
     /// Takes a cycle; the filter's records of it too.
+    #[inline(never)]
     pub fn step_in_full(&mut self, sample: &Sample, increments: &Increments) -> (Estimate, Outcome) {
         let reading = &sample.reading;
         self.temperatures.note(reading);

@@ -96,6 +96,7 @@ struct Turning {
 
 impl Monitor {
     /// Of a unit with these parameters, about which nothing is known yet. A new set makes a new monitor.
+    #[inline(never)]
     pub fn new(set: &Set) -> Self {
         let [acc, mag, gyro] = set.uncertainty;
         let counts = |axis: &crate::calibration::Axis| axis.noise / axis.scale;

@@ -194,8 +194,8 @@ fn a_static_is_read_by_its_name_and_a_wrong_name_is_refused() {
     assert!(matches!(&refused, Err(Error::Image(error)) if error.to_string().contains("NO_SUCH_STATIC")));
 }
 
-/// [bytes] what the stack may have grown to: 60 % of its place.
-const STACK_CEILING: usize = 32 * 1024 * 6 / 10;
+/// [bytes] what the stack may have grown to: 70 % of its place. Most is the estimator's, while it is being built.
+const STACK_CEILING: usize = 48 * 1024 * 7 / 10;
 
 #[test]
 fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
@@ -222,7 +222,7 @@ fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
     let used = said
         .split("stack ")
         .nth(1)
-        .and_then(|rest| rest.split_once(" of 32768 bytes"));
+        .and_then(|rest| rest.split_once(" of 49152 bytes"));
     let used: usize = used.and_then(|(used, _)| used.parse().ok()).expect("the status tells");
     println!("{used} bytes of stack");
     // A mark that was never painted or never read would be 0 or all of it.
