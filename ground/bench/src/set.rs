@@ -2,7 +2,7 @@
 //!
 //! TOML, a `[[channel]]` each, so that two sets differ line by line under review: parameters in counts and SI, covariance,
 //! temperatures, part identities, and the SHA-256 of every file it came from. Out of calibrations, merged by channel; in
-//! for [`diff`](crate::set::diff), for the twin's [`unit`] and, in single precision, for the unit itself ([`image`]).
+//! for [`diff`], for the twin's [`unit`] and, in single precision, for the unit itself ([`image`]).
 //!
 //! Refused: another format, a covariance that is not square or not positive, an axis without length, two channels with
 //! one name.
