@@ -112,6 +112,13 @@ pub struct Status {
     pub last: Option<(Key, u64)>,
 }
 
+impl Status {
+    /// [min] until the log is full, at a record each `period_ms`.
+    pub fn minutes_left(&self, period_ms: u64) -> u64 {
+        u64::from(self.capacity.saturating_sub(self.used)) * period_ms / 60_000
+    }
+}
+
 /// The log on a chip.
 pub struct FlightLog<N> {
     chip: N,

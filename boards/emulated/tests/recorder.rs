@@ -1,4 +1,4 @@
-//! The recorder of the release image: its NAND on the FSMC, its supply, and power cuts at random instants of a flight.
+//! The recorder of the release image: its NAND on the FSMC, its supply, and power cuts and resets at random instants of a flight.
 //!
 //! Per change [`CUTS`] cuts; the long set is `EMEMS_CUTS=5000 cargo host-test --test recorder -- --nocapture`. Cuts are drawn
 //! from the number of their run, which a failure names.
@@ -154,10 +154,12 @@ fn cut_again_and_again(run: u64) {
         } else {
             BACK + draw % (LONGEST - BACK)
         };
-        faults.push(Scheduled {
-            at,
-            fault: Fault::PowerCut((draw >> 16) as usize % 9),
-        });
+        // One in four is a reset.
+        let fault = match draw >> 8 & 3 {
+            0 => Fault::Reset,
+            _ => Fault::PowerCut((draw >> 16) as usize % 9),
+        };
+        faults.push(Scheduled { at, fault });
     }
     let (tape, chip) = flown(&faults, at + BACK);
     let logged = logged(&chip);
