@@ -40,7 +40,7 @@ fn recording() -> Flight {
 /// Packets on the chip, by key.
 fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
     let mut found = std::collections::BTreeMap::new();
-    for block in LOG_START..LOG_START + 20 {
+    for block in LOG_START..LOG_START + 40 {
         for page in 0..PAGES_PER_BLOCK {
             let mut bytes = chip.read(PageAddress { block, page });
             let whole = page::correct(&mut bytes);
