@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use embassy_futures::block_on;
 use emems::flight_log::{
-    LogError,
+    LOG_START, LogError,
     record::{self, Content},
 };
 use host_tests::recorder::{Flown, Tally, campaign, log, three_boots};
@@ -127,4 +127,13 @@ fn f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used() {
         verdict(flown, true)
     });
     assert!(tally.is_clean(), "{tally:?}");
+}
+
+/// The verdict is no rubber stamp.
+#[test]
+fn a_log_half_erased_and_an_erase_that_is_undone_are_found_out() {
+    let mut half = three_boots(BLOCKS, 1);
+    half.chip.erase(LOG_START + 1);
+    assert!(verdict(half, false).lost > 0);
+    assert_eq!(verdict(three_boots(BLOCKS, 1), true).wrong, 1);
 }
