@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(rows.lines().count(), 1 + 39, "{rows}");
         let remarks = String::from_utf8(remarks).expect("text");
         assert!(
-            remarks.contains("boot 1: records 7 to 7 are missing, after"),
+            remarks.contains("boot 1: records 6 to 6 are missing, after"),
             "{remarks}"
         );
         to_folder(&log, "nand.bin", place.path()).expect("a folder");
