@@ -6,8 +6,6 @@
 //! adds to `(sum s)^2`. Kept as integers of 1/64, so that running sums are exact for ever, and clipped at 127, so that one
 //! wild sample does not fill the window alone.
 
-use nalgebra::ComplexField;
-
 /// Cycles: those within one second of the first faulty one at 5 Hz, itself included.
 pub(super) const SHORT: usize = 6;
 /// Cycles: those within five seconds.
@@ -70,16 +68,21 @@ impl Trace {
             disagreement: clipped(disagreement),
             systematic: clipped(systematic),
         };
-        let left = self.ring[(usize::from(self.next) + LONG - SHORT) % LONG];
+        let next = usize::from(self.next);
+        let left = self.ring[if next < SHORT {
+            next + LONG - SHORT
+        } else {
+            next - SHORT
+        }];
         self.short[0] += i32::from(new.disagreement) - i32::from(left.disagreement);
         self.short[1] += i32::from(new.systematic) - i32::from(left.systematic);
-        let old = core::mem::replace(&mut self.ring[usize::from(self.next)], new);
+        let old = core::mem::replace(&mut self.ring[next], new);
         let square = |value: i16| i32::from(value) * i32::from(value);
         self.sum += i32::from(new.disagreement) - i32::from(old.disagreement);
         self.squares += square(new.disagreement) - square(old.disagreement);
         self.systematic += i32::from(new.systematic) - i32::from(old.systematic);
         self.systematic_squares += square(new.systematic) - square(old.systematic);
-        self.next = (self.next + 1) % LONG as u8;
+        self.next = if next + 1 < LONG { self.next + 1 } else { 0 };
         self.held = (self.held + 1).min(LONG as u8);
     }
 
@@ -112,7 +115,9 @@ impl Trace {
 
 fn clipped(sigmas: f32) -> i16 {
     let sigmas = if sigmas.is_nan() { MOST_SIGMAS } else { sigmas };
-    ComplexField::round(sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA) as i16
+    let units = sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA;
+    // To the nearest; the cast takes what is behind the point off.
+    (if units < 0.0 { units - 0.5 } else { units + 0.5 }) as i16
 }
 
 fn squared_sigmas(squares: i32) -> f32 {
