@@ -64,7 +64,9 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
     let mut used = 0;
     for (k, ((axis_b, value), variance)) in axes_b.iter().zip(values).zip(variances).take(16).enumerate() {
         let weight = 1.0 / variance;
-        if wanted >> k & 1 == 0 || !value.is_finite() || !weight.is_finite() || weight <= 0.0 {
+        // Comparisons with NaN are false.
+        let usable = value.is_finite() && weight > 0.0 && weight <= f32::MAX;
+        if wanted >> k & 1 == 0 || !usable {
             continue;
         }
         let row = axis_b * weight;

@@ -50,12 +50,8 @@ const QUIET_CYCLES: u8 = 52;
 #[derive(Clone, Debug)]
 pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
-    /// [rad2/s2] variance of each gyro's noise.
-    noise: [f32; PLATES],
     /// Unit vector of the parity.
     across: [f32; PLATES],
-    /// [rad2/s2] variance of its noise.
-    parity_noise: f32,
     /// Least squares by all four, and without each.
     rate_from_all: SMatrix<f32, 3, PLATES>,
     rate_without: [SMatrix<f32, 3, PLATES>; PLATES],
@@ -85,14 +81,12 @@ impl Gyros {
         Gyros {
             axes_b,
             across,
-            parity_noise: (0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(),
-            noise,
             rate_from_all: matrix(&axes_b, ALL),
             rate_without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k))),
             uncertainty,
             timing_s,
-            parity: Watch::new(allowed),
-            watches: [Watch::new(allowed); PLATES],
+            parity: Watch::new((0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(), allowed),
+            watches: noise.map(|noise| Watch::new(noise, allowed)),
             course_b: None,
             usual_b: None,
             cycles: 0.0,
@@ -121,7 +115,7 @@ impl Gyros {
         }
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle, candidates);
-        let variances = self.noise.map(|noise| noise + systematic);
+        let variances = core::array::from_fn(|k| self.watches[k].noise + systematic);
         let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
         if candidates == ALL {
             solution = self.check(cycle, &variances, systematic, solution);
@@ -167,7 +161,7 @@ impl Gyros {
     fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
         let sum: f32 = (0..PLATES).map(|k| self.across[k] * cycle.values[k]).sum();
         let parity = sum - self.parity.offset;
-        let noise = self.parity_noise;
+        let noise = self.parity.noise;
         let variance = noise + systematic + self.parity.offset_variance;
         if let Some(leapt) = self.leap(cycle, variances, parity * reciprocal_root(noise)) {
             self.watches[leapt].strike(true);
@@ -179,8 +173,8 @@ impl Gyros {
         if self.leaping.is_none() {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
-        self.parity.note(parity, noise, systematic);
-        let alarm = self.parity.learn(parity, variance, noise, LIMITS);
+        self.parity.note(parity, 1.0, systematic);
+        let alarm = self.parity.learn(parity, variance, LIMITS);
         self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
         } else {
@@ -254,7 +248,7 @@ impl Gyros {
             let share = (variances[k] + variance) / variances[k];
             let watch = &mut self.watches[k];
             let disagreement = cycle.values[k] - watch.offset - expected;
-            watch.note(disagreement, self.noise[k] * share, systematic * share);
+            watch.note(disagreement, share, systematic);
             watch.reconsider();
         }
     }

@@ -68,22 +68,28 @@ impl Trace {
             disagreement: clipped(disagreement),
             systematic: clipped(systematic),
         };
-        let next = usize::from(self.next);
+        let next = usize::from(self.next) % LONG;
         let left = self.ring[if next < SHORT {
             next + LONG - SHORT
         } else {
             next - SHORT
         }];
-        self.short[0] += i32::from(new.disagreement) - i32::from(left.disagreement);
-        self.short[1] += i32::from(new.systematic) - i32::from(left.systematic);
         let old = core::mem::replace(&mut self.ring[next], new);
-        let square = |value: i16| i32::from(value) * i32::from(value);
-        self.sum += i32::from(new.disagreement) - i32::from(old.disagreement);
-        self.squares += square(new.disagreement) - square(old.disagreement);
-        self.systematic += i32::from(new.systematic) - i32::from(old.systematic);
-        self.systematic_squares += square(new.systematic) - square(old.systematic);
-        self.next = if next + 1 < LONG { self.next + 1 } else { 0 };
-        self.held = (self.held + 1).min(LONG as u8);
+        // The sums of 26 squares of 8128 stay within 32 bits; arithmetic that would check it is a tenth of the step.
+        let moved = |sum: &mut i32, new: i32, old: i32| *sum = sum.wrapping_add(new).wrapping_sub(old);
+        let square = |value: i16| i32::from(value).wrapping_mul(i32::from(value));
+        moved(&mut self.short[0], new.disagreement.into(), left.disagreement.into());
+        moved(&mut self.short[1], new.systematic.into(), left.systematic.into());
+        moved(&mut self.sum, new.disagreement.into(), old.disagreement.into());
+        moved(&mut self.squares, square(new.disagreement), square(old.disagreement));
+        moved(&mut self.systematic, new.systematic.into(), old.systematic.into());
+        moved(
+            &mut self.systematic_squares,
+            square(new.systematic),
+            square(old.systematic),
+        );
+        self.next = if next + 1 < LONG { next as u8 + 1 } else { 0 };
+        self.held = self.held.saturating_add(1).min(LONG as u8);
     }
 
     /// Whether it holds [`LONG`] cycles.
@@ -114,10 +120,13 @@ impl Trace {
 }
 
 fn clipped(sigmas: f32) -> i16 {
-    let sigmas = if sigmas.is_nan() { MOST_SIGMAS } else { sigmas };
-    let units = sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA;
-    // To the nearest; the cast takes what is behind the point off.
-    (if units < 0.0 { units - 0.5 } else { units + 0.5 }) as i16
+    const MOST: i32 = (MOST_SIGMAS * PER_SIGMA) as i32;
+    if sigmas.is_nan() {
+        return MOST as i16;
+    }
+    // To the nearest; the cast saturates and takes off what is behind the point.
+    let half = if sigmas < 0.0 { -0.5 } else { 0.5 };
+    ((sigmas * PER_SIGMA + half) as i32).clamp(-MOST, MOST) as i16
 }
 
 fn squared_sigmas(squares: i32) -> f32 {

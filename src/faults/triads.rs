@@ -53,8 +53,6 @@ pub(super) struct Apart {
 #[derive(Clone, Debug)]
 pub(super) struct Triads {
     axes_b: [Vector3<f32>; TRIAD_AXES],
-    /// [unit2] variance of each axis's noise.
-    noise: [f32; TRIAD_AXES],
     uncertainty: Uncertainty,
     /// [s] by how much the sensors' sampling instants are unsure.
     timing_s: f32,
@@ -73,10 +71,9 @@ impl Triads {
     pub(super) fn new(axes: &[Axis; TRIAD_AXES], uncertainty: Uncertainty, timing_s: f32) -> Self {
         Triads {
             axes_b: core::array::from_fn(|k| axes[k].axis_b),
-            noise: core::array::from_fn(|k| axes[k].noise * axes[k].noise),
             uncertainty,
             timing_s,
-            watches: [Watch::new(uncertainty.bias * uncertainty.bias); TRIAD_AXES],
+            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, uncertainty.bias * uncertainty.bias)),
             likeness: [[0.0; 4]; TRIAD_AXES],
             usual_b: None,
             last_b: None,
@@ -104,7 +101,10 @@ impl Triads {
         let values = core::array::from_fn(|k| cycle.values[k] - self.watches[k].offset);
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle.dt_s, apart, &values, candidates);
-        let variances = core::array::from_fn(|k| self.noise[k] + systematic + self.watches[k].offset_variance);
+        let variances = core::array::from_fn(|k| {
+            let watch = &self.watches[k];
+            watch.noise + systematic + watch.offset_variance
+        });
         let axes_b = self.axes_b;
         let axes = Values {
             axes_b: &axes_b,
@@ -165,29 +165,34 @@ impl Triads {
 
     /// Notes what each axis disagrees by; how near each that is believed is to an alarm.
     fn watch(&mut self, present: u16, systematic: f32, axes: &Values, found: &Agreement) -> [f32; TRIAD_AXES] {
-        core::array::from_fn(|k| {
-            let read = present >> k & 1 == 1;
+        let mut alarms = [0.0; TRIAD_AXES];
+        for (k, (watch, alarm)) in self.watches.iter_mut().zip(&mut alarms).enumerate() {
+            let (read, used) = (present >> k & 1 == 1, found.solution.used >> k & 1 == 1);
             let disagreement = axes.disagreement(k, found).filter(|_| read);
-            let watch = &mut self.watches[k];
-            let Some(disagreement) = disagreement else {
-                return if watch.excluded() { 0.0 } else { watch.alarm(LIMITS) };
-            };
-            // The parts of the disagreement's variance are in the same proportion as the axis's own.
-            let share = disagreement.variance / axes.variances[k];
-            watch.note(disagreement.by, self.noise[k] * share, systematic * share);
-            if watch.excluded() {
-                watch.reconsider();
-                self.resemble(k, axes, &found.solution);
-                return 0.0;
+            if let Some(disagreement) = disagreement {
+                // The parts of the disagreement's variance are in the same proportion as the axis's own.
+                watch.note(disagreement.by, disagreement.variance / axes.variances[k], systematic);
             }
-            let used = found.solution.used >> k & 1 == 1;
-            watch.strike(!used);
-            if used {
-                watch.learn(disagreement.by, disagreement.variance, self.noise[k], LIMITS)
-            } else {
-                watch.alarm(LIMITS)
+            match disagreement {
+                Some(_) if watch.excluded() => watch.reconsider(),
+                Some(disagreement) if used => {
+                    watch.strike(false);
+                    *alarm = watch.learn(disagreement.by, disagreement.variance, LIMITS);
+                }
+                _ if watch.excluded() => {}
+                gated => {
+                    if gated.is_some() {
+                        watch.strike(true);
+                    }
+                    *alarm = watch.alarm(LIMITS);
+                }
             }
-        })
+        }
+        let doubted = present & self.excluded();
+        for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
+            self.resemble(k, axes, &found.solution);
+        }
+        alarms
     }
 
     /// Excludes the axis with the loudest alarm, if there is one.

@@ -36,6 +36,8 @@ const NOISY: f32 = 4.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watch {
     trace: Trace,
+    /// [unit2] variance of its noise.
+    pub(super) noise: f32,
     /// [unit] learned disagreement.
     pub(super) offset: f32,
     /// [unit2] of the offset.
@@ -49,10 +51,11 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// An axis not seen yet, whose offset may have this variance.
-    pub(super) fn new(allowed: f32) -> Self {
+    /// An axis not seen yet, with noise of this variance, whose offset may have the other.
+    pub(super) fn new(noise: f32, allowed: f32) -> Self {
         Watch {
             trace: Trace::EMPTY,
+            noise,
             offset: 0.0,
             offset_variance: allowed,
             allowed,
@@ -73,10 +76,11 @@ impl Watch {
         self.trace.full()
     }
 
-    /// Takes a cycle's disagreement beyond the offset, with the variance of its noise and of what is systematic in it.
-    pub(super) fn note(&mut self, disagreement: f32, noise: f32, systematic: f32) {
-        let per_noise = reciprocal_root(noise);
-        let systematic = root(systematic + self.offset_variance) * per_noise;
+    /// Takes a cycle's disagreement beyond the offset; its variance and the systematic part of it are those of the axis
+    /// times `share`.
+    pub(super) fn note(&mut self, disagreement: f32, share: f32, systematic: f32) {
+        let per_noise = reciprocal_root(self.noise * share);
+        let systematic = root(systematic * share + self.offset_variance) * per_noise;
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
         let mut sigmas = disagreement * per_noise;
         // The root is worth its while only beyond what it is at least.
@@ -107,14 +111,14 @@ impl Watch {
         over.max(crept)
     }
 
-    /// Learns from a disagreement of this variance in all, `noise` that of its noise, unless something may be wrong; how
-    /// near it is to an alarm, as [`Watch::alarm`] has it.
-    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, noise: f32, limits: Limits) -> f32 {
+    /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
+    /// [`Watch::alarm`] has it.
+    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits) -> f32 {
         let over = self.trace.over_squared(limits);
         if self.loudness(over) <= QUIET || !self.trace.full() {
             let gain = self.offset_variance / variance;
             self.offset += gain * disagreement;
-            let forgotten = noise * (1.0 / (MEMORY * MEMORY));
+            let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
             self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten).min(self.allowed);
         }
         self.loudness(over)

@@ -154,18 +154,20 @@ impl Covariance {
         }
     }
 
-    /// After a scalar: Joseph's form.
+    /// After a scalar: Joseph's form, by columns of the upper triangle; the lower one is its mirror image.
     pub(super) fn update(&mut self, seen: &Seen) {
         let p = &seen.column;
         let gain = p / seen.variance;
-        for column in 0..STATES {
-            for row in 0..=column {
-                let cross = gain[row] * p[column] + p[row] * gain[column];
-                let sum = self.0[(row, column)] - cross + seen.variance * gain[row] * gain[column];
-                self.0[(row, column)] = sum;
-                self.0[(column, row)] = sum;
+        let spread = gain * seen.variance;
+        for (column, elements) in self.0.as_mut_slice().chunks_exact_mut(STATES).enumerate() {
+            let (gain_c, p_c) = (gain[column], p[column]);
+            let rows = elements[..=column].iter_mut().zip(&gain).zip(p).zip(&spread);
+            for (((element, gain), p), spread) in rows {
+                let cross = gain * p_c + p * gain_c;
+                *element = *element - cross + spread * gain_c;
             }
         }
+        self.0.fill_lower_triangle_with_upper_triangle();
     }
 
     /// Attitude known afresh with this covariance \[rad^2\], in n, and independent of the rest.
