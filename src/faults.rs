@@ -24,6 +24,8 @@ mod gyros;
 mod health;
 mod repeat;
 mod root;
+#[cfg(test)]
+mod tests;
 mod trace;
 mod triads;
 mod vector_rate;
