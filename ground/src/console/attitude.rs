@@ -80,14 +80,16 @@ fn name(channel: Channel) -> String {
 
 #[cfg(test)]
 mod tests {
+    use emems::attitude::{Euler, from_euler};
+
     use super::*;
 
     #[test]
     fn an_attitude_is_angles_with_what_they_are_worth() {
-        // Ninety degrees of yaw.
-        let half = std::f32::consts::FRAC_1_SQRT_2;
+        let [roll, pitch, yaw] = [10.0_f32, -20.0, 90.0].map(f32::to_radians);
+        let q_nb = from_euler(Euler { roll, pitch, yaw });
         let estimate = Estimate {
-            q_nb: Some([half, 0.0, 0.0, half]),
+            q_nb: Some([q_nb.w, q_nb.i, q_nb.j, q_nb.k]),
             covariance_n: [1e-4, 0.0, 0.0, 1e-4, 0.0, 4e-4],
             bias_b: [0.01, -0.02, 0.0],
             bias_sd: [1e-3, 2e-3, 1e-3],
@@ -97,7 +99,7 @@ mod tests {
         assert_eq!(
             lines(&estimate),
             [
-                " roll    0.00  pitch   0.00  yaw   90.00 deg   sd north 0.57 east 0.57 down 1.15",
+                " roll   10.00  pitch -20.00  yaw   90.00 deg   sd north 0.57 east 0.57 down 1.15",
                 " bias +0.573 -1.146 +0.000 deg/s  sd 0.115   not used: a2x g3; gyro fault not isolable",
             ]
         );
