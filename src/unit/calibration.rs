@@ -38,7 +38,10 @@ fn load(shared: &Shared) {
         Ok(set) => {
             *shared.calibration.borrow_mut() = set;
             shared.arriving.take();
-            shared.say(format_args!("G_CL ok: set {} of unit {unit}", set.identity.set));
+            shared.say(format_args!(
+                "G_CL ok: set {} of unit {}",
+                set.identity.set, set.identity.unit
+            ));
         }
         Err(why) => shared.say(format_args!("G_CL no: {why}")),
     }

@@ -141,7 +141,7 @@ impl Shared {
             testing: Cell::default(),
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
-            calibration: RefCell::new(Set::nominal(Ranges::of(&settings))),
+            calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
             arriving: RefCell::default(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),

@@ -17,7 +17,7 @@
 //!
 //! A term is refused, and bounded from above instead, if its squared coefficient is less than [`SEEN`] standard
 //! deviations from zero or if it does not make up [`VISIBLE`] of the variance at [`OCTAVES`] averaging times: a slope
-//! that short is a guess.
+//! that short is a guess. A sinusoid needs no slope: its frequency comes from the spectrum.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -227,7 +227,9 @@ impl Problem<'_> {
         let visible = (0..self.tau_s.len())
             .filter(|&i| part(i) > VISIBLE * self.variance[i])
             .count();
-        solution.sigmas(term) >= SEEN && visible >= OCTAVES
+        // A line is told by the spectrum, where it need not be strong to be sharp.
+        let told = matches!(self.terms[term], Term::Sinusoid { .. }) || visible >= OCTAVES;
+        solution.sigmas(term) >= SEEN && told
     }
 
     /// The largest squared coefficient that would not come out as low as it did but once in twenty. What a term itself makes
@@ -246,8 +248,9 @@ impl Problem<'_> {
             let rest = self.uncertainty(&solution.gain, term, &mixture) - own * squared * squared;
             squared - (ONE_SIDED * rest.max(0.0).sqrt()).hypot(own_low * squared)
         };
-        let found = solution.squared[term];
-        let (mut low, mut high) = (0.0, found.max(0.0) + solution.sigma[term]);
+        // One that came out below zero is bounded as if at zero: a bound near nothing would only show that terms are missing.
+        let found = solution.squared[term].max(0.0);
+        let (mut low, mut high) = (0.0, found + solution.sigma[term]);
         for _ in 0..HALVINGS {
             if lowest(high) >= found {
                 break;
