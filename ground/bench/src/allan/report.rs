@@ -92,8 +92,8 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
     }
     if analysis.suspects > 0 {
         said.push(format!(
-            "wrong: {} samples are no noise: farther from their surroundings than 8 robust deviations; next: look at them, or \
-             remove them from rates with --outliers 8",
+            "wrong: too far from their surroundings to be noise (8 robust deviations): {} samples; next: look at them, or remove \
+             them from rates with --outliers 8",
             analysis.suspects
         ));
     }

@@ -116,7 +116,7 @@ fn describe(plan: &Plan, means: &Means, arguments: &Arguments) -> Report {
     ));
     let directions = plan.runs.iter().map(|run| run.excitation_b);
     report.picture(Figure::map(
-        "Runs by the direction they excite in b",
+        "Runs by direction in b: height by longitude, in percent of the fullest cell",
         &Coverage::of(directions).map(),
     ));
     let text = table(plan);

@@ -168,3 +168,36 @@ fn a_constant_record_has_nothing_to_fit() {
         None
     );
 }
+
+/// A line that nobody fits pushes other coefficients below zero; that says nothing about how small they are.
+#[test]
+fn a_coefficient_below_zero_is_bounded_as_if_at_zero() {
+    let noise = Noise {
+        arw: 0.01,
+        ..Noise::default()
+    };
+    let below = |line: f64| {
+        let mut values = noise.rate(30_000, STEP_S, 10);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value += line * (0.7 * k as f64).sin();
+        }
+        let series = Series {
+            step_s: STEP_S,
+            values,
+            gaps: Vec::new(),
+        };
+        let phase = Phase::new(&series, Input::Rate);
+        let points = sweep(&phase, &octaves(&phase), |_| ());
+        let fit = fit(&points, STEP_S, &Term::POWER_LAWS, CONFIDENCE).expect("enough points");
+        fit.findings.into_iter().map(|(_, finding)| match finding {
+            Finding::NotSeen { below } => below,
+            Finding::Seen { .. } => f64::INFINITY,
+        })
+    };
+    for (disturbed, clean) in below(0.02).zip(below(0.0)) {
+        assert!(
+            disturbed > 0.5 * clean || clean.is_infinite(),
+            "{disturbed}, where {clean} was clean"
+        );
+    }
+}
