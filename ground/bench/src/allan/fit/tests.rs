@@ -84,7 +84,9 @@ fn intervals_hold_the_truth_in_93_to_97_of_100_records_whatever_the_noise_is_mad
             });
             let held = held.count() as f64 / fits.len() as f64;
             println!("  {}: seen {seen}, held {held}", term.name());
-            assert!((0.93..=0.97).contains(&held), "{}: {held}", term.name());
+            // A bound from above that cannot go below zero holds more often than it says where little is there.
+            let most = if seen > 0.5 { 0.97 } else { 1.0 };
+            assert!((0.93..=most).contains(&held), "{}: {held}", term.name());
         }
     }
 }
