@@ -1,12 +1,14 @@
-//! Link arguments of the firmware, and which board file it is built for (`EMEMS_BOARD`, default `obc`).
+//! Link arguments of the firmware, which board file it is built for (`EMEMS_BOARD`, default `obc`), and the calibration set it
+//! starts with (`EMEMS_CALIBRATION`, a file of `ground calibration apply --out`; nominal without).
 
-use std::env;
+use std::{env, fs, path::Path};
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-env-changed=EMEMS_BOARD");
     println!("cargo:rustc-check-cfg=cfg(board, values(\"obc\", \"discovery\"))");
+    calibration();
     let board = env::var("EMEMS_BOARD").unwrap_or_else(|_| "obc".into());
     println!("cargo:rustc-cfg=board=\"{board}\"");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
@@ -18,4 +20,15 @@ fn main() {
             println!("cargo:rustc-link-arg-bins={argument}");
         }
     }
+}
+
+/// Puts the bytes of the set where `src/calibration/compiled.rs` takes them from; none for no set.
+fn calibration() {
+    println!("cargo:rerun-if-env-changed=EMEMS_CALIBRATION");
+    let bytes = env::var_os("EMEMS_CALIBRATION").map_or_else(Vec::new, |file| {
+        println!("cargo:rerun-if-changed={}", Path::new(&file).display());
+        fs::read(&file).unwrap_or_else(|error| panic!("EMEMS_CALIBRATION={}: {error}", Path::new(&file).display()))
+    });
+    let folder = env::var_os("OUT_DIR").expect("set by cargo");
+    fs::write(Path::new(&folder).join("calibration.bin"), bytes).expect("OUT_DIR can be written");
 }

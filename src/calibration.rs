@@ -17,7 +17,7 @@
 //!   them; Eq 4.39 is for gravity, Eq 4.41 for specific force. Here: counts per unit of specific force, bias in counts.
 //! - MV SEC: nine-parameter ellipsoid, `v = T B + v0` (Eq 4.43), `T` lower triangular, in the plate's axes.
 //!
-//! A set is compiled in ([`Set::nominal`]) or loaded ([`Set::load`], [`load`]); one that is corrupt, ill-conditioned, for other
+//! A set is compiled in ([`Set::compiled_in`]) or loaded ([`Set::load`], [`load`]); one that is corrupt, ill-conditioned, for other
 //! ranges or of another unit is refused with the reason, and whoever loads it stays with the set it had.
 
 mod apply;
@@ -25,6 +25,7 @@ mod axis;
 mod bytes;
 mod channel;
 mod check;
+mod compiled;
 pub mod load;
 pub mod method;
 mod set;

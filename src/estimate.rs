@@ -135,7 +135,7 @@ impl Estimator {
     /// Not inlined, as the others here: what they build on the way would lie on the stack under all that the unit does.
     #[inline(never)]
     pub fn of(settings: &Settings) -> Self {
-        Estimator::new(Set::nominal(Ranges::of(settings)), &settings.site)
+        Estimator::new(Set::compiled_in(Ranges::of(settings)), &settings.site)
     }
 
     /// The filter as it stands.

@@ -129,27 +129,33 @@ fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
     let settings = emems::unit::Settings::NOMINAL;
     let nominal = emems::calibration::Set::nominal(emems::calibration::Ranges::of(&settings));
     let mut own = nominal;
+    own.identity.unit = 7;
     own.identity.set = 5;
     own.gyro[2].bias_counts = -12.5;
     let sent = set_words(&own);
     let good = still().say(S, &sent).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
-    assert!(good.replied("G_CL ok: set 5 of unit 0"), "{:?}", good.replies());
+    assert!(good.replied("G_CL ok: set 5 of unit 7"), "{:?}", good.replies());
     assert_eq!(read_back(&good), own.encode());
     assert_eq!(good.second(5).len(), 5, "packets go on");
 
     let mut spoilt = sent.clone();
     spoilt[16 * 40 + 10] ^= 1;
-    let mut foreign = own;
-    foreign.identity.unit = 9;
     for (words, why) in [
         (&sent[16..], "G_CL no: 1 words missing, the first at 0000"),
         (&spoilt[..], "G_CL no: checksum"),
-        (&set_words(&foreign)[..], "G_CL no: of unit 9, this is unit 0"),
     ] {
         let flown = still().say(S, words).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
         assert!(flown.replied(why), "{why}: {:?}", flown.replies());
         assert_eq!(read_back(&flown), nominal.encode(), "{why}");
     }
+
+    let mut foreign = own;
+    foreign.identity.unit = 9;
+    let foreign = [&sent[..], b"G_CL", &set_words(&foreign)[..], b"G_CL"].concat();
+    let numbered = still().say(S, &foreign).say(6 * S, b"G_CR").fly(8 * S);
+    let why = "G_CL no: of unit 9, this is unit 7";
+    assert!(numbered.replied(why), "{:?}", numbered.replies());
+    assert_eq!(read_back(&numbered), own.encode());
 
     let flying = still()
         .say(S, b"G_MV")

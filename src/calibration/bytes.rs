@@ -88,6 +88,11 @@ pub(super) fn encode(set: &Set) -> [u8; ENCODED_BYTES] {
     bytes
 }
 
+/// Whether the checksum at the end fits what stands before it: together they leave a constant.
+pub(super) const fn is_intact(bytes: &[u8]) -> bool {
+    CRC.checksum(bytes) == CRC_32_ISO_HDLC.residue ^ CRC_32_ISO_HDLC.xorout
+}
+
 /// The set in `bytes`, not yet checked for sense.
 pub(super) fn decode(bytes: &[u8]) -> Result<Set, Refusal> {
     let bytes: &[u8; ENCODED_BYTES] = bytes.try_into().map_err(|_| Refusal::Length(bytes.len()))?;

@@ -29,7 +29,7 @@ pub enum Method {
 /// Whose parameters they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
-    /// Serial number of the unit; 0 for the compiled-in set, which fits none in particular.
+    /// Serial number of the unit; 0 for the nominal set, which fits none in particular.
     pub unit: u32,
     /// Number of the set, counted up by whoever calibrates.
     pub set: u32,
@@ -96,7 +96,7 @@ pub struct Set {
 }
 
 impl Set {
-    /// MT for every sensor, as compiled in.
+    /// MT for every sensor, where no set was compiled in.
     ///
     /// Noise is that of the thesis' unit (sections 4.1 and 4.2: 1.53 and 2.68 counts at the unit's nominal ranges) and of
     /// the HMC5883L's datasheet (2 mG). How far datasheet parameters may be off is what LMS EC found on the thesis' unit
@@ -142,13 +142,14 @@ impl Set {
         }
     }
 
-    /// The set in `bytes`, if it is whole, sound, for these ranges and of this unit.
+    /// The set in `bytes`, if it is whole, sound, for these ranges and of this unit; a unit that was built without a serial
+    /// number (0) cannot tell, and takes any.
     pub fn load(bytes: &[u8], ranges: Ranges, unit: u32) -> Result<Self, Refusal> {
         let set = bytes::decode(bytes)?;
         if set.ranges != ranges {
             return Err(Refusal::OtherRanges);
         }
-        if set.identity.unit != unit {
+        if unit != 0 && set.identity.unit != unit {
             return Err(Refusal::OtherUnit {
                 found: set.identity.unit,
                 expected: unit,

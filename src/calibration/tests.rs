@@ -69,6 +69,11 @@ fn another_length_unit_or_range_is_refused_with_the_reason() {
         Set::load(&bytes, ranges(), 8),
         Err(Refusal::OtherUnit { found: 7, expected: 8 })
     );
+    assert_eq!(
+        Set::load(&bytes, ranges(), 0),
+        Ok(own()),
+        "a unit without a number takes any"
+    );
     let wide = Ranges {
         field: Gain::PerGauss390,
         ..ranges()
@@ -219,4 +224,12 @@ fn beyond_its_validity_a_set_is_applied_as_at_its_end_and_says_so() {
     let measured = applied(&set, &hot);
     assert!(measured.beyond_validity);
     assert_eq!(measured.acc[0], set.acc[0].value(100, 18.0));
+}
+
+#[test]
+fn a_set_is_intact_only_as_it_was_written() {
+    let mut bytes = own().encode();
+    assert!(bytes::is_intact(&bytes));
+    bytes[500] ^= 1;
+    assert!(!bytes::is_intact(&bytes));
 }

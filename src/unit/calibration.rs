@@ -45,7 +45,10 @@ fn load(shared: &Shared) {
             *shared.set_name.borrow_mut() = name(&set);
             shared.set_loaded.set(true);
             shared.arriving.take();
-            shared.say(format_args!("G_CL ok: set {} of unit {unit}", set.identity.set));
+            shared.say(format_args!(
+                "G_CL ok: set {} of unit {}",
+                set.identity.set, set.identity.unit
+            ));
         }
         Err(why) => shared.say(format_args!("G_CL no: {why}")),
     }

@@ -148,7 +148,7 @@ impl Shared {
             testing: Cell::default(),
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
-            calibration: RefCell::new(Set::nominal(Ranges::of(&settings))),
+            calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
             set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
             set_loaded: Cell::default(),
             arriving: RefCell::default(),

@@ -57,7 +57,7 @@ pub struct Arguments {
     /// Confidence of bounds and intervals
     #[arg(long, default_value_t = 0.95, value_parser = share)]
     confidence: f64,
-    /// Remove samples farther than this many robust deviations from their surroundings (5 is usual)
+    /// Remove rates farther than this many robust deviations from their surroundings (5 is usual); a jump in an angle stays
     #[arg(long, value_name = "DEVIATIONS", value_parser = positive)]
     outliers: Option<f64>,
     /// Folder for the page and the tables [default: reports/allan-FILE]

@@ -8,6 +8,7 @@
 //! A plain fit spreads a wrong sign over all rows; so candidates are solved exactly from four rows each and the rows are
 //! counted (consensus: M. A. Fischler, R. C. Bolles, CACM 24(6), 1981). All fours are tried where they are few,
 //! otherwise [`CANDIDATES`] of them, drawn with a fixed seed. What this cannot see: errors that most rows share.
+//! Temperature is not modelled: rows that it moves by more than [`AGREE`] are taken for contradictions; calibrate over less.
 
 use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3, Vector4};
 

@@ -245,23 +245,28 @@ fn step(
         let w = inverse.transpose() * way;
         let lengthened = variance * (spread.trace() - way.dot(&(spread * way))) / (2.0 * h);
         let noise = w.norm();
-        let gradient = [
-            w.x * way.x,
-            w.y * way.x,
-            w.y * way.y,
-            w.z * way.x,
-            w.z * way.y,
-            w.z * way.z,
-            w.x,
-            w.y,
-            w.z,
-        ];
+        let gradient = nine_partials(&w, &way);
         for (k, value) in gradient.iter().enumerate() {
             design[(row, k)] = value / noise;
         }
         observed[row] = (h - lengthened - 1.0) / noise;
     }
     least_squares::solve(&design, &observed).ok()
+}
+
+/// What `w . (dT way + dv0)` takes of each element of `dT`, by rows of its lower triangle, and of `dv0`.
+fn nine_partials(w: &Vector3<f64>, way: &Vector3<f64>) -> [f64; 9] {
+    [
+        w.x * way.x,
+        w.y * way.x,
+        w.y * way.y,
+        w.z * way.x,
+        w.z * way.y,
+        w.z * way.z,
+        w.x,
+        w.y,
+        w.z,
+    ]
 }
 
 fn finish(
@@ -294,17 +299,7 @@ fn condition(points: &[Vector3<f64>], shape: &Matrix3<f64>, offset: &Vector3<f64
             .solve_lower_triangular(&(v - offset))
             .unwrap_or_default()
             .normalize();
-        [
-            u.x * u.x,
-            u.x * u.y,
-            u.y * u.y,
-            u.x * u.z,
-            u.y * u.z,
-            u.z * u.z,
-            u.x,
-            u.y,
-            u.z,
-        ]
+        nine_partials(&u, &u)
     };
     let rows: Vec<[f64; 9]> = points.iter().map(row).collect();
     Information::of(&DMatrix::from_fn(rows.len(), 9, |r, k| rows[r][k])).map_or(f64::INFINITY, |known| known.condition)

@@ -7,7 +7,7 @@
 //! `NAME_sigma` or `NAME_n` beside it is a channel, or those named by the caller. Out: an [`Experiment`].
 //!
 //! Left out, and said: cells that are empty, and cells at the limit of the channel's code. Refused, with file, line and
-//! column: half an excitation, channels that never change, and unknown units.
+//! column: half an excitation or one in two units, channels that never change, and unknown units.
 
 use std::path::PathBuf;
 
@@ -214,6 +214,11 @@ impl Source {
         let mut components = None;
         for &(unit, factor) in units {
             match triple(unit, letter) {
+                [Some(_), Some(_), Some(_)] if components.is_some() => {
+                    return Err(missing(
+                        "says what the unit felt in two units: keep the columns of one".into(),
+                    ));
+                }
                 [Some(x), Some(y), Some(z)] => components = Some(([x, y, z], factor)),
                 [None, None, None] => {}
                 _ => {

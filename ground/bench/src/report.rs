@@ -89,6 +89,19 @@ impl Report {
         chart::html(&self.title, about, &blocks)
     }
 
+    /// Prints it, and writes the page where one was asked for.
+    ///
+    /// # Errors
+    /// When the page cannot be written, with its name.
+    pub fn finish(&self, page: Option<&Path>, about: &str) -> Result<(), String> {
+        print!("{}", self.text());
+        if let Some(page) = page {
+            self.write(page, about)?;
+            println!("{}", page.display());
+        }
+        Ok(())
+    }
+
     /// Writes the page.
     ///
     /// # Errors

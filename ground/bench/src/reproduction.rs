@@ -139,20 +139,27 @@ impl Reproduced {
 
     fn blocks(&self) -> Vec<Block> {
         let mut blocks = vec![Block::Heading(self.table.into()), Block::Text(self.why.into())];
-        let values = |values: &[f64]| values.iter().map(|v| digits(*v)).collect::<Vec<_>>().join("  ");
+        // What is nothing beside the tolerance is rounding, and is shown as nothing.
+        let value = |value: f64, within: f64| digits(if value.abs() < 1e-3 * within { 0.0 } else { value });
+        let values = |values: &[f64], within| {
+            let cells: Vec<String> = values.iter().map(|one| value(*one, within)).collect();
+            cells.join("  ")
+        };
         let row = |line: &Line| {
             let said = if line.agrees() { "agrees" } else { "differs" };
             vec![
                 line.what.clone(),
-                values(&line.printed),
-                values(&line.ours),
+                values(&line.printed, line.within),
+                values(&line.ours, line.within),
                 digits(line.within),
                 said.into(),
             ]
         };
         if !self.lines.is_empty() {
             blocks.push(Block::Table {
-                columns: ["", "printed", "here", "within", ""].map(String::from).to_vec(),
+                columns: ["what", "printed", "here", "within", "verdict"]
+                    .map(String::from)
+                    .to_vec(),
                 rows: self.lines.iter().map(row).collect(),
             });
         }

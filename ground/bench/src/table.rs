@@ -5,8 +5,9 @@
 //! numbers on demand.
 //!
 //! The separator is the one the line of column names is split by: tab before semicolon before comma. A comma is a
-//! decimal comma only where it cannot be anything else: it does not separate, and no other cell of the file has a
-//! decimal point. A LabVIEW header says both itself.
+//! decimal comma only where it cannot be anything else: it does not separate or stands within quotes, and no other cell of
+//! the file has a decimal point. A LabVIEW header says both itself. Cells may be quoted, with separators within and quotes
+//! doubled; a quoted cell ends on its line.
 //!
 //! Refused, with file, line and column: rows with more or fewer cells than there are names (what a decimal comma does
 //! to a comma-separated file), cells that are no number, `1.234,5` and files that mix both decimal marks, repeated
@@ -109,7 +110,9 @@ impl Table {
             .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
         let &(names_line, names) = body.next().ok_or_else(|| fail(0, "has no line of column names"))?;
         let separator = said.separator.unwrap_or_else(|| separator(names));
-        let columns: Vec<String> = split(names, separator);
+        let cells_of =
+            |line, text| split(text, separator).ok_or_else(|| fail(line, "a quoted cell does not end on its line"));
+        let columns: Vec<String> = cells_of(names_line, names)?;
         if let Some(name) = repeated(&columns) {
             return Err(fail(names_line, &format!("two columns are called \"{name}\"")));
         }
@@ -125,7 +128,7 @@ impl Table {
         }
         let mut rows = Vec::new();
         for &(line, text) in body {
-            let mut cells = split(text, separator);
+            let mut cells = cells_of(line, text)?;
             // LabVIEW ends lines with an empty comment column.
             while cells.len() > columns.len() && cells.last().is_some_and(String::is_empty) {
                 cells.pop();
@@ -150,7 +153,7 @@ impl Table {
         };
         table.decimal = match said.decimal {
             Some(decimal) => decimal,
-            None if separator == ',' => Decimal::Point,
+            None if separator == ',' && !text.contains('"') => Decimal::Point,
             None => table.seen_decimal()?,
         };
         Ok(table)
@@ -281,16 +284,31 @@ impl Said {
 }
 
 fn separator(names: &str) -> char {
-    ['\t', ';']
-        .into_iter()
-        .find(|&mark| names.contains(mark))
-        .unwrap_or(',')
+    // Every second part stands within quotes.
+    let bare: String = names.split('"').step_by(2).collect();
+    ['\t', ';'].into_iter().find(|&mark| bare.contains(mark)).unwrap_or(',')
 }
 
-fn split(line: &str, separator: char) -> Vec<String> {
-    line.split(separator)
-        .map(|cell| cell.trim().trim_matches('"').trim().to_string())
-        .collect()
+/// The cells of a line; `None` where a quoted one does not end.
+fn split(line: &str, separator: char) -> Option<Vec<String>> {
+    if !line.contains('"') {
+        return Some(line.split(separator).map(|cell| cell.trim().to_string()).collect());
+    }
+    if line.matches('"').count() % 2 == 1 {
+        return None;
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(u8::try_from(separator).ok()?)
+        .has_headers(false)
+        .buffer_capacity(line.len())
+        .from_reader(line.as_bytes());
+    let record = reader.records().next()?.ok()?;
+    // A blank before the quote keeps it from being one to the reader.
+    let bare = |cell: &str| match cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')) {
+        Some(within) => within.trim().to_string(),
+        None => cell.to_string(),
+    };
+    Some(record.iter().map(|cell| bare(cell.trim())).collect())
 }
 
 fn repeated(columns: &[String]) -> Option<&String> {

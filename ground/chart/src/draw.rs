@@ -42,11 +42,13 @@ pub fn panels(title: &str, columns: usize, panels: &[Panel]) -> Result<String, C
 /// Draws a map of shades with its values in percent.
 pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
     const CELL: (i32, i32) = (76, 28);
-    const NAMES: (i32, i32) = (260, 190);
     const PX: u32 = 15;
+    // A letter is about half as wide as it is high.
+    let longest = |names: &[String]| names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as i32;
+    let names = (8 * longest(&map.rows) + 20, 8 * longest(&map.columns) + 16);
     let size = (
-        (NAMES.0 + CELL.0 * map.columns.len() as i32 + 20) as u32,
-        (NAMES.1 + CELL.1 * map.rows.len() as i32 + 20) as u32,
+        (names.0 + CELL.0 * map.columns.len() as i32 + 20) as u32,
+        (names.1 + CELL.1 * map.rows.len() as i32 + 20) as u32,
     );
     drawing(title, size, |root| {
         let text =
@@ -57,16 +59,16 @@ pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
                 .pos(Pos::new(HPos::Left, VPos::Center));
             text(
                 name,
-                (NAMES.0 + CELL.0 * column as i32 + CELL.0 / 2, NAMES.1 - 8),
+                (names.0 + CELL.0 * column as i32 + CELL.0 / 2, names.1 - 8),
                 style,
             )?;
         }
         for (row, name) in map.rows.iter().enumerate() {
-            let top = NAMES.1 + CELL.1 * row as i32;
+            let top = names.1 + CELL.1 * row as i32;
             let right = font(PX).pos(Pos::new(HPos::Right, VPos::Center));
-            text(name, (NAMES.0 - 8, top + CELL.1 / 2), right)?;
+            text(name, (names.0 - 8, top + CELL.1 / 2), right)?;
             for (column, value) in map.values.get(row).into_iter().flatten().enumerate() {
-                let left = NAMES.0 + CELL.0 * column as i32;
+                let left = names.0 + CELL.0 * column as i32;
                 if !value.is_finite() {
                     continue;
                 }

@@ -21,6 +21,9 @@ use crate::spectrum;
 /// has a size takes off 9 in a hundredth of records without it.
 const WORTH: f64 = 10.0;
 
+/// Robust deviations beyond which a sample is no noise: of normal noise one in 10^15 is.
+const SUSPECT: f64 = 8.0;
+
 /// How to analyse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -65,6 +68,8 @@ pub struct Analysis {
     pub gaps: (usize, usize),
     /// Steps of the outliers removed.
     pub outliers: Vec<usize>,
+    /// Samples (of angles, their steps) that are farther from their surroundings than noise goes, and were kept.
+    pub suspects: usize,
     /// Mean and standard deviation of what is left.
     pub moments: (f64, f64),
     /// Deviations.
@@ -82,6 +87,10 @@ pub fn analyse(name: &str, mut series: Series, options: &Options, progress: impl
         (Some(deviations), Input::Rate) => outliers::remove(&mut series, deviations),
         _ => Vec::new(),
     };
+    let suspects = match options.input {
+        Input::Rate => outliers::far(&series, SUSPECT).len(),
+        Input::Angle => outliers::far(&steps(&series), SUSPECT).len(),
+    };
     let phase = Phase::new(&series, options.input);
     let points = sweep(&phase, &octaves(&phase), progress);
     let density = density(&series, options.input);
@@ -91,10 +100,22 @@ pub fn analyse(name: &str, mut series: Series, options: &Options, progress: impl
         used: series.measured(),
         gaps,
         outliers,
+        suspects,
         moments: moments(&series),
         rows: rows(&phase, &points, options.confidence),
         fit: best_fit(&points, &density, series.step_s, options.confidence),
         density,
+    }
+}
+
+/// The steps of an angle, with the gaps it has.
+fn steps(series: &Series) -> Series {
+    // A step into a gap or out of it is none.
+    let gaps = series.gaps.iter().map(|gap| gap.start - 1..gap.end);
+    Series {
+        step_s: series.step_s,
+        values: series.values.windows(2).map(|pair| pair[1] - pair[0]).collect(),
+        gaps: gaps.collect(),
     }
 }
 
@@ -263,6 +284,49 @@ mod tests {
                 .take(8)
                 .all(|row| row.law == Some(PowerLaw::WhiteRate))
         );
+    }
+
+    #[test]
+    fn a_line_too_weak_for_the_plot_is_still_told_from_noise() {
+        let noise = Noise {
+            arw: 0.01,
+            ..Noise::default()
+        };
+        let noise = noise.rate(60_000, 0.05, 24);
+        let line = |k: usize| 0.01 * (2.0 * PI * 1.3 * k as f64 * 0.05).sin();
+        let analysis = analysis(noise.iter().enumerate().map(|(k, n)| n + line(k)).collect());
+        let (_, finding) = found(&analysis, |term| matches!(term, Term::Sinusoid { .. })).expect("a line");
+        assert!((finding.value() / 0.01 - 1.0).abs() < 0.25, "{finding:?}");
+    }
+
+    #[test]
+    fn outliers_that_were_not_asked_to_be_removed_are_counted() {
+        let mut rate = Noise {
+            arw: 0.01,
+            ..Noise::default()
+        }
+        .rate(20_000, 0.05, 23);
+        rate[7_000] = 5.0;
+        let angle: Vec<f64> = rate
+            .iter()
+            .scan(0.0, |angle, rate| {
+                *angle += rate * 0.05;
+                Some(*angle)
+            })
+            .collect();
+        for (input, values) in [(Input::Rate, rate), (Input::Angle, angle)] {
+            let series = Series {
+                step_s: 0.05,
+                values,
+                gaps: std::iter::once(100..104).collect(),
+            };
+            let kept = Options {
+                input,
+                outliers: None,
+                ..OPTIONS
+            };
+            assert_eq!(analyse("g1", series, &kept, |_| ()).suspects, 1, "{input:?}");
+        }
     }
 
     #[test]

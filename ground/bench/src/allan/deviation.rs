@@ -10,8 +10,9 @@
 //!
 //! (Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065, section 5.) The third difference is also the step
 //! of the moving sum, so that one loop of constant cost a sample serves all: O(N) per averaging time.
-//! Windows that were not measured ([`Phase::is_measured`]) are left out. Work is cut into pieces for all cores; a piece
-//! starts its moving sum afresh, which also keeps rounding from adding up.
+//! Windows that were not measured ([`Phase::is_measured`]) are left out. Work is cut into blocks of starts for all cores,
+//! and a block is done at all averaging times before the next, while it is in the core's cache. A block starts its moving
+//! sums afresh, which also keeps rounding from adding up.
 
 use std::ops::Range;
 
@@ -110,6 +111,7 @@ impl Point {
     }
 
     fn join(&mut self, other: Self) {
+        self.disjoint.join(other.disjoint);
         self.second.join(other.second);
         self.moving.join(other.moving);
         self.third.join(other.third);
@@ -124,123 +126,141 @@ pub fn octaves(phase: &Phase) -> Vec<usize> {
         .collect()
 }
 
-/// Shortest piece of work: below it handing it to another core costs more than it saves.
-const PIECE: usize = 1 << 14;
+/// Windows taken at once.
+const LANES: usize = 4;
+/// Starts in a block: with what the shorter averaging times see behind them they fit a core's own cache.
+const BLOCK: usize = 1 << 14;
 
 /// All deviations at the given averaging factors, on all cores; `progress` is called with the share of each finished
-/// piece. Factors for which no window fits give points without windows.
+/// block. Factors for which no window fits give points without windows.
 pub fn sweep(phase: &Phase, factors: &[usize], progress: impl Fn(f64) + Sync) -> Vec<Point> {
-    let mut work: Vec<(usize, Range<usize>)> = Vec::new();
-    for (index, &factor) in factors.iter().enumerate() {
-        let windows = phase.angle.len().saturating_sub(2 * factor);
-        let piece = PIECE.max(4 * factor);
-        work.extend(
-            (0..windows)
-                .step_by(piece)
-                .map(|start| (index, start..windows.min(start + piece))),
-        );
-    }
-    let share = 1.0 / work.len().max(1) as f64;
-    let pieces: Vec<(usize, Point)> = work
+    let sums: Vec<f64> = phase.angle.par_chunks(BLOCK).map(|block| block.iter().sum()).collect();
+    let share = 1.0 / sums.len().max(1) as f64;
+    let blocks: Vec<Vec<Point>> = (0..sums.len())
         .into_par_iter()
-        .map(|(index, range)| {
-            let point = piece(phase, factors[index], range);
+        .map(|number| {
+            let of = |&factor: &usize| block(phase, &sums, factor, number * BLOCK);
+            let points = factors.iter().map(of).collect();
             progress(share);
-            (index, point)
+            points
         })
         .collect();
-    let mut points: Vec<Point> = factors
-        .iter()
-        .map(|&factor| Point {
-            factor,
-            tau_s: factor as f64 * phase.step_s,
-            disjoint: disjoint(phase, factor),
-            ..Point::default()
-        })
-        .collect();
-    // In the order of the pieces, so that the sum is the same on any number of cores.
-    for (index, point) in pieces {
-        points[index].join(point);
+    let empty = |&factor: &usize| Point {
+        factor,
+        tau_s: factor as f64 * phase.step_s,
+        ..Point::default()
+    };
+    let mut points: Vec<Point> = factors.iter().map(empty).collect();
+    // In the order of the blocks, so that the sum is the same on any number of cores.
+    for block in blocks {
+        points.iter_mut().zip(block).for_each(|(point, part)| point.join(part));
     }
     points
 }
 
-fn disjoint(phase: &Phase, m: usize) -> MeanSquare {
+/// A block's part of a point; empty where no window starts in it.
+fn block(phase: &Phase, sums: &[f64], m: usize, start: usize) -> Point {
+    let windows = phase.angle.len().saturating_sub(2 * m);
+    let range = start..windows.min(start + BLOCK);
+    if range.is_empty() {
+        return Point::default();
+    }
     let x = &phase.angle;
-    let mut sum = MeanSquare::default();
-    for k in (0..x.len().saturating_sub(2 * m)).step_by(m.max(1)) {
+    // Where there is no moving sum there is none to start.
+    let s = if start + 3 * m <= x.len() {
+        let sum = |window: usize| sum_from(x, sums, start + window * m, m);
+        (sum(2) - sum(1)) - (sum(1) - sum(0))
+    } else {
+        0.0
+    };
+    let mut point = if phase.is_complete() {
+        complete_block(x, m, range.clone(), s)
+    } else {
+        gapped_block(phase, m, range.clone(), s)
+    };
+    for k in (start.next_multiple_of(m)..range.end).step_by(m) {
         if phase.is_complete() || phase.is_measured(k, 2 * m) {
-            sum.add(x[k + 2 * m] - 2.0 * x[k + m] + x[k]);
+            point.disjoint.add((x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k]));
         }
     }
-    sum
+    point
 }
 
-fn piece(phase: &Phase, m: usize, range: Range<usize>) -> Point {
-    if phase.is_complete() {
-        complete_piece(&phase.angle, m, range)
-    } else {
-        gapped_piece(phase, m, range)
+/// The sum of `count` angles from `start`, whole blocks of them from `sums`.
+fn sum_from(x: &[f64], sums: &[f64], start: usize, count: usize) -> f64 {
+    let (first, last) = (start.div_ceil(BLOCK), (start + count) / BLOCK);
+    if first >= last {
+        return x[start..start + count].iter().sum();
     }
+    x[start..first * BLOCK].iter().sum::<f64>()
+        + sums[first..last].iter().sum::<f64>()
+        + x[last * BLOCK..start + count].iter().sum::<f64>()
 }
 
-/// Splits a piece's windows into those with a third difference and the few at the record's end without.
+/// Splits a block's windows into those with a third difference and the few at the record's end without.
 fn with_third(points: usize, m: usize, range: &Range<usize>) -> usize {
     points.saturating_sub(3 * m).clamp(range.start, range.end)
 }
 
-fn complete_piece(x: &[f64], m: usize, range: Range<usize>) -> Point {
+fn complete_block(x: &[f64], m: usize, range: Range<usize>, moving_sum: f64) -> Point {
     let third_end = with_third(x.len(), m, &range);
-    let (mut second, mut moving, mut third) = (0.0, 0.0, 0.0);
-    let at = |offset: usize| &x[range.start + offset..third_end + offset];
     let has_moving = range.start + 3 * m <= x.len();
-    let mut s = if has_moving { moving_sum(x, m, range.start) } else { 0.0 };
-    if third_end > range.start {
-        for (((x0, x1), x2), x3) in at(0).iter().zip(at(m)).zip(at(2 * m)).zip(at(3 * m)) {
-            let here = (x2 - x1) - (x1 - x0);
-            let step = (x3 - x2) - (x2 - x1) - here;
-            second += here * here;
-            third += step * step;
+    let mut s = moving_sum;
+    let (mut seconds, mut movings, mut thirds) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    // Nothing, where no third difference fits.
+    let at = |offset: usize| {
+        x.get(range.start + offset..third_end + offset)
+            .unwrap_or(&[])
+            .chunks_exact(LANES)
+    };
+    for (((x0, x1), x2), x3) in at(0).zip(at(m)).zip(at(2 * m)).zip(at(3 * m)) {
+        // Steps are summed within the lanes first: the chain from one moving sum to the next is then one addition long.
+        let mut step = [0.0; LANES];
+        for lane in 0..LANES {
+            let here = (x2[lane] - x1[lane]) - (x1[lane] - x0[lane]);
+            step[lane] = ((x3[lane] - x2[lane]) - (x2[lane] - x1[lane])) - here;
+            seconds[lane] += here * here;
+            thirds[lane] += step[lane] * step[lane];
+        }
+        let so_far = [0.0, step[0], step[0] + step[1], step[0] + (step[1] + step[2])];
+        for lane in 0..LANES {
+            let sum = s + so_far[lane];
+            movings[lane] += sum * sum;
+        }
+        s += (step[0] + step[1]) + (step[2] + step[3]);
+    }
+    let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
+    let (mut second, mut moving, mut third) = (total(seconds), total(movings), total(thirds));
+    let done = range.start + (third_end - range.start) / LANES * LANES;
+    for k in done..range.end {
+        let here = (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k]);
+        second += here * here;
+        // The last moving sum has no third difference after it.
+        if k <= third_end && has_moving {
             moving += s * s;
+        }
+        if k < third_end {
+            let step = (x[k + 3 * m] - x[k + 2 * m]) - (x[k + 2 * m] - x[k + m]) - here;
+            third += step * step;
             s += step;
         }
     }
-    // The last moving sum has no third difference after it.
+    let count = third_end - range.start;
     let last_moving = has_moving && third_end < range.end;
-    if last_moving {
-        moving += s * s;
-    }
-    for k in third_end..range.end {
-        let here = (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k]);
-        second += here * here;
-    }
-    let thirds = third_end - range.start;
+    let of = |sum, windows| MeanSquare { sum, windows };
     Point {
-        second: MeanSquare {
-            sum: second,
-            windows: range.len(),
-        },
-        moving: MeanSquare {
-            sum: moving,
-            windows: thirds + usize::from(last_moving),
-        },
-        third: MeanSquare {
-            sum: third,
-            windows: thirds,
-        },
+        second: of(second, range.len()),
+        moving: of(moving, count + usize::from(last_moving)),
+        third: of(third, count),
         ..Point::default()
     }
 }
 
-fn gapped_piece(phase: &Phase, m: usize, range: Range<usize>) -> Point {
+fn gapped_block(phase: &Phase, m: usize, range: Range<usize>, moving_sum: f64) -> Point {
     let x = &phase.angle;
     let third_end = with_third(x.len(), m, &range);
     let mut point = Point::default();
-    let mut s = if range.start + 3 * m <= x.len() {
-        moving_sum(x, m, range.start)
-    } else {
-        0.0
-    };
+    let mut s = moving_sum;
     for k in range {
         let here = (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k]);
         if phase.is_measured(k, 2 * m) {
@@ -259,12 +279,6 @@ fn gapped_piece(phase: &Phase, m: usize, range: Range<usize>) -> Point {
         }
     }
     point
-}
-
-fn moving_sum(x: &[f64], m: usize, start: usize) -> f64 {
-    (start..start + m)
-        .map(|k| (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k]))
-        .sum()
 }
 
 #[cfg(test)]

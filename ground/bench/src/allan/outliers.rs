@@ -13,8 +13,8 @@ use super::series::Series;
 /// Samples a block has: some seconds of a gyro's noise.
 const BLOCK: usize = 1_001;
 
-/// Takes out what is more than `deviations` from its surroundings; returns the steps taken out, ascending.
-pub fn remove(series: &mut Series, deviations: f64) -> Vec<usize> {
+/// Steps that are more than `deviations` from their surroundings, ascending.
+pub fn far(series: &Series, deviations: f64) -> Vec<usize> {
     let mut outliers = Vec::new();
     for stretch in series.stretches().collect::<Vec<_>>() {
         let mut start = stretch.start;
@@ -33,6 +33,12 @@ pub fn remove(series: &mut Series, deviations: f64) -> Vec<usize> {
             start = end;
         }
     }
+    outliers
+}
+
+/// Takes out what is more than `deviations` from its surroundings; returns the steps taken out, ascending.
+pub fn remove(series: &mut Series, deviations: f64) -> Vec<usize> {
+    let outliers = far(series, deviations);
     for &k in &outliers {
         series.gaps.push(k..k + 1);
     }

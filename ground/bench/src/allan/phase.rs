@@ -8,7 +8,7 @@
 //! about the noise that white rate noise would have had there. A gap in angle is bridged by a straight line in angle,
 //! which loses nothing at long times. The deviations leave out windows of which more than [`MOST_MISSING`] was bridged.
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 use super::series::Series;
 
@@ -45,23 +45,20 @@ impl Phase {
     }
 
     fn from_rate(series: &Series) -> Self {
-        let mut rate = series.values.clone();
+        let mut rate = Cow::Borrowed(&series.values);
         for gap in &series.gaps {
-            bridge_rate(&mut rate, gap, series);
+            bridge_rate(rate.to_mut(), gap, series);
         }
         let mean = rate.iter().sum::<f64>() / rate.len() as f64;
         let mut angle = Vec::with_capacity(rate.len() + 1);
-        // Neumaier's sum: 10^7 steps of a plain one would leave noise of their own at the shortest times.
+        // Two-sum (Knuth): 10^7 steps of a plain sum would leave noise of their own at the shortest times.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         angle.push(0.0);
-        for value in &rate {
+        for value in rate.iter() {
             let term = (value - mean) * series.step_s;
             let next = sum + term;
-            lost += if sum.abs() >= term.abs() {
-                (sum - next) + term
-            } else {
-                (term - next) + sum
-            };
+            let taken = next - sum;
+            lost += (sum - (next - taken)) + (term - taken);
             sum = next;
             angle.push(sum + lost);
         }

@@ -90,6 +90,13 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
     if analysis.gaps.1 * 10 > steps {
         said.push("wrong: more than a tenth of the record is missing; long averaging times rest on few windows".into());
     }
+    if analysis.suspects > 0 {
+        said.push(format!(
+            "wrong: too far from their surroundings to be noise (8 robust deviations): {} samples; next: look at them, or remove \
+             them from rates with --outliers 8",
+            analysis.suspects
+        ));
+    }
     let Some(fit) = &analysis.fit else {
         said.push("wrong: too short to fit any coefficient; next: record at least 64 samples".into());
         return said;
@@ -152,7 +159,7 @@ pub fn blocks(analysis: &Analysis, unit: &str) -> Result<Vec<Block>, ChartError>
         Block::Rows(about),
         Block::Rows(coefficients(analysis, unit)),
         Block::Figure(Figure::of(
-            analysis.name.clone(),
+            format!("Deviations and spectrum of {}", analysis.name),
             2,
             &[deviations(analysis, unit), density(analysis, unit)],
         )?),
@@ -187,6 +194,13 @@ fn deviations(analysis: &Analysis, unit: &str) -> Panel {
         Layer::new("modified", 1, Marks::Line(line(Deviation::Mdev))),
         Layer::new("Hadamard", 2, Marks::Line(line(Deviation::Hdev))),
     ];
+    let shown = analysis.rows.iter().flat_map(|row| {
+        [Deviation::Oadev, Deviation::Mdev, Deviation::Hdev].map(|deviation| row.deviations[deviation as usize])
+    });
+    let shown = shown.flatten().flat_map(|one| {
+        let (low, high) = one.bounds.unwrap_or((one.value, one.value));
+        [one.value, low, high]
+    });
     if let Some(fit) = &analysis.fit {
         let curve = analysis
             .rows
@@ -198,7 +212,7 @@ fn deviations(analysis: &Analysis, unit: &str) -> Panel {
     Panel {
         title: "deviation".into(),
         x: Axis::logarithmic("averaging time [s]"),
-        y: Axis::logarithmic(format!("deviation [{unit}]")),
+        y: decades(format!("deviation [{unit}]"), shown),
         layers,
     }
 }
@@ -207,9 +221,27 @@ fn density(analysis: &Analysis, unit: &str) -> Panel {
     Panel {
         title: "power spectral density".into(),
         x: Axis::logarithmic("frequency [Hz]"),
-        y: Axis::logarithmic(format!("density [({unit})²/Hz]")),
+        y: decades(
+            format!("density [({unit})²/Hz]"),
+            analysis.density.iter().map(|point| point.1),
+        ),
         layers: vec![Layer::new("Welch", 0, Marks::Line(analysis.density.clone()))],
     }
+}
+
+/// A logarithmic axis over whole decades, so that at least two of them are named.
+fn decades(label: String, values: impl Iterator<Item = f64>) -> Axis {
+    let (least, most) = values
+        .filter(|value| value.is_finite() && *value > 0.0)
+        .map(f64::log10)
+        .fold((f64::MAX, f64::MIN), |(least, most), value| {
+            (least.min(value), most.max(value))
+        });
+    let axis = Axis::logarithmic(label);
+    if least > most {
+        return axis;
+    }
+    axis.between(10_f64.powf(least.floor()), 10_f64.powf(most.floor() + 1.0))
 }
 
 /// Five significant digits, as the thesis prints them.

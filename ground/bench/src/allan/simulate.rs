@@ -4,6 +4,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use rustfft::{FftPlanner, num_complex::Complex};
 
+use super::terms::Term;
+
 /// Coefficients as in IEEE 952, in the record's own unit and seconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Noise {
@@ -42,34 +44,39 @@ impl Noise {
             }
         }
         if self.bias_instability > 0.0 {
-            // Spectrum B^2 / (2 pi f), one-sided B^2 / (pi f): the filter (1 - z^-1)^(-1/2) on white noise (Kasdin, "Discrete simulation
-            // of colored noise", Proc. IEEE 1995) gives 1 / (2 pi f) per unit variance, two-sided.
-            for (value, pink) in rate.iter_mut().zip(pink(count, &mut draw)) {
-                *value += self.bias_instability * pink;
+            for (value, flicker) in rate.iter_mut().zip(flicker(count, step_s, &mut draw)) {
+                *value += self.bias_instability * flicker;
             }
         }
         rate
     }
 }
 
-fn pink(count: usize, draw: &mut impl FnMut() -> f64) -> Vec<f64> {
-    let length = (2 * count).next_power_of_two();
-    let zero = Complex::new(0.0, 0.0);
-    let (mut filter, mut white) = (vec![zero; length], vec![zero; length]);
-    let mut tap = 1.0;
-    for k in 0..count {
-        filter[k].re = tap;
-        tap *= (k as f64 + 0.5) / (k as f64 + 1.0);
-        white[k].re = draw();
+/// Flicker rate averaged over each sampling interval, all frequencies of `1 / (2 pi f)` included. Its steps are stationary
+/// with the autocovariance of the angle's second differences, and are drawn exactly by circulant embedding (Davies and
+/// Harte, "Tests for Hurst effect", Biometrika 1987). A filter on white noise (Kasdin 1995) would have its own spectrum near
+/// the Nyquist frequency.
+fn flicker(count: usize, step_s: f64, draw: &mut impl FnMut() -> f64) -> Vec<f64> {
+    let half = count.next_power_of_two();
+    let angle = |lag: i64| Term::BiasInstability.autocovariance(lag as f64 * step_s);
+    let power = |lag: i64| 6.0 * angle(lag) - 4.0 * (angle(lag - 1) + angle(lag + 1)) + angle(lag - 2) + angle(lag + 2);
+    let mut spectrum: Vec<Complex<f64>> = (0..=half)
+        .chain((1..half).rev())
+        .map(|lag| Complex::new(power(lag as i64), 0.0))
+        .collect();
+    let forward = FftPlanner::new().plan_fft_forward(2 * half);
+    forward.process(&mut spectrum);
+    for bin in &mut spectrum {
+        // Rounding makes the bin at zero, where flicker's steps have no power, a little negative.
+        *bin = Complex::new(draw(), draw()) * (bin.re.max(0.0) / (2 * half) as f64).sqrt();
     }
-    let mut planner = FftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
-    forward.process(&mut filter);
-    forward.process(&mut white);
-    white
-        .iter_mut()
-        .zip(&filter)
-        .for_each(|(white, filter)| *white *= filter);
-    inverse.process(&mut white);
-    white[..count].iter().map(|value| value.re / length as f64).collect()
+    forward.process(&mut spectrum);
+    let mut rate = 0.0;
+    let steps = spectrum[..count].iter().map(|step| step.re / step_s);
+    steps
+        .map(|step| {
+            rate += step;
+            rate
+        })
+        .collect()
 }

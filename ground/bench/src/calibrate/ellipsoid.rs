@@ -150,7 +150,10 @@ fn describe(found: &Ellipsoid, points: &[Vector3<f64>], arguments: &Arguments) -
             .next
             .push("compare with the last set: ground calibration diff".into());
     }
-    report.picture(Figure::map("Points on the sphere", &coverage.map()));
+    report.picture(Figure::map(
+        "Points on the sphere: height by longitude, in percent of the fullest cell",
+        &coverage.map(),
+    ));
     let relative = found
         .residuals
         .iter()

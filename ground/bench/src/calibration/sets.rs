@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use chart::{Axis, Figure, Layer, Marks, Panel};
+
 use crate::{
     calibrate::{CalibrateError, read_set, read_text},
     report::Report,
@@ -18,6 +20,9 @@ pub struct Diff {
     earlier: PathBuf,
     /// Later set
     later: PathBuf,
+    /// Write a page to this file
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
 }
 
 /// A calibration set as the twin's nominal unit
@@ -83,13 +88,36 @@ pub fn diff(arguments: &Diff) -> Result<bool, CalibrateError> {
     report
         .remarks
         .extend(found.come.iter().map(|name| format!("{name} is in the later set only")));
-    if !report.wrong.is_empty() {
-        report
-            .next
-            .push("find out what happened between the two: turn-on, temperature, a blow, another part".into());
-    }
-    print!("{}", report.text());
+    report.next.push(if report.wrong.is_empty() {
+        "either set will do: nothing moved beyond what chance does".into()
+    } else {
+        "find out what happened between the two: turn-on, temperature, a blow, another part".into()
+    });
+    report.picture(picture(&found.moved));
+    let about = format!("{} to {}", arguments.earlier.display(), arguments.later.display());
+    report
+        .finish(arguments.page.as_deref(), &about)
+        .map_err(CalibrateError::of(&arguments.later))?;
     Ok(report.wrong.is_empty())
+}
+
+/// Changes of every channel in sigma, in the order of the table.
+fn picture(moved: &[diff::Moved]) -> Result<Figure, chart::ChartError> {
+    let dots = |change: fn(&diff::Moved) -> diff::Change| {
+        let points = moved.iter().enumerate();
+        Marks::Dots(points.map(|(k, one)| (k as f64 + 1.0, change(one).sigmas())).collect())
+    };
+    let panel = Panel {
+        title: String::new(),
+        x: Axis::linear("channel, by row of the table"),
+        y: Axis::linear("change [sigma]"),
+        layers: vec![
+            Layer::new("scale", 0, dots(|one| one.scale)),
+            Layer::new("bias", 1, dots(|one| one.bias)),
+            Layer::new("axis", 2, dots(|one| one.axis_rad)),
+        ],
+    };
+    Figure::of("What moved", 1, &[panel])
 }
 
 pub fn unit(arguments: &Unit) -> Result<(), CalibrateError> {

@@ -2,10 +2,14 @@
 
 use std::{fmt::Write as _, path::PathBuf};
 
+use chart::{Block, Figure};
+
 use super::{Means, Plan, TooShort, Wanted, plan};
 use crate::{
     calibrate::{CalibrateError, Place, read_nominal},
+    coverage::Coverage,
     experiment::Kind,
+    report::Report,
     turntable::Turning,
 };
 
@@ -41,6 +45,9 @@ pub struct Arguments {
     /// Write the plan to this table
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write a page to this file
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
@@ -76,15 +83,49 @@ pub fn run(arguments: &Arguments) -> Result<(), DesignError> {
             .map_err(|error| DesignError::Missing(format!("{} cannot be written: {error}", path.display())))?,
         None => print!("{table}"),
     }
-    let unit = if means.kind == Kind::Rate { "rad/s" } else { "m/s²" };
-    println!("runs    {}", plan.runs.len());
-    println!("scale   ± {:.2e} (1 sigma, relative)", plan.scale_sigma);
-    println!("axis    ± {:.2e} rad", plan.axis_sigma_rad);
-    println!("bias    ± {:.2e} {unit}", plan.bias_sigma);
-    for line in &plan.unobservable {
-        println!("unseen  {line}");
-    }
-    Ok(())
+    let report = describe(&plan, &means, arguments);
+    let about = format!("{} min on the table, {}", arguments.minutes, arguments.unit.display());
+    report
+        .finish(arguments.page.as_deref(), &about)
+        .map_err(DesignError::Missing)
+}
+
+fn describe(plan: &Plan, means: &Means, arguments: &Arguments) -> Report {
+    let (unit, command) = match means.kind {
+        Kind::Rate => ("rad/s", "rate-table"),
+        Kind::Force => ("m/s²", "multi-position"),
+    };
+    let row = |what: &str, sigma: f64, unit: &str| vec![what.into(), format!("{sigma:.2e}"), unit.into()];
+    let mut report = Report {
+        title: format!("Plan of {} runs", plan.runs.len()),
+        columns: ["wanted", "± sigma", "unit"].map(String::from).to_vec(),
+        rows: vec![
+            row("scale", plan.scale_sigma, "relative"),
+            row("axis", plan.axis_sigma_rad, "rad"),
+            row("bias", plan.bias_sigma, unit),
+        ],
+        remarks: plan.unobservable.iter().map(|line| format!("unseen: {line}")).collect(),
+        ..Report::default()
+    };
+    let file = arguments
+        .out
+        .as_ref()
+        .map_or("it".into(), |path| path.display().to_string());
+    report.next.push(format!(
+        "run the plan, put a mean a channel into {file} as further columns, then: ground calibrate {command}"
+    ));
+    let directions = plan.runs.iter().map(|run| run.excitation_b);
+    report.picture(Figure::map(
+        "Runs by direction in b: height by longitude, in percent of the fullest cell",
+        &Coverage::of(directions).map(),
+    ));
+    let text = table(plan);
+    let mut lines = text.lines().map(|line| line.split(',').map(String::from).collect());
+    report.blocks.push(Block::Table {
+        columns: lines.next().unwrap_or_default(),
+        rows: lines.collect(),
+    });
+    report
 }
 
 fn means(arguments: &Arguments) -> Result<Means, DesignError> {

@@ -83,7 +83,7 @@ pub fn sensitivity(found: &Sensitivity, unidentifiable: &[String]) -> Result<Sec
         .enumerate()
         .map(|(k, left)| (k as f64 + 1.0, *left))
         .collect();
-    let figure = residuals("Multi-position test", "position", "residual [deg/h]", points)?;
+    let figure = residuals("What the positions leave over", "position", "residual [deg/h]", points)?;
     Ok(Section {
         title: "Multi-position test".into(),
         rows,
@@ -116,7 +116,7 @@ pub fn scale(found: &Scale, points: &[(f64, f64)]) -> Result<Section, ChartError
         .zip(&found.residuals)
         .map(|((rate, _), left)| (*rate, *left))
         .collect();
-    let figure = residuals("Scale factor", "rate", "residual [output]", left)?;
+    let figure = residuals("What a straight line leaves over", "rate", "residual [output]", left)?;
     // Residuals that bend have their extremes in the middle and at the ends with opposite signs: few sign changes.
     let mut by_rate: Vec<(f64, f64)> = points
         .iter()

@@ -66,6 +66,14 @@ fn what_is_missing_is_named() {
     for (text, why) in [
         ("seq,g1,g1_n\n1,5,9\n", "does not say what the unit felt"),
         ("wx_rad_s,wy_rad_s,g1,g1_n\n1,2,5,9\n", "has not all of wx_rad_s"),
+        (
+            "wx_deg_s,wy_rad_s,wz_deg_s,g1,g1_n\n1,2,3,5,9\n",
+            "has not all of wx_rad_s",
+        ),
+        (
+            "wx_rad_s,wy_rad_s,wz_rad_s,wx_deg_s,wy_deg_s,wz_deg_s,g1,g1_n\n1,0,0,57,0,0,5,9\n",
+            "in two units",
+        ),
         ("wx_rad_s,wy_rad_s,wz_rad_s,g1\n1,2,3,5\n", "which columns are channels"),
         (
             "wx_rad_s,wy_rad_s,wz_rad_s,g1,g1_n\n1,2,,5,9\n",

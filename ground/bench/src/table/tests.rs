@@ -84,3 +84,24 @@ fn any_bytes_are_read_or_refused() {
         }
     }
 }
+
+#[test]
+fn quoted_cells_are_read_as_spreadsheets_write_them() {
+    let table = parse(b"\"seq\";\"g1; mean\";\"g \"\"2\"\"\"\n\"pos 1; up\";\"0,5\";-2\n").expect("quoted");
+    assert_eq!(table.columns, ["seq", "g1; mean", "g \"2\""]);
+    assert_eq!(table.rows[0].cells[0], "pos 1; up");
+    assert_eq!(
+        (table.required(&table.rows[0], 1), table.required(&table.rows[0], 2)),
+        (Ok(0.5), Ok(-2.0))
+    );
+    // Decimal commas between separating commas can only be told where they are quoted.
+    let commas = parse(b"g1,g2\n\"0,5\",\"-1,25\"\n3,4\n").expect("quoted commas");
+    assert_eq!(numbers(&commas), [[Some(0.5), Some(-1.25)], [Some(3.0), Some(4.0)]]);
+}
+
+#[test]
+fn a_quote_that_does_not_end_is_refused_with_its_line() {
+    let error = parse(b"a;b\n1;2\n\"3;4\n5\";6\n").expect_err("open");
+    assert_eq!(error.line, 3);
+    assert!(error.why.contains("quoted"), "{error}");
+}

@@ -109,27 +109,33 @@ fn the_thousand_point_vector_gives_the_published_deviations() {
     );
 }
 
+/// Blocks end within windows, and windows are longer than blocks.
 #[test]
-fn cutting_the_work_into_pieces_changes_nothing() {
-    let rate: Vec<f64> = lcg1000()
-        .into_iter()
-        .cycle()
-        .take(50_000)
-        .enumerate()
-        .map(|(k, y)| y + k as f64 * 1e-5)
-        .collect();
+fn blocks_add_up_to_what_the_definitions_give() {
+    let noisy = lcg1000().into_iter().cycle().take(3 * BLOCK + 1_234).enumerate();
+    let rate: Vec<f64> = noisy.map(|(k, y)| y + k as f64 * 1e-5).collect();
     let phase = phase(&rate, &[]);
-    for (factor, cut) in [(1, 16_384), (700, 3_000), (16_000, 17_000)] {
-        let windows = phase.angle.len() - 2 * factor;
-        let whole = piece(&phase, factor, 0..windows);
-        let mut joined = piece(&phase, factor, 0..cut.min(windows));
-        joined.join(piece(&phase, factor, cut.min(windows)..windows));
-        for deviation in [Deviation::Oadev, Deviation::Mdev, Deviation::Hdev] {
-            let (whole, joined) = (whole.mean_square(deviation), joined.mean_square(deviation));
-            assert_eq!(whole.windows, joined.windows);
+    let x = &phase.angle;
+    for m in [1, 7, 700, BLOCK, 16_777] {
+        let second = |k: usize| x[k + 2 * m] - 2.0 * x[k + m] + x[k];
+        let third = |k: usize| second(k + m) - second(k);
+        let seconds: Vec<f64> = (0..x.len() - 2 * m).map(second).collect();
+        let mean = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
+        let disjoint: Vec<f64> = seconds.iter().copied().step_by(m).collect();
+        let moving: Vec<f64> = seconds.windows(m).map(|window| window.iter().sum()).collect();
+        let thirds: Vec<f64> = (0..x.len().saturating_sub(3 * m)).map(third).collect();
+        let point = sweep(&phase, &[m], |_| ())[0];
+        for (name, found, values) in [
+            ("disjoint", point.disjoint, &disjoint),
+            ("second", point.second, &seconds),
+            ("moving", point.moving, &moving),
+            ("third", point.third, &thirds),
+        ] {
+            assert_eq!(found.windows, values.len(), "{name} at {m}");
+            let (found, expected) = (found.sum / values.len() as f64, mean(values));
             assert!(
-                (whole.sum - joined.sum).abs() <= 1e-9 * whole.sum,
-                "{deviation:?} at factor {factor}"
+                (found / expected - 1.0).abs() < 1e-9,
+                "{name} at {m}: {found}, not {expected}"
             );
         }
     }

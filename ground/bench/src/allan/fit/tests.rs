@@ -12,6 +12,9 @@ use super::{
 
 const CONFIDENCE: f64 = 0.95;
 const STEP_S: f64 = 0.1;
+/// Share of records in which a term is seen that is not there: 2.5 standard deviations are exceeded by 0.6 %, by chi-squared
+/// ones somewhat more often.
+const FALSE_ALARMS: f64 = 0.02;
 
 fn points(noise: &Noise, count: usize, seed: u64) -> Vec<Point> {
     let series = Series {
@@ -35,38 +38,56 @@ fn finding(fit: &Fit, term: Term) -> Finding {
         .1
 }
 
+/// Coefficients in the order of [`Term::POWER_LAWS`].
+fn truth(noise: &Noise) -> [f64; 5] {
+    [
+        noise.quantisation,
+        noise.arw,
+        noise.bias_instability,
+        noise.rrw,
+        noise.ramp,
+    ]
+}
+
+/// Of 1,000 records, seven are one standard deviation of the count; the wanted 93 to 97 % are three of them.
 #[test]
-fn intervals_hold_the_truth_in_93_to_97_of_100_records() {
-    let noise = Noise {
-        quantisation: 0.01,
-        arw: 0.03,
-        rrw: 0.01,
-        ..Noise::default()
-    };
-    let covariance = covariance_of(&points(&noise, 8_192, 0), STEP_S, &Term::POWER_LAWS);
-    let fits: Vec<Fit> = (0..1_000)
-        .into_par_iter()
-        .map(|seed| {
+fn intervals_hold_the_truth_in_93_to_97_of_100_records_whatever_the_noise_is_made_of() {
+    let none = Noise::default();
+    #[rustfmt::skip]
+    let noises = [
+        Noise { arw: 0.03, ..none },
+        Noise { bias_instability: 0.02, ..none },
+        Noise { arw: 0.01, bias_instability: 0.02, ..none },
+        Noise { quantisation: 0.01, arw: 0.03, rrw: 0.01, ..none },
+        Noise { arw: 0.03, ramp: 1e-3, ..none },
+        // A rate walk that the record is too short to show: its bound from above is asked of.
+        Noise { arw: 0.03, bias_instability: 0.02, rrw: 0.003, ..none },
+    ];
+    let covariance = covariance_of(&points(&noises[0], 8_192, 0), STEP_S, &Term::POWER_LAWS);
+    for noise in noises {
+        let fits = (0..1_000).into_par_iter().map(|seed| {
             let points = points(&noise, 8_192, seed);
             fit_with(&points, &Term::POWER_LAWS, &covariance, CONFIDENCE).expect("enough points")
-        })
-        .collect();
-    for (term, truth) in [
-        (Term::Quantisation, 0.01),
-        (Term::AngleWalk, 0.03),
-        (Term::RateWalk, 0.01),
-    ] {
-        let seen = fits
-            .iter()
-            .map(|fit| finding(fit, term))
-            .filter(|finding| finding.value() > 0.0);
-        let held = fits.iter().filter(|fit| match finding(fit, term) {
-            Finding::Seen { low, high, .. } => low <= truth && truth <= high,
-            Finding::NotSeen { below } => truth <= below,
         });
-        let (seen, share) = (seen.count(), held.count() as f64 / fits.len() as f64);
-        println!("{}: seen {seen}, held {share}", term.name());
-        assert!((0.93..=0.97).contains(&share), "{}: {share}", term.name());
+        let fits: Vec<Fit> = fits.collect();
+        println!("{noise:?}");
+        for (term, truth) in Term::POWER_LAWS.into_iter().zip(truth(&noise)) {
+            let is_seen = |fit: &&Fit| finding(fit, term).value() > 0.0;
+            let seen = fits.iter().filter(is_seen).count() as f64 / fits.len() as f64;
+            if truth == 0.0 {
+                assert!(seen <= FALSE_ALARMS, "{}: {seen}", term.name());
+                continue;
+            }
+            let held = fits.iter().filter(|fit| match finding(fit, term) {
+                Finding::Seen { low, high, .. } => low <= truth && truth <= high,
+                Finding::NotSeen { below } => truth <= below,
+            });
+            let held = held.count() as f64 / fits.len() as f64;
+            println!("  {}: seen {seen}, held {held}", term.name());
+            // A bound from above that cannot go below zero holds more often than it says where little is there.
+            let most = if seen > 0.5 { 0.97 } else { 1.0 };
+            assert!((0.93..=most).contains(&held), "{}: {held}", term.name());
+        }
     }
 }
 
@@ -148,4 +169,37 @@ fn a_constant_record_has_nothing_to_fit() {
         ),
         None
     );
+}
+
+/// A line that nobody fits pushes other coefficients below zero; that says nothing about how small they are.
+#[test]
+fn a_coefficient_below_zero_is_bounded_as_if_at_zero() {
+    let noise = Noise {
+        arw: 0.01,
+        ..Noise::default()
+    };
+    let below = |line: f64| {
+        let mut values = noise.rate(30_000, STEP_S, 10);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value += line * (0.7 * k as f64).sin();
+        }
+        let series = Series {
+            step_s: STEP_S,
+            values,
+            gaps: Vec::new(),
+        };
+        let phase = Phase::new(&series, Input::Rate);
+        let points = sweep(&phase, &octaves(&phase), |_| ());
+        let fit = fit(&points, STEP_S, &Term::POWER_LAWS, CONFIDENCE).expect("enough points");
+        fit.findings.into_iter().map(|(_, finding)| match finding {
+            Finding::NotSeen { below } => below,
+            Finding::Seen { .. } => f64::INFINITY,
+        })
+    };
+    for (disturbed, clean) in below(0.02).zip(below(0.0)) {
+        assert!(
+            disturbed > 0.5 * clean || clean.is_infinite(),
+            "{disturbed}, where {clean} was clean"
+        );
+    }
 }

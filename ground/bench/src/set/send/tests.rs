@@ -62,13 +62,18 @@ impl Unit {
             Verdict::Done(Action::Calibration(Command::SetWord { place, bytes })) => {
                 self.arriving.take(place, bytes);
             }
-            Verdict::Done(Action::Calibration(Command::LoadSet)) => match self.arriving.set(ranges(), 0) {
-                Ok(set) => {
-                    self.set = set;
-                    self.say(&format!("G_CL ok: set {} of unit 0", set.identity.set));
+            Verdict::Done(Action::Calibration(Command::LoadSet)) => {
+                match self.arriving.set(ranges(), self.set.identity.unit) {
+                    Ok(set) => {
+                        self.set = set;
+                        self.say(&format!(
+                            "G_CL ok: set {} of unit {}",
+                            set.identity.set, set.identity.unit
+                        ));
+                    }
+                    Err(why) => self.say(&format!("G_CL no: {why}")),
                 }
-                Err(why) => self.say(&format!("G_CL no: {why}")),
-            },
+            }
             Verdict::Done(Action::Calibration(_)) => {
                 for (line, bytes) in self.set.encode().chunks(32).enumerate() {
                     let hex: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
@@ -118,10 +123,10 @@ impl Read for Unit {
 fn a_set_is_sent_used_and_read_back() {
     let mut unit = Unit::new();
     assert_eq!(
-        send(&mut unit, &own(0).encode()).expect("used"),
-        "G_CL ok: set 3 of unit 0"
+        send(&mut unit, &own(7).encode()).expect("used"),
+        "G_CL ok: set 3 of unit 7"
     );
-    assert_eq!(unit.set, own(0));
+    assert_eq!(unit.set, own(7));
 }
 
 #[test]
@@ -144,9 +149,10 @@ fn a_line_read_back_garbled_is_asked_for_again() {
 #[test]
 fn the_unit_keeps_its_set_when_it_refuses_or_flies() {
     let mut unit = Unit::new();
+    unit.set = own(5);
     let error = send(&mut unit, &own(9).encode()).expect_err("another unit's");
-    assert_eq!(error.to_string(), "the unit says: G_CL no: of unit 9, this is unit 0");
-    assert_eq!(unit.set, Set::nominal(ranges()));
+    assert_eq!(error.to_string(), "the unit says: G_CL no: of unit 9, this is unit 5");
+    assert_eq!(unit.set, own(5));
     let mut flying = Unit::new();
     flying.state.lift_off(true);
     assert_eq!(flying.state.mode, Mode::Flight);
