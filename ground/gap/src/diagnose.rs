@@ -3,8 +3,6 @@
 //! In: a [`Subject`] and what to leave out of the library. Out: [`Diagnosis`]. The held-out samples are asked once, at the end,
 //! about a model that no longer changes; if its effects do not shrink their gap, they are withdrawn.
 
-use nalgebra::DVector;
-
 use crate::{
     attribute::{Chosen, attribute},
     case::Subject,
@@ -30,6 +28,13 @@ const MOST_CAUSES: usize = 3;
 
 /// Prior probability that a unit has something the library does not.
 const UNKNOWN_PRIOR: f64 = 0.05;
+
+/// The effect on the scatter that changes nothing but its size.
+const LOUDER: &str = "noise-level";
+
+/// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
+/// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
+const UNLIKE: f64 = 0.02;
 
 /// Channels whose residuals are shown.
 const TRACES: usize = 6;
@@ -133,11 +138,16 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         scatter = best_scatter(&problem, &model, withheld);
     }
     progress("leftover", 0.0);
-    let scattered: Vec<usize> = scatter.iter().flat_map(|scatter| scatter.channels.clone()).collect();
+    // Louder white noise is in the weights by now, so that its channels are judged like any other.
+    let scattered: Vec<usize> = scatter
+        .iter()
+        .filter(|scatter| scatter.effect.page().name != LOUDER)
+        .flat_map(|scatter| scatter.channels.clone())
+        .collect();
     let mut left = if found.chosen.is_empty() && scatter.is_none() {
         gate.clone()
     } else {
-        leftover::judge(&views, &model.joint, &model.fitted, &scattered)
+        leftover::judge(&sight::views(&problem), &model.joint, &model.fitted, &scattered)
     };
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
@@ -175,10 +185,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
-    let explained = explained_share(&quiet, &model, &problem);
+    let explained =
+        explained_energy(&quiet, &model, &scattered) + scatter.as_ref().map_or(0.0, |scatter| 2.0 * scatter.gain);
     let mut causes = causes_of(&problem, &library, &found);
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
-    let trust = 1.0 - unknown * (1.0 - explained);
+    let unlike = left.energy() / explained.max(f64::MIN_POSITIVE);
+    let trust = 1.0 - unknown * unlike / (unlike + UNLIKE);
     causes.iter_mut().for_each(|cause| cause.probability *= trust);
     // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
@@ -265,23 +277,16 @@ fn factors(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
     (0..problem.frames.len()).map(factor).collect()
 }
 
-/// Share of the excess over calibration and noise that the model explains.
-fn explained_share(quiet: &Model, model: &Model, problem: &Problem) -> f64 {
-    let (before, after): (Vec<f64>, Vec<f64>) = (quiet.energies(), model.energies());
-    let excess = |energies: &[f64], nuisance: &[DVector<f64>]| -> f64 {
-        let open: f64 = nuisance.iter().map(|values| values.norm_squared()).sum();
-        let samples: usize = problem.frames.iter().map(|frame| frame.series.rows.len()).sum();
-        (energies.iter().sum::<f64>() + open - samples as f64).max(0.0)
+/// Energy that a model takes off what calibration and noise leave, in squares of noise; of channels not in `scattered`.
+fn explained_energy(quiet: &Model, model: &Model, scattered: &[usize]) -> f64 {
+    let energy = |model: &Model| -> f64 {
+        let channels = model.energies().into_iter().zip(&model.fitted.nuisance).enumerate();
+        channels
+            .filter(|(channel, _)| !scattered.contains(channel))
+            .map(|(_, (energy, open))| energy + open.norm_squared())
+            .sum()
     };
-    let (before, after) = (
-        excess(&before, &quiet.fitted.nuisance),
-        excess(&after, &model.fitted.nuisance),
-    );
-    if before > 0.0 {
-        (1.0 - after / before).clamp(0.0, 1.0)
-    } else {
-        1.0
-    }
+    (energy(quiet) - energy(model)).max(0.0)
 }
 
 /// Residuals of the channels whose gap is largest.
