@@ -19,6 +19,9 @@ use crate::{
 /// `TRIALS.md` says how far it holds.
 pub const TEMPERATURE: f64 = 2.0;
 
+/// Of its largest size, from where an engineer should look twice.
+const SUSPICIOUS: f64 = 0.25;
+
 /// Share of an effect's energy below which a channel is not named.
 const NAMED_SHARE: f64 = 0.02;
 
@@ -100,7 +103,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
                 .collect(),
             probability: probability(library, chosen),
             gain: chosen.gain,
-            is_suspicious: oversize(page, &chosen.theta, &hypothesis.parameters) > 1.0,
+            is_suspicious: oversize(page, &chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
             parameters,
             share: total,
             when: match hypothesis.span {
@@ -189,13 +192,9 @@ pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
     ))
 }
 
-/// Probability that an effect of so many times its largest size is itself and no proxy.
+/// Probability that an effect of so many times its largest size is itself and no proxy: the tail of a Cauchy law.
 fn itself(excess: f64) -> f64 {
-    if excess > 1.0 {
-        1.0 / (1.0 + excess * excess)
-    } else {
-        1.0
-    }
+    1.0 / (1.0 + excess * excess)
 }
 
 /// Energies to shares, most first.
@@ -272,7 +271,7 @@ mod tests {
 
     #[test]
     fn what_is_beyond_its_largest_size_is_never_named() {
-        assert_eq!(itself(0.98), 1.0);
+        assert!(itself(0.1) > 0.98);
         assert!(itself(1.02) < 0.5);
         assert!(itself(10.0) < 0.01);
     }

@@ -32,6 +32,9 @@ const UNKNOWN_PRIOR: f64 = 0.05;
 /// The effect on the scatter that changes nothing but its size.
 const LOUDER: &str = "noise-level";
 
+/// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
+const WANDERING: &str = "gyro-bias-walk";
+
 /// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
 /// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.02;
@@ -96,8 +99,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
-    let first = Model::around(&problem, &library, found.model(&library));
+    let mut first = Model::around(&problem, &library, found.model(&library));
     let mut scatter = best_scatter(&problem, &first, withheld);
+    // What wanders at random looks like a little of everything: if that alone says more than all that was chosen, it is that.
+    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
+    let at_random = best_scatter(&problem, &quiet, withheld).filter(|one| {
+        !found.chosen.is_empty()
+            && one.effect.page().name == WANDERING
+            && one.gain > gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain)
+    });
+    let is_random = at_random.is_some();
+    if is_random {
+        found.chosen.clear();
+        scatter = at_random;
+        first = Model::around(&problem, &library, Vec::new());
+    }
     let mut sigmas_after = problem.sigmas.clone();
     let loud = scatter.as_ref().map_or_else(
         || vec![1.0; problem.frames.len()],
@@ -121,20 +137,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     if both.iter().any(|factor| *factor != 1.0) {
         // The noise as found, then everything else anew with it.
         reweigh(&mut problem, &mut library, &both);
-        found = attribute(&problem, &mut library, &|share| progress("search", share));
+        if !is_random {
+            found = attribute(&problem, &mut library, &|share| progress("search", share));
+        }
     }
     let sought = distinct(&library, &found.chosen);
     let (kept, mut refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
         .into_iter()
         .partition(|chosen| probability_of_any(&library, chosen) >= SAID);
-    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
     let is_refused = gains(&refused) > gains(&kept);
     found.chosen = kept;
     // What is left is judged with the noise as described, or a misfit would excuse itself.
     let back: Vec<f64> = tempered.iter().map(|factor| 1.0 / factor).collect();
     reweigh(&mut problem, &mut library, &back);
     let model = Model::around(&problem, &library, found.model(&library));
-    if scatter.is_some() {
+    if scatter.is_some() && !is_random {
         scatter = best_scatter(&problem, &model, withheld);
     }
     progress("leftover", 0.0);
@@ -168,6 +185,36 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
     let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
     if has_effect && (!is_smaller || is_patchwork || is_refused) {
+        eprintln!(
+            "DEBUG smaller {is_smaller} patch {is_patchwork} refused {is_refused} {:?} {:?} {:?} {:?} kept {:?} refused {:?} scatter {:?} left {} {:?}",
+            shrink.before,
+            shrink.recalibrated,
+            shrink.after,
+            shrink.beyond_recalibration,
+            found
+                .chosen
+                .iter()
+                .map(|c| (
+                    library.hypotheses[c.hypothesis].effect(),
+                    library.hypotheses[c.hypothesis].cause.locality.to_string(),
+                    c.gain,
+                    &c.theta
+                ))
+                .collect::<Vec<_>>(),
+            refused
+                .iter()
+                .map(|c| (library.hypotheses[c.hypothesis].effect(), c.gain, &c.theta))
+                .collect::<Vec<_>>(),
+            scatter
+                .as_ref()
+                .map(|s| (s.effect.page().name, s.gain, s.channels.clone())),
+            left.log_tail,
+            left.aspects
+                .iter()
+                .take(3)
+                .map(|a| (&a.what, a.size))
+                .collect::<Vec<_>>()
+        );
         withdrawn.extend(
             found
                 .chosen

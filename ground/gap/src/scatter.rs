@@ -48,7 +48,7 @@ fn is_odd(view: &View) -> bool {
 const COLOURED: f64 = 0.2;
 
 /// Effects that stand for white noise, and for its outliers.
-const WHITE: [&str; 2] = ["noise-level", "shock"];
+const WHITE: [&str; 3] = ["noise-level", "packet-corruption", "shock"];
 
 /// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
 /// and these must not make the rest of the log look alike.

@@ -32,7 +32,7 @@ const PAGE: Page = Page {
     ],
     passes: true,
     // A magnet at a centimetre makes more than the Earth; the sigma is of screws, batteries and connectors.
-    largest: 50.0,
+    largest: 100.0,
     ..Page::SMOOTH
 };
 

@@ -87,7 +87,8 @@ pub struct Page {
     /// Whether its cause is brought, taken away or switched, so that it may be there for a part of a log. A lag or a
     /// warm-up is a property of its sensor and always there: a stretch of it is the shape of something else.
     pub passes: bool,
-    /// [prior sigmas] size beyond which it more likely stands for something else.
+    /// [prior sigmas] size beyond which it more likely stands for something else; a unit that was badly calibrated is off by
+    /// ten times the usual, a thing that is not this effect at all by any number.
     pub largest: f64,
 }
 
@@ -107,6 +108,6 @@ impl Page {
         sensors: &[],
         parameters: &[],
         passes: false,
-        largest: 5.0,
+        largest: 20.0,
     };
 }
