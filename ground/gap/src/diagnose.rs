@@ -9,11 +9,14 @@ use crate::{
     attribute::{Chosen, attribute},
     case::Subject,
     cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, probability_of_any, share_out},
-    confusion,
-    held::{Finished, Shrink},
+    confusion, contribution,
+    correction::Correction,
+    crossval::{self, Key},
+    held::{Finished, Shrink, ceiling_percent, stages::Stage},
     leftover::{self, Leftover, STRETCHES, View},
     library::Library,
     model::Model,
+    place::{self, Place},
     problem::Problem,
     scatter::{Scatter, scatters},
     sight, temper,
@@ -64,8 +67,20 @@ pub struct Diagnosis {
     pub none_of_these: f64,
     /// What the causes leave.
     pub leftover: Leftover,
+    /// Where the gap is.
+    pub place: Place,
     /// The held-out gap before and after.
     pub shrink: Shrink,
+    /// Percent that the true effect would shrink it; `None` without a cause.
+    pub ceiling_percent: Option<f64>,
+    /// The held-out gap in calibrated vectors and attitude.
+    pub stages: Vec<Stage>,
+    /// What the unit can correct of the causes.
+    pub correction: Option<Correction>,
+    /// What cross-validation says of the causes that are effects on readings.
+    pub keys: Vec<(&'static str, Key)>,
+    /// Per channel, standard deviation of a sample with effects on the scatter in.
+    pub sigmas_after: Vec<f64>,
     /// Effects that were withdrawn because they do not shrink it.
     pub withdrawn: Vec<&'static str>,
     /// [nats per effect] what each hypothesis gained alone; for the page.
@@ -91,6 +106,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
+    progress("where", 0.0);
+    let place = place::locate(&problem, &quiet);
     let first = Model::around(&problem, &library, found.model(&library));
     let mut scatter = best_scatter(&problem, &first, withheld);
     let mut sigmas_after = problem.sigmas.clone();
@@ -142,19 +159,17 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
         .collect();
-    let judge = |after: &[Vec<f64>], sigmas_after: &[f64]| {
-        subject.held.judge(Finished {
-            start_s: subject.twin.starts_s(),
-            sigmas: &problem.sigmas,
-            before: &before,
-            recalibrated: &quiet.predicted,
-            after,
-            sigmas_after,
-        })
+    let finished = |after, sigmas_after| Finished {
+        start_s: subject.twin.starts_s(),
+        sigmas: &problem.sigmas,
+        before: &before,
+        recalibrated: &quiet.predicted,
+        after,
+        sigmas_after,
     };
-    let mut shrink = judge(&model.predicted, &sigmas_after);
+    let mut shrink = subject.held.judge(finished(&model.predicted, &sigmas_after));
     let mut withdrawn = Vec::new();
-    let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
+    let is_smaller = shrink.supports_the_effect();
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
     let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
     if has_effect && (!is_smaller || is_patchwork || is_refused) {
@@ -171,12 +186,14 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     if found.chosen.is_empty() && scatter.is_none() {
         // Without the effects what is left is all there was.
         left = gate.clone();
-        shrink = judge(&quiet.predicted, &problem.sigmas);
+        shrink = subject.held.judge(finished(&quiet.predicted, &problem.sigmas));
     }
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
     let explained = explained_share(&quiet, &model, &problem);
     let mut causes = causes_of(&problem, &library, &found);
+    contribution::settle(&problem, &library, &found, &mut causes);
+    let keys = second_keys(&problem, &library, &model, &mut causes);
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
     let trust = 1.0 - unknown * (1.0 - explained);
     causes.iter_mut().for_each(|cause| cause.probability *= trust);
@@ -192,7 +209,34 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
     alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
     alternatives.dedup_by_key(|(name, _)| *name);
+    let is_named = !causes.is_empty();
+    let correction = is_named
+        .then(|| Correction::of(&subject.twin, &model.components))
+        .flatten();
+    let (after, sigmas_after) = if is_named {
+        (&model.predicted, &sigmas_after)
+    } else {
+        (&quiet.predicted, &problem.sigmas)
+    };
+    let responses = correction.as_ref().map(|correction| correction.responses.as_slice());
+    progress("attitude", 0.0);
+    let stages = subject
+        .held
+        .stages(&subject.twin, finished(after, sigmas_after), responses);
+    let ceiling = is_named.then(|| {
+        let parameters = causes.iter().map(|cause| cause.parameters.len()).sum();
+        let snr = (contribution::left(&quiet) - contribution::left(&model))
+            .max(0.0)
+            .sqrt();
+        ceiling_percent(shrink.before, parameters, snr)
+    });
     Diagnosis {
+        place,
+        ceiling_percent: ceiling,
+        stages,
+        correction,
+        keys,
+        sigmas_after: sigmas_after.clone(),
         gap,
         gate,
         alternatives,
@@ -205,7 +249,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         known: model
             .components
             .iter()
-            .filter(|_| !causes.is_empty())
+            // What comes and goes is no property of the unit.
+            .filter(|component| is_named && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
         rivals: confusion::pair(&library, &found),
@@ -224,6 +269,21 @@ fn root_mean_square(problem: &Problem) -> f64 {
         samples += frame.series.rows.len();
     }
     (energy / samples.max(1) as f64).sqrt()
+}
+
+/// What cross-validation says of the model's effects; the causes, which are those in their order, are believed no more.
+fn second_keys(problem: &Problem, library: &Library, model: &Model, causes: &mut [Cause]) -> Vec<(&'static str, Key)> {
+    if causes.len() != model.components.len() {
+        // They were withdrawn.
+        return Vec::new();
+    }
+    let keys = crossval::keys(problem, library, model).into_iter();
+    let said = keys.zip(causes).filter_map(|(key, cause)| {
+        let key = key?;
+        cause.probability = cause.probability.min(key.confidence());
+        Some((cause.effect, key))
+    });
+    said.collect()
 }
 
 /// How many effects are chosen: packets lost at three instants are one.

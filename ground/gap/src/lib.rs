@@ -12,11 +12,15 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
+pub mod attitude;
 pub mod attribute;
 pub mod case;
 pub mod cause;
 pub mod command;
 pub mod confusion;
+pub mod contribution;
+pub mod correction;
+pub mod crossval;
 pub mod diagnose;
 pub mod evidence;
 pub mod gram;
@@ -30,11 +34,13 @@ pub mod model;
 pub mod next;
 pub mod onset;
 pub mod page;
+pub mod place;
 pub mod problem;
 pub mod products;
 pub mod refine;
 pub mod regime;
 pub mod scatter;
+pub mod shapley;
 pub mod sight;
 pub mod temper;
 pub mod terminal;
