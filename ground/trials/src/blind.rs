@@ -26,6 +26,8 @@ use crate::{
 const MANIFEST: &str = "manifest.json";
 /// Hashes of the verdicts.
 const ANSWERED: &str = "answered.json";
+/// The revealed answer of a case, in its folder.
+const ANSWER: &str = "answer.json";
 /// The verdict on a case, in its folder.
 pub const VERDICT: &str = "verdict.json";
 
@@ -59,6 +61,12 @@ pub enum BlindError {
         /// The list of hashes.
         manifest: &'static str,
     },
+    /// Answers are asked for before the verdicts were published.
+    #[error("{0} does not exist: publish the verdicts with `answer` before the answers are revealed")]
+    Unanswered(PathBuf),
+    /// Verdicts are published after the answers were revealed.
+    #[error("{0} is revealed: verdicts given after that prove nothing")]
+    Revealed(PathBuf),
     /// A case was revealed that is not in the manifest, or the other way round.
     #[error("{0} lists other cases than there are answers for: commit before revealing")]
     Other(PathBuf),
@@ -131,10 +139,14 @@ pub fn commit(folder: &Path, answers: &Path) -> Result<(), BlindError> {
 /// Publishes the hashes of the verdicts that stand in the cases' folders.
 ///
 /// # Errors
-/// When a file cannot be read or written.
+/// When an answer is revealed already, or a file cannot be read or written.
 pub fn answer(folder: &Path) -> Result<usize, BlindError> {
     let mut hashes = BTreeMap::new();
     for case in cases(folder)? {
+        let revealed = case.join(ANSWER);
+        if revealed.exists() {
+            return Err(BlindError::Revealed(revealed));
+        }
         let verdict = case.join(VERDICT);
         if verdict.exists() {
             hashes.insert(stem(&case), hash(&read(&verdict)?));
@@ -144,11 +156,16 @@ pub fn answer(folder: &Path) -> Result<usize, BlindError> {
     Ok(hashes.len())
 }
 
-/// Puts the answers beside the cases, after checking that they are those that were committed to.
+/// Puts the answers beside the cases, after checking that the verdicts are published and that the answers are those that
+/// were committed to.
 ///
 /// # Errors
-/// When an answer is not the one that was committed to.
+/// When the verdicts are not published, or an answer is not the one that was committed to.
 pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
+    let answered = folder.join(ANSWERED);
+    if !answered.exists() {
+        return Err(BlindError::Unanswered(answered));
+    }
     let manifest_path = folder.join(MANIFEST);
     let manifest: BTreeMap<String, String> = parse(&manifest_path)?;
     let kept = files(answers)?;
@@ -163,7 +180,7 @@ pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
             });
         }
         let bytes = read(&path)?;
-        let shown = folder.join(stem(&path)).join("answer.json");
+        let shown = folder.join(stem(&path)).join(ANSWER);
         fs::write(&shown, bytes).map_err(|source| BlindError::File { path: shown, source })?;
     }
     Ok(())
@@ -178,7 +195,7 @@ pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
     let answered: BTreeMap<String, String> = parse(&folder.join(ANSWERED))?;
     let mut judged = Vec::new();
     for (name, published) in manifest {
-        let path = folder.join(&name).join("answer.json");
+        let path = folder.join(&name).join(ANSWER);
         if answer_hash(&path)? != published {
             return Err(BlindError::Changed {
                 path,
@@ -328,10 +345,12 @@ mod tests {
         make(&folder).expect("a folder");
         deal(&folder, &answers, hand, 1).expect("dealt");
         commit(&folder, &answers).expect("committed");
+        assert!(matches!(reveal(&folder, &answers), Err(BlindError::Unanswered(_))));
         let verdict = folder.join("T001").join(VERDICT);
         fs::write(&verdict, r#"{"causes":[],"none_of_these":0.0}"#).expect("written");
         assert_eq!(answer(&folder).expect("answered"), 1);
         reveal(&folder, &answers).expect("revealed");
+        assert!(matches!(answer(&folder), Err(BlindError::Revealed(_))));
         let (table, judged) = score(&folder).expect("scored");
         assert!(table.contains("| false name, nothing wrong | 1 | 0.000 |"), "{table}");
         assert_eq!(judged.len(), 1);
