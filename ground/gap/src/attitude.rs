@@ -5,6 +5,10 @@
 //! the filter's. TRIAD and filter are `emems::triad` and `emems::kalman`, the code that flies, in f32; the filter is told
 //! the site of the case and the low-passes of the unit's description, and is otherwise the one for a unit in a room.
 //!
+//! Channels are read one after another and through low-passes, so each looks at another instant. Directions that stand still
+//! in n are carried to one instant, that of the first accelerometer, by turning the channel's sensitivity with the rate:
+//! `S.v(t + s) = (exp(w s) S).v(t)`.
+//!
 //! A response is inverted as `(1 + k dT) S.v + b + b' dT = y`, `S.(w' x r + w x (w x r))` taken off for an accelerometer at
 //! `r`. Rates between rows are integrated as the mean of two: at 5 Hz that is what limits the filter, before and after any
 //! effect alike.
@@ -79,7 +83,9 @@ pub struct Track {
 /// What a motion and a unit are to the estimation, made once for all readings of a log.
 pub struct Estimation<'a> {
     twin: &'a Twin,
-    /// What is felt when the accelerometers are read.
+    /// The channel whose instants count: the first accelerometer.
+    first: usize,
+    /// What is felt at them.
     feels: Vec<Feel>,
     /// Rows to estimate.
     rows: Vec<usize>,
@@ -93,9 +99,11 @@ impl<'a> Estimation<'a> {
             .channels
             .iter()
             .position(|channel| channel.sensor == Kind::Accelerometer);
+        let first = first.unwrap_or(0);
         Estimation {
             twin,
-            feels: twin.feels(first.unwrap_or(0)),
+            first,
+            feels: twin.feels(first),
             rows,
         }
     }
@@ -115,11 +123,10 @@ impl<'a> Estimation<'a> {
         let mut track = Track::default();
         let turning = self.vectors(Kind::Gyro, readings, responses, None);
         track.vectors[0] = self.vectors(Kind::Accelerometer, readings, responses, Some(&turning));
-        track.vectors[2] = self.vectors(Kind::Magnetometer, readings, responses, None);
+        track.vectors[2] = self.vectors(Kind::Magnetometer, readings, responses, Some(&turning));
         track.vectors[1] = turning;
-        let delays = KINDS.map(|kind| self.mean(kind, |index| responses[index].delay_s));
-        track.triad = (0..self.rows.len()).map(|at| self.triad(&track, at, delays)).collect();
-        track.filter = self.filter(&track, delays);
+        track.triad = (0..self.rows.len()).map(|at| self.triad(&track, at)).collect();
+        track.filter = self.filter(&track, self.mean(Kind::Gyro, |index| responses[index].delay_s));
         track
     }
 
@@ -146,8 +153,11 @@ impl<'a> Estimation<'a> {
             .collect();
         let starts_s = self.twin.starts_s();
         let standard_c = self.twin.environment().temperature_c;
+        let channels = &self.twin.unit().channels;
+        let at_s = channels.get(self.first).map_or(0.0, |channel| channel.slot_s);
         let vector = |(at, row): (usize, &usize)| {
             let above_k = self.feels[*row].temperature_c - standard_c;
+            // What a rate is at another instant no rate tells: gyros are not carried.
             let rate_b = turning.and_then(|turning| turning[at]).unwrap_or_default();
             let rate_dot_b = turning.map_or_else(Vector3::zeros, |turning| {
                 slope(turning, &self.rows, starts_s, at).unwrap_or_default()
@@ -158,12 +168,15 @@ impl<'a> Estimation<'a> {
                 if !reading.is_finite() {
                     continue;
                 }
+                let channel = &channels[*index];
+                let later_s = channel.slot_s - channel.tau_s() - response.delay_s - at_s;
+                let seen_b = UnitQuaternion::from_scaled_axis(rate_b * later_s) * response.sensitivity_b;
                 let carried = rate_dot_b.cross(&response.lever_m) + rate_b.cross(&rate_b.cross(&response.lever_m));
                 let along = (reading - response.bias - response.bias_per_k * above_k)
                     / (1.0 + response.scale_per_k * above_k)
                     - response.sensitivity_b.dot(&carried);
-                matrix += response.sensitivity_b * response.sensitivity_b.transpose() * *weight;
-                pull += response.sensitivity_b * (along * weight);
+                matrix += seen_b * seen_b.transpose() * *weight;
+                pull += seen_b * (along * weight);
             }
             let eigenvalues = matrix.symmetric_eigenvalues();
             let is_whole = eigenvalues.min() > INDEPENDENT * eigenvalues.max();
@@ -176,13 +189,9 @@ impl<'a> Estimation<'a> {
         self.rows.iter().enumerate().map(vector).collect()
     }
 
-    fn triad(&self, track: &Track, at: usize, delays: [f64; 3]) -> Option<UnitQuaternion<f64>> {
+    fn triad(&self, track: &Track, at: usize) -> Option<UnitQuaternion<f64>> {
         let environment = self.twin.environment();
-        let now = |kind: usize| -> Option<Vector3<f64>> {
-            let turned = track.vectors[1][at].unwrap_or_default() * -delays[kind];
-            Some(UnitQuaternion::from_scaled_axis(turned) * track.vectors[kind][at]?)
-        };
-        let (force_b, field_b) = (now(0)?, now(2)?);
+        let (force_b, field_b) = (track.vectors[0][at]?, track.vectors[2][at]?);
         let is_near = (force_b.norm() - environment.gravity).abs() < NEAR_ONE_G * environment.gravity;
         let sighting = |seen_b: Vector3<f64>, known_n: Vector3<f64>| Sighting {
             seen_b: seen_b.cast(),
@@ -198,11 +207,12 @@ impl<'a> Estimation<'a> {
         found.map(|found| found.q_nb.cast())
     }
 
-    fn filter(&self, track: &Track, delays: [f64; 3]) -> Vec<Option<UnitQuaternion<f64>>> {
+    fn filter(&self, track: &Track, gyro_delay_s: f64) -> Vec<Option<UnitQuaternion<f64>>> {
         let channels = &self.twin.unit().channels;
-        let mut filter = Filter::new(self.params(delays));
+        let mut filter = Filter::new(self.params(gyro_delay_s));
         let starts_s = self.twin.starts_s();
-        let slots_s = KINDS.map(|kind| self.mean(kind, |index| channels[index].slot_s));
+        let gyro_slot_s = self.mean(Kind::Gyro, |index| channels[index].slot_s);
+        let at_s = channels.get(self.first).map_or(0.0, |channel| channel.slot_s);
         let variances = KINDS.map(|kind| {
             let count = channels.iter().filter(|channel| channel.sensor == kind).count().max(1);
             // Axes all round: each tells a third of a component.
@@ -224,11 +234,11 @@ impl<'a> Estimation<'a> {
                 track.vectors[kind][at].map(|value_b| Sampled {
                     value_b: value_b.cast(),
                     variance: variances[kind] as f32,
-                    at_us: micros(start_s + slots_s[kind]),
+                    at_us: micros(start_s + at_s),
                 })
             };
             filter.step(&Step {
-                at_us: micros(start_s + slots_s[1]),
+                at_us: micros(start_s + gyro_slot_s),
                 covered_s: covered_s as f32,
                 angle_b: ((rate_b + rate_before_b) * (0.5 * covered_s)).cast(),
                 angle_variance: (variances[1] * covered_s * covered_s) as f32,
@@ -243,13 +253,10 @@ impl<'a> Estimation<'a> {
         attitudes
     }
 
-    fn params(&self, delays: [f64; 3]) -> Params {
+    fn params(&self, gyro_delay_s: f64) -> Params {
         let environment = self.twin.environment();
         let channels = &self.twin.unit().channels;
-        let late = |kind: usize| {
-            let tau_s = self.mean(KINDS[kind], |index| channels[index].tau_s());
-            (tau_s + delays[kind]) as f32
-        };
+        let tau_s = self.mean(Kind::Gyro, |index| channels[index].tau_s());
         let field_n = environment.field_n_ut;
         let level = field_n.x.hypot(field_n.y);
         Params {
@@ -261,9 +268,10 @@ impl<'a> Estimation<'a> {
                 field_n.y.atan2(field_n.x) as f32,
             ),
             delays: Delays {
-                acc_s: late(0),
-                gyro_s: late(1),
-                mag_s: late(2),
+                gyro_s: (tau_s + gyro_delay_s) as f32,
+                // They are carried to their stamp already.
+                acc_s: 0.0,
+                mag_s: 0.0,
             },
             ..Params::ROOM
         }

@@ -10,6 +10,7 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use twin::predict::UnitDescription;
 
 use crate::{
     case::{CaseError, Subject},
@@ -30,7 +31,7 @@ pub struct Arguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
     #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
     pub words: Vec<String>,
-    /// Write verdict.json, index.html and unit.toml in DIR
+    /// Write verdict.json, index.html, unit.toml and, where the unit can correct the cause, calibration.toml in DIR
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Leave an effect out of the library; may be given several times
@@ -61,6 +62,9 @@ pub enum GapError {
         /// Why.
         source: io::Error,
     },
+    /// The calibration set cannot be written as text.
+    #[error(transparent)]
+    Set(#[from] bench::set::SetError),
     /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
@@ -106,6 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     let said = match word {
         _ if arguments.json => format!("{verdict}\n"),
         "where" => terminal::places(&subject, &diagnosis),
+        "why" => terminal::why(&subject, &diagnosis),
         "shrink" => terminal::shrink(&subject, &diagnosis),
         "next" => format!("{advice}\n"),
         "limits" => terminal::limits(&diagnosis),
@@ -130,6 +135,17 @@ pub fn write_verdict(case: &Path) -> Result<(), GapError> {
     put(case, "verdict.json", &verdict)
 }
 
+/// The unit as it is now believed to be: with its effects, and the noise that effects on the scatter give it.
+pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
+    let mut unit = subject.twin.unit().clone();
+    unit.effects.extend(diagnosis.known.iter().cloned());
+    for (channel, louder) in unit.channels.iter_mut().zip(&diagnosis.louder) {
+        let grown = channel.sigma().powi(2) * (louder * louder - 1.0);
+        channel.noise_sigma = (channel.noise_sigma.powi(2) + grown).max(0.0).sqrt();
+    }
+    unit
+}
+
 fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {
     let file = folder.join(name);
     std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
@@ -148,9 +164,10 @@ fn write_folder(
     })?;
     put(folder, "verdict.json", verdict)?;
     put(folder, "index.html", &page::html(subject, diagnosis, advice)?)?;
-    let mut unit = subject.twin.unit().clone();
-    unit.effects.extend(diagnosis.known.iter().cloned());
-    put(folder, "unit.toml", &unit.text())?;
+    put(folder, "unit.toml", &taught(subject, diagnosis).text())?;
+    if let Some(correction) = &diagnosis.correction {
+        put(folder, "calibration.toml", &correction.set(&subject.twin)?)?;
+    }
     println!("{}", folder.join("index.html").display());
     Ok(())
 }

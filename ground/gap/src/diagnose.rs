@@ -13,6 +13,7 @@ use crate::{
     correction::Correction,
     crossval::{self, Key},
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
+    imitation::{Imitation, imitation},
     leftover::{self, Leftover, STRETCHES, View},
     library::Library,
     model::Model,
@@ -79,12 +80,14 @@ pub struct Diagnosis {
     pub correction: Option<Correction>,
     /// What cross-validation says of the causes that are effects on readings.
     pub keys: Vec<(&'static str, Key)>,
-    /// Per channel, standard deviation of a sample with effects on the scatter in.
-    pub sigmas_after: Vec<f64>,
+    /// Per channel, by how much more it scatters than described, for an effect on the scatter.
+    pub louder: Vec<f64>,
     /// Effects that were withdrawn because they do not shrink it.
     pub withdrawn: Vec<&'static str>,
     /// [nats per effect] what each hypothesis gained alone; for the page.
     pub alone: Vec<(String, f64)>,
+    /// Which effects imitate which on this motion.
+    pub imitation: Imitation,
     /// Smallest size of each effect that this log would show.
     pub limits: Vec<confusion::Limit>,
     /// The effects as the unit's description would list them.
@@ -236,7 +239,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         stages,
         correction,
         keys,
-        sigmas_after: sigmas_after.clone(),
+        louder: sigmas_after
+            .iter()
+            .zip(&problem.sigmas)
+            .map(|(after, before)| after / before)
+            .collect(),
         gap,
         gate,
         alternatives,
@@ -245,6 +252,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         leftover: left,
         shrink,
         alone: alone(&library, &found),
+        imitation: imitation(&library, &found),
         limits: confusion::limits(&library),
         known: model
             .components

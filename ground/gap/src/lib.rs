@@ -26,6 +26,7 @@ pub mod evidence;
 pub mod gram;
 pub mod gross;
 pub mod held;
+pub mod imitation;
 pub mod joint;
 pub mod leftover;
 pub mod library;

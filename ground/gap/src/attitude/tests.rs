@@ -104,6 +104,21 @@ fn a_lever_arm_is_taken_off() {
     );
 }
 
+/// The unit of the thesis, 118.8 ms a cycle, with its low-passes.
+#[test]
+fn sensors_read_one_after_another_see_one_instant() {
+    let unit = emems(twin::predict::thesis_slot_s);
+    let environment = Environment::laboratory();
+    let scene = Scene::new(&Tumble::new(), &environment, 0.0, SECONDS, 0.01);
+    let starts_s = (5..(SECONDS / 0.2) as usize - 5).map(|row| row as f64 * 0.2).collect();
+    let twin = Twin::new(unit, environment, scene, starts_s).expect("a twin");
+    let (_, triad, _) = tracked(&twin, &[], |_, _| {});
+    // The rate changes within the 119 ms; not carried, the last sensor is ten degrees late.
+    assert!(most(&triad) < 3.0, "{}", most(&triad));
+    let (_, late, _) = tracked(&twin, &[], |response, _| response.delay_s = 0.1);
+    assert!(most(&late) > 2.0 * most(&triad), "{} {}", most(&late), most(&triad));
+}
+
 #[test]
 fn a_row_without_three_axes_has_no_vector() {
     let twin = twin_of(&Still::level());

@@ -18,6 +18,9 @@ const ROUNDS: usize = 6;
 /// Rows that are looked at: more do not change a share.
 const MOST_ROWS: usize = 4000;
 
+/// Name of what none of the quantities explains.
+pub const UNEXPLAINED: &str = "none of these";
+
 /// A quantity: its name and value.
 type Quantity = (&'static str, fn(&Feel) -> f64);
 
@@ -70,7 +73,7 @@ pub fn shares(feels: &[Feel], rows: &[usize], energy: &[f64]) -> Vec<(String, f6
         .collect();
     named.sort_by(|one, other| other.1.total_cmp(&one.1));
     let rest = 1.0 - named.iter().map(|(_, share)| share).sum::<f64>();
-    named.push(("none of these".to_owned(), rest.max(0.0)));
+    named.push((UNEXPLAINED.to_owned(), rest.max(0.0)));
     named
 }
 
