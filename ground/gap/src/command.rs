@@ -13,9 +13,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use twin::predict::UnitDescription;
 
 use crate::{
+    baseline,
     case::{CaseError, Subject},
     diagnose::{Diagnosis, diagnose},
-    next, page, terminal,
+    library::Library,
+    next, page,
+    problem::Problem,
+    terminal,
     verdict::Verdict,
 };
 
@@ -144,6 +148,42 @@ pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
         channel.noise_sigma = (channel.noise_sigma.powi(2) + grown).max(0.0).sqrt();
     }
     unit
+}
+
+/// Leaves what the baselines say of a case in its folder, `verdict-NAME.json` each; that of the oracle where the effects are
+/// known.
+///
+/// # Errors
+/// When the case cannot be judged or a file not written.
+pub fn write_baselines(case: &Path, effects: Option<&[String]>) -> Result<(), GapError> {
+    let subject = Subject::open(case)?;
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
+    let library = Library::new(&problem, &[], &|_| ());
+    for (name, named) in [
+        ("largest-residual", baseline::largest_residual(&problem, &library)),
+        ("lasso", baseline::lasso(&problem, &library)),
+        ("best-subset", baseline::best_subset(&problem, &library)),
+    ] {
+        let cause = |named: &baseline::Named| {
+            serde_json::json!({
+                "effect": named.effect,
+                "channels": subject.names(named.channels.iter().copied()),
+                "probability": named.share,
+            })
+        };
+        let verdict = serde_json::json!({ "causes": named.iter().map(cause).collect::<Vec<_>>() });
+        put(
+            case,
+            &format!("verdict-{name}.json"),
+            &serde_json::to_string_pretty(&verdict)?,
+        )?;
+    }
+    if let Some(effects) = effects {
+        let diagnosis = diagnose(&subject, &baseline::oracle_withholds(effects), &|_, _| ());
+        let verdict = Verdict::new(&subject, &diagnosis, String::new());
+        put(case, "verdict-oracle.json", &serde_json::to_string_pretty(&verdict)?)?;
+    }
+    Ok(())
 }
 
 fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {

@@ -14,6 +14,7 @@
 
 pub mod attitude;
 pub mod attribute;
+pub mod baseline;
 pub mod case;
 pub mod cause;
 pub mod command;
@@ -45,7 +46,8 @@ pub mod shapley;
 pub mod sight;
 pub mod temper;
 pub mod terminal;
+pub mod trace;
 pub mod verdict;
 pub mod windows;
 
-pub use command::{Arguments, GapError, run, write_verdict};
+pub use command::{Arguments, GapError, run, write_baselines, write_verdict};

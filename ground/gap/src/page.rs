@@ -2,11 +2,7 @@
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Map, Marks, Panel};
 
-use crate::{
-    case::Subject,
-    diagnose::{Diagnosis, Trace},
-    terminal,
-};
+use crate::{case::Subject, diagnose::Diagnosis, terminal, trace::Trace};
 
 /// Rows of a map of probabilities.
 const SHOWN: usize = 10;

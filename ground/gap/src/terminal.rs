@@ -10,6 +10,9 @@ pub use shrink::shrink;
 
 use crate::{case::Subject, diagnose::Diagnosis};
 
+/// Columns of a screen.
+const WIDTH: usize = 118;
+
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
 
@@ -27,21 +30,52 @@ pub fn screen(subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, subject, diagnosis, next_experiment);
-    text
+    wrapped(&text)
+}
+
+/// Longer lines go on in the next, indented.
+fn wrapped(text: &str) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let mut width = 0;
+        for (at, word) in line.split(' ').enumerate() {
+            let length = word.chars().count();
+            if at > 0 && width + 1 + length > WIDTH {
+                out.push_str("\n        ");
+                width = 8;
+            } else if at > 0 {
+                out.push(' ');
+                width += 1;
+            }
+            out.push_str(word);
+            width += length;
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// How large each effect could be and not be seen.
 pub fn limits(diagnosis: &Diagnosis) -> String {
     let mut text =
         String::from("a marginal signal-to-noise ratio of 5 on this log, at the place where it shows least\n");
-    for limit in &diagnosis.limits {
+    let (seen, unseen): (Vec<_>, Vec<_>) = diagnosis.limits.iter().partition(|limit| limit.size.is_finite());
+    for limit in seen {
         let _ = writeln!(
             text,
-            "{:28} {:10.3e} {:12} {} at {} ({:.2} of its usual size)",
+            "{:30} {:10.3e} {:12} {} at {} ({:.2} of its usual size)",
             limit.effect, limit.size, limit.unit, limit.parameter, limit.locality, limit.priors
         );
     }
-    text
+    if !unseen.is_empty() {
+        let names: Vec<&str> = unseen.iter().map(|limit| limit.effect).collect();
+        let _ = writeln!(
+            text,
+            "nothing on this log excites, somewhere at least: {}",
+            names.join(", ")
+        );
+    }
+    wrapped(&text)
 }
 
 /// Which effect, how sure, and what else it may be.
@@ -276,4 +310,23 @@ fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std:
         writeln!(text, "        worse: {}", worse.join(" "))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lines_go_on_indented_and_lose_no_word() {
+        let line = format!("NEXT    {}", "word ".repeat(60));
+        let found = wrapped(&line);
+        assert!(found.lines().all(|line| line.chars().count() <= WIDTH), "{found}");
+        assert_eq!(found.matches("word").count(), 60);
+        assert!(
+            found
+                .lines()
+                .nth(1)
+                .is_some_and(|line| line.starts_with("        word"))
+        );
+    }
 }

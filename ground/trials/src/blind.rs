@@ -19,7 +19,7 @@ use crate::{
     answer::Answer,
     deal::{self, DealError, Ring},
     draw::Draw,
-    score::{self, Judged, Verdict},
+    score::{self, Judged, Line, Verdict},
 };
 
 /// Hashes of the answers.
@@ -50,6 +50,9 @@ pub enum BlindError {
         /// Why.
         source: serde_json::Error,
     },
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] chart::ChartError),
     /// A case was not dealt.
     #[error(transparent)]
     Deal(#[from] DealError),
@@ -186,11 +189,11 @@ pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
     Ok(())
 }
 
-/// The table of revealed cases, all hashes checked.
+/// Revealed cases with their verdicts, all hashes checked.
 ///
 /// # Errors
 /// When a verdict or an answer was changed after its hash was published.
-pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
+pub fn judged(folder: &Path) -> Result<Vec<Judged>, BlindError> {
     let manifest: BTreeMap<String, String> = parse(&folder.join(MANIFEST))?;
     let answered: BTreeMap<String, String> = parse(&folder.join(ANSWERED))?;
     let mut judged = Vec::new();
@@ -219,7 +222,49 @@ pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
             verdict,
         });
     }
-    Ok((score::markdown(&score::table(&judged)), judged))
+    Ok(judged)
+}
+
+/// Revealed cases with the effects that are in them.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn revealed(folder: &Path) -> Result<Vec<(PathBuf, Vec<String>)>, BlindError> {
+    let mut revealed = Vec::new();
+    for case in cases(folder)? {
+        let path = case.join(ANSWER);
+        if path.exists() {
+            let kept: Kept = parse(&path)?;
+            let effects = kept.answer.effects.into_iter().map(|cause| cause.effect).collect();
+            revealed.push((case, effects));
+        }
+    }
+    Ok(revealed)
+}
+
+/// The tables of the diagnosis and of every baseline that left a `verdict-NAME.json`, by name.
+///
+/// # Errors
+/// When a verdict cannot be read.
+pub fn tools(folder: &Path, judged: &[Judged]) -> Result<Vec<(String, Vec<Line>)>, BlindError> {
+    let mut names: Vec<String> = Vec::new();
+    for case in cases(folder)? {
+        for path in files(&case)? {
+            let name = stem(&path).strip_prefix("verdict-").map(str::to_owned);
+            names.extend(name.filter(|name| !names.contains(name)));
+        }
+    }
+    names.sort();
+    let mut tools = vec![("diagnosis".to_owned(), score::table(judged))];
+    for name in names {
+        let mut others = judged.to_vec();
+        for other in &mut others {
+            let path = folder.join(&other.answer.case).join(format!("verdict-{name}.json"));
+            other.verdict = if path.exists() { Some(parse(&path)?) } else { None };
+        }
+        tools.push((name, score::table(&others)));
+    }
+    Ok(tools)
 }
 
 /// A case in one line: what it was, what was said.
@@ -329,43 +374,4 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), BlindError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_changed_after_its_hash_was_published_is_found() {
-        let place = tempfile::tempdir().expect("a folder");
-        let (folder, answers) = (place.path().join("cases"), place.path().join("answers"));
-        let hand = Hand {
-            r0: 1,
-            r1: 0,
-            r3: 0,
-            r4: 0,
-        };
-        make(&folder).expect("a folder");
-        deal(&folder, &answers, hand, 1).expect("dealt");
-        commit(&folder, &answers).expect("committed");
-        assert!(matches!(reveal(&folder, &answers), Err(BlindError::Unanswered(_))));
-        let verdict = folder.join("T001").join(VERDICT);
-        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.0}"#).expect("written");
-        assert_eq!(answer(&folder).expect("answered"), 1);
-        reveal(&folder, &answers).expect("revealed");
-        assert!(matches!(answer(&folder), Err(BlindError::Revealed(_))));
-        let (table, judged) = score(&folder).expect("scored");
-        assert!(table.contains("| false name, nothing wrong | 1 | 0.000 |"), "{table}");
-        assert_eq!(judged.len(), 1);
-
-        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.1}"#).expect("written");
-        assert!(matches!(
-            score(&folder),
-            Err(BlindError::Changed { manifest: ANSWERED, .. })
-        ));
-        let kept = answers.join("T001.json");
-        let other = fs::read_to_string(&kept).expect("kept").replace("\"R0\"", "\"R1\"");
-        fs::write(&kept, other).expect("written");
-        assert!(matches!(
-            reveal(&folder, &answers),
-            Err(BlindError::Changed { manifest: MANIFEST, .. })
-        ));
-    }
-}
+mod tests;

@@ -229,17 +229,31 @@ fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
     ]
 }
 
-/// The table as Markdown.
-pub fn markdown(lines: &[Line]) -> String {
-    let mut text = String::from("| figure | cases | value | 95 % interval | target |\n|---|---:|---:|---|---|\n");
-    for line in lines {
+/// The tables of several tools side by side as Markdown; intervals are those of the first.
+pub fn markdown(tools: &[(String, Vec<Line>)]) -> String {
+    let Some(((first, lines), others)) = tools.split_first() else {
+        return String::new();
+    };
+    let names: String = others.iter().map(|(name, _)| format!(" {name} |")).collect();
+    let rules = "---:|".repeat(others.len());
+    let mut text =
+        format!("| figure | cases | {first} | 95 % interval | target |{names}\n|---|---:|---:|---|---|{rules}\n");
+    for (at, line) in lines.iter().enumerate() {
         let interval = line
             .interval
             .map_or(String::new(), |(least, most)| format!("{least:.3} to {most:.3}"));
+        let beside: String = others
+            .iter()
+            .map(|(_, lines)| {
+                lines
+                    .get(at)
+                    .map_or(" |".to_owned(), |line| format!(" {:.3} |", line.value))
+            })
+            .collect();
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| {} | {} | {:.3} | {interval} | {} |",
+            "| {} | {} | {:.3} | {interval} | {} |{beside}",
             line.what, line.trials, line.value, line.target
         );
     }

@@ -28,7 +28,7 @@ pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, subject, diagnosis);
-    text
+    super::wrapped(&text)
 }
 
 /// One line of the screen; nothing where there is no gap to be anywhere.
