@@ -30,12 +30,13 @@ pub type Gyro = SpiDevice<'static, NoopRawMutex, GyroBus, Output<'static>>;
 
 static BUS: StaticCell<Mutex<NoopRawMutex, GyroBus>> = StaticCell::new();
 
-/// Times the wait for a word may be woken by something else. Nothing wakes it more than a few times in 12 us, so this
-/// many mean that SPI1 has stopped. The time driver wakes it each 33 ms, so the wait ends in half a second.
-const WAKES: u32 = 16;
+/// Sleeps until a word is there: the first may be ended by an event left over, the second by another interrupt. After
+/// that SPI_SR is read in place. The time driver ends a sleep within 33 ms, so an SPI1 that has stopped costs a cycle
+/// 4 x 33 ms of its 190, and the packet closes.
+const SLEEPS: u32 = 2;
 
-/// Reads of SPI_SR until BSY falls after the last word: it takes half a clock period, a handful of reads.
-const BUSY_READS: u32 = 1_000;
+/// Reads of SPI_SR, 20 us and more: until the rest of a word is there, or until BSY falls half a clock period after it.
+const READS: u32 = 1_000;
 
 /// The gyros of plates 1 to 4 with these chip selects.
 pub fn gyros(
@@ -87,13 +88,15 @@ impl GyroBus {
         }
         NVIC::unpend(interrupt::SPI1);
         pac::SPI1.dr().write(|w| w.set_dr(word));
-        let there = (0..WAKES).any(|_| {
-            let there = pac::SPI1.sr().read().rxne();
+        let is_there = || pac::SPI1.sr().read().rxne();
+        let asleep = |_| {
+            let there = is_there();
             if !there {
                 asm::wfe();
             }
             there
-        });
+        };
+        let there = (0..SLEEPS).any(asleep) || (0..READS).any(|_| is_there());
         let answer = pac::SPI1.dr().read().dr();
         if there { Ok(answer) } else { Err(ErrorKind::Other) }
     }
@@ -136,7 +139,7 @@ impl SpiBus<u16> for GyroBus {
     async fn flush(&mut self) -> Result<(), ErrorKind> {
         // The sleeps above may have taken an event that was the executor's: give it back, or a woken task sleeps on.
         asm::sev();
-        let idle = (0..BUSY_READS).any(|_| !pac::SPI1.sr().read().bsy());
+        let idle = (0..READS).any(|_| !pac::SPI1.sr().read().bsy());
         if idle { Ok(()) } else { Err(ErrorKind::Other) }
     }
 }

@@ -6,12 +6,12 @@
 
 mod panel;
 
-use plotters::{
-    coord::Shift,
-    prelude::{BLACK, DrawingArea, IntoDrawingArea, RGBColor, SVGBackend, WHITE},
-};
+use plotters::prelude::RGBColor;
 
-use chart::{ChartError, Figure};
+use chart::{
+    ChartError, Figure,
+    canvas::{drawing, hex},
+};
 use packets::channel::{CHANNELS, Quantity};
 
 use crate::{
@@ -101,7 +101,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
         .map(|(colour, name)| (hex(colour), name.to_string()))
         .collect();
     legend.extend(times.legend(panels.iter().any(|panel| !panel.failed.is_empty())));
-    let svg = draw(FOUR_PANELS, title, |root| {
+    let svg = drawing(title, FOUR_PANELS, |root| {
         let y = panel::shared_y(&panels, times, lsb);
         for (area, panel) in root.split_evenly((2, 2)).iter().zip(&panels) {
             panel.draw(area, times, y.clone())?;
@@ -135,7 +135,7 @@ fn period(times: &Times, summary: &Summary) -> Result<Figure, ChartError> {
     };
     let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other".to_string())];
     legend.extend(times.legend(false));
-    let svg = draw(ONE_PANEL, &title, |root| {
+    let svg = drawing(&title, ONE_PANEL, |root| {
         let y = panel::shared_y(
             std::slice::from_ref(&panel),
             times,
@@ -155,7 +155,7 @@ fn slots(summary: &Summary) -> Result<Figure, ChartError> {
             range: (spread.count > 0).then_some((1e3 * spread.least, 1e3 * spread.mean, 1e3 * spread.most)),
         })
         .collect();
-    let svg = draw(ONE_PANEL, &title, |root| panel::draw_bars(root, &bars, XYZ[0]))?;
+    let svg = drawing(&title, ONE_PANEL, |root| panel::draw_bars(root, &bars, XYZ[0]))?;
     Ok(Figure {
         title,
         legend: vec![(hex(XYZ[0]), "least to most, dot at the mean".to_string())],
@@ -167,34 +167,6 @@ fn slots(summary: &Summary) -> Result<Figure, ChartError> {
 fn si_range(bin: &Bin, index: usize) -> Option<(f64, f64)> {
     let (range, channel) = ((*bin.counts.get(index)?)?, CHANNELS.get(index)?);
     Some((channel.quantity.si(range.least), channel.quantity.si(range.most)))
-}
-
-/// What a drawing on an SVG may fail with.
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-
-/// Where panels are drawn.
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-fn draw(size: (u32, u32), title: &str, draw_on: impl FnOnce(&Area) -> Drawn) -> Result<String, ChartError> {
-    let mut svg = String::new();
-    let drawn = {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE)
-            .map_err(Into::into)
-            .and_then(|()| draw_on(&root))
-            .and_then(|()| root.present().map_err(Into::into))
-    };
-    match drawn {
-        Ok(()) => Ok(svg),
-        Err(why) => Err(ChartError {
-            figure: title.into(),
-            why: why.to_string(),
-        }),
-    }
-}
-
-fn hex(RGBColor(red, green, blue): RGBColor) -> String {
-    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 #[cfg(test)]

@@ -81,7 +81,8 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
         };
         for byte in heard {
             if let Some(heard) = parser.hear(*byte, now().as_micros()) {
-                answer(shared, heard).await;
+                // An answer of many lines waits for room behind a transmitter that may be stuck.
+                votes.waiting(Voter::UmbilicalListen, answer(shared, heard)).await;
             }
         }
         shared.umbilical_noise.set(parser.passed_over.saturating_add(lost));

@@ -90,9 +90,9 @@ impl Axis {
     pub(crate) fn tick(&self, place: f64, range: &Range<f64>) -> String {
         let span = range.end - range.start;
         match self.scale {
-            Scale::Linear => tidy(place, span, range.start.abs().max(range.end.abs())),
+            Scale::Linear => tidy(place, range),
             Scale::Logarithmic if (place - place.round()).abs() < 1e-6 => power(place.round()),
-            Scale::Logarithmic if span < 1.0 => tidy(10f64.powf(place), 10f64.powf(place), 10f64.powf(place)),
+            Scale::Logarithmic if span < 1.0 => tidy(10f64.powf(place), &(0.0..10f64.powf(place))),
             Scale::Logarithmic => String::new(),
         }
     }
@@ -111,7 +111,9 @@ fn power(exponent: f64) -> String {
 }
 
 /// A value with no more decimals than its axis needs; very large and very small axes in powers of ten.
-fn tidy(value: f64, span: f64, most: f64) -> String {
+pub fn tidy(value: f64, range: &Range<f64>) -> String {
+    let span = range.end - range.start;
+    let most = range.start.abs().max(range.end.abs());
     if !(1e-4..1e6).contains(&most) && most > 0.0 {
         if value.abs() < 1e-9 * most {
             return "0".into();

@@ -6,12 +6,16 @@
 use std::ops::Range;
 
 use plotters::{
-    coord::{Shift, types::RangedCoordf64},
+    coord::types::RangedCoordf64,
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use crate::{COLOURS, ChartError, Layer, Map, Marks, Panel, axis::Scale};
+use crate::{
+    COLOURS, ChartError, Layer, Map, Marks, Panel,
+    axis::Scale,
+    canvas::{Area, Drawn, FRAME, GRID, LABEL_PX, TITLE_PX, drawing, font},
+};
 
 /// [px] size of a panel; a picture is shown at half of it or less, so that lines are finer than a pixel.
 const PANEL: (u32, u32) = (1300, 620);
@@ -22,13 +26,6 @@ const WIDE: (u32, u32) = (2600, 760);
 /// Stretches of x of which least and most are drawn.
 const COLUMNS: usize = 1300;
 
-const GRID: RGBColor = RGBColor(222, 222, 222);
-const FRAME: RGBColor = RGBColor(120, 120, 120);
-const TITLE_PX: u32 = 34;
-const LABEL_PX: u32 = 30;
-
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Draws panels in rows of `columns`.
@@ -94,13 +91,8 @@ pub fn map(title: &str, map: &Map) -> Result<String, ChartError> {
     })
 }
 
-/// `#rrggbb` of a colour of [`COLOURS`].
-pub fn hex(colour: usize) -> String {
-    let RGBColor(red, green, blue) = rgb(colour);
-    format!("#{red:02x}{green:02x}{blue:02x}")
-}
-
-fn rgb(colour: usize) -> RGBColor {
+/// A colour of [`COLOURS`].
+pub fn rgb(colour: usize) -> RGBColor {
     let (red, green, blue) = COLOURS[colour % COLOURS.len()];
     RGBColor(red, green, blue)
 }
@@ -256,26 +248,4 @@ fn thinned(run: &[Placed], stretches: usize) -> Vec<Placed> {
             kept
         })
         .collect()
-}
-
-fn drawing(title: &str, size: (u32, u32), draw_on: impl FnOnce(&Area) -> Drawn) -> Result<String, ChartError> {
-    let mut svg = String::new();
-    let drawn = {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE)
-            .map_err(Into::into)
-            .and_then(|()| draw_on(&root))
-            .and_then(|()| root.present().map_err(Into::into))
-    };
-    match drawn {
-        Ok(()) => Ok(svg),
-        Err(why) => Err(ChartError {
-            figure: title.into(),
-            why: why.to_string(),
-        }),
-    }
-}
-
-fn font(px: u32) -> TextStyle<'static> {
-    ("sans-serif", px).into_font().color(&BLACK)
 }

@@ -4,10 +4,11 @@
 //! puts figures, tables and text into one file. Nothing here knows what the numbers mean.
 
 mod axis;
+pub mod canvas;
 mod draw;
 pub mod page;
 
-pub use axis::{Axis, Scale};
+pub use axis::{Axis, Scale, tidy};
 pub use page::{Block, html};
 
 /// Colours in the order layers take them, distinguishable without red or green (Okabe and Ito, "Color universal
@@ -118,7 +119,7 @@ impl Figure {
         let mut legend: Vec<(String, String)> = Vec::new();
         for layer in panels.iter().flat_map(|panel| &panel.layers) {
             if !layer.name.is_empty() && !legend.iter().any(|(_, name)| *name == layer.name) {
-                legend.push((draw::hex(layer.colour), layer.name.clone()));
+                legend.push((canvas::hex(draw::rgb(layer.colour)), layer.name.clone()));
             }
         }
         let svg = draw::panels(&title, columns, panels)?;

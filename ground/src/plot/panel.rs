@@ -10,7 +10,11 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::{Area, BLACK, Drawn, hex};
+use chart::{
+    canvas::{Area, Drawn, FRAME, GRID, LABEL_PX, TITLE_PX, font, hex},
+    tidy,
+};
+
 use crate::envelope::{Bin, Envelope};
 
 /// A channel that hardly changes is not blown up beyond this many counts.
@@ -20,11 +24,6 @@ const FAILED: RGBColor = RGBColor(170, 0, 100);
 const MISSED: RGBColor = RGBColor(90, 90, 90);
 const LIFT_OFF: RGBColor = RGBColor(60, 60, 60);
 const MICRO_G: RGBColor = RGBColor(228, 238, 250);
-const GRID: RGBColor = RGBColor(222, 222, 222);
-const FRAME: RGBColor = RGBColor(120, 120, 120);
-
-const TITLE_PX: u32 = 34;
-const LABEL_PX: u32 = 30;
 
 /// Share of the height that a strip takes.
 const STRIP: f64 = 0.035;
@@ -227,8 +226,8 @@ impl Panel {
             .x_desc(format!("time [{}]", times.unit))
             .y_desc(&self.y_title)
             .label_style(font(LABEL_PX))
-            .y_label_formatter(&|value| tidy(*value, height))
-            .x_label_formatter(&|time| tidy(*time, times.axis.end - times.axis.start))
+            .y_label_formatter(&|value| tidy(*value, &y))
+            .x_label_formatter(&|time| tidy(*time, &times.axis))
             .draw()?;
         if let Some(at) = times.lift_off.filter(|at| *at > times.axis.start) {
             let line = [(at, y.start), (at, y.end)];
@@ -293,33 +292,9 @@ pub fn draw_bars(area: &Area, bars: &[Bar], colour: RGBColor) -> Drawn {
     Ok(())
 }
 
-fn font(px: u32) -> TextStyle<'static> {
-    ("sans-serif", px).into_font().color(&BLACK)
-}
-
-/// A tick's text, with no more decimals than its axis needs.
-fn tidy(value: f64, span: f64) -> String {
-    let decimals = (1.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize;
-    let text = format!("{value:.decimals$}");
-    // Rounding may leave "-0".
-    match text.trim_start_matches(['-', '0', '.']) {
-        "" => "0".into(),
-        _ => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn ticks_have_the_decimals_their_axis_needs() {
-        let check = |value, span, text: &str| assert_eq!(tidy(value, span), text);
-        check(20.0, 400.0, "20");
-        check(-0.5, 2.0, "-0.5");
-        check(0.0125, 0.05, "0.013");
-        check(-1e-9, 3.0, "0");
-    }
 
     #[test]
     fn a_flat_line_is_not_blown_up() {

@@ -18,7 +18,7 @@ use emems::board::RecoverBus;
 
 use super::{
     clock,
-    timing::{I2C_BIT, I2C_OVERHEAD, I2C_TURN, SPI_OVERHEAD, SPI_WORD},
+    timing::{I2C_BIT, I2C_OVERHEAD, I2C_READ, I2C_TURN, SPI_OVERHEAD, SPI_WORD},
 };
 use crate::{
     part::{Nanos, SpiPart},
@@ -69,7 +69,10 @@ impl SensorBus {
         now: Nanos,
     ) -> (Nanos, Result<(), ErrorKind>) {
         let plant = || self.plant.borrow_mut();
-        let mut at = now + I2C_OVERHEAD;
+        let reads = operations
+            .iter()
+            .any(|operation| matches!(operation, i2c::Operation::Read(_)));
+        let mut at = now + I2C_OVERHEAD + if reads { I2C_READ } else { 0 };
         let byte = 9 * I2C_BIT;
         let mut direction = None;
         for operation in operations {

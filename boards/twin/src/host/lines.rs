@@ -17,7 +17,10 @@ use emems::{
     resume::Resume,
 };
 
-use super::{clock, timing::UART_BYTE};
+use super::{
+    clock,
+    timing::{UART_BYTE, UART_START},
+};
 use crate::{part::Nanos, plant::Plant};
 
 /// What a transmitter sent and nobody has heard yet.
@@ -32,7 +35,8 @@ impl ErrorType for Transmitter {
 
 impl Write for Transmitter {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        Timer::after(Duration::from_micros(bytes.len() as u64 * UART_BYTE / 1000)).await;
+        let taken = UART_START + bytes.len() as Nanos * UART_BYTE;
+        Timer::after(Duration::from_micros(taken / 1000)).await;
         self.0.borrow_mut().push((clock::since_power_on(), bytes.to_vec()));
         Ok(bytes.len())
     }
