@@ -176,6 +176,10 @@ fn what_the_unit_can_correct_is_an_entry_of_its_calibration_set() {
         .iter()
         .find(|stage| stage.name == "rate")
         .expect("three gyros");
+    assert!(
+        rate.after < 0.7 * rate.before && rate.percent.is_some_and(|percent| percent > 80.0),
+        "{rate:?}"
+    );
     let corrected = rate.corrected.expect("corrected");
     assert!(
         corrected < 0.7 * rate.before && corrected > 0.9 * rate.floor,

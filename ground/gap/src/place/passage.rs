@@ -184,6 +184,12 @@ mod tests {
     }
 
     #[test]
+    fn a_gap_that_varies_is_no_passage() {
+        let (energies, counts) = energies(|k| if k >= 30 { 5.0 } else { 3.5 });
+        assert_eq!(passage(&energies, &counts), None);
+    }
+
+    #[test]
     fn a_slight_change_is_no_onset() {
         let (energies, counts) = energies(|k| if k >= 30 { 1.2 } else { 1.0 });
         assert_eq!(passage(&energies, &counts), None);
