@@ -77,7 +77,9 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
 
 fn gap(arguments: &Gap) -> Result<(), Box<dyn Error>> {
     if let Some(Challenge::Blind(step)) = &arguments.challenge {
-        trials::command::run(step, &|case| Ok(gap::write_verdict(case)?))?;
+        trials::command::run(step, &|case| Ok(gap::write_verdict(case)?), &|case, effects| {
+            Ok(gap::write_baselines(case, Some(effects))?)
+        })?;
     }
     if let Some(case) = &arguments.case {
         gap::run(case)?;

@@ -10,11 +10,16 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use twin::predict::UnitDescription;
 
 use crate::{
+    baseline,
     case::{CaseError, Subject},
     diagnose::{Diagnosis, diagnose},
-    next, page, terminal,
+    library::Library,
+    next, page,
+    problem::Problem,
+    terminal,
     verdict::Verdict,
 };
 
@@ -30,7 +35,7 @@ pub struct Arguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
     #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
     pub words: Vec<String>,
-    /// Write verdict.json, index.html and unit.toml in DIR
+    /// Write verdict.json, index.html, unit.toml and, where the unit can correct the cause, calibration.toml in DIR
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Leave an effect out of the library; may be given several times
@@ -61,6 +66,9 @@ pub enum GapError {
         /// Why.
         source: io::Error,
     },
+    /// The calibration set cannot be written as text.
+    #[error(transparent)]
+    Set(#[from] bench::set::SetError),
     /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
@@ -106,6 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     let said = match word {
         _ if arguments.json => format!("{verdict}\n"),
         "where" => terminal::places(&subject, &diagnosis),
+        "why" => terminal::why(&subject, &diagnosis),
         "shrink" => terminal::shrink(&subject, &diagnosis),
         "next" => format!("{advice}\n"),
         "limits" => terminal::limits(&diagnosis),
@@ -130,6 +139,53 @@ pub fn write_verdict(case: &Path) -> Result<(), GapError> {
     put(case, "verdict.json", &verdict)
 }
 
+/// The unit as it is now believed to be: with its effects, and the noise that effects on the scatter give it.
+pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
+    let mut unit = subject.twin.unit().clone();
+    unit.effects.extend(diagnosis.known.iter().cloned());
+    for (channel, louder) in unit.channels.iter_mut().zip(&diagnosis.louder) {
+        let grown = channel.sigma().powi(2) * (louder * louder - 1.0);
+        channel.noise_sigma = (channel.noise_sigma.powi(2) + grown).max(0.0).sqrt();
+    }
+    unit
+}
+
+/// Leaves what the baselines say of a case in its folder, `verdict-NAME.json` each; that of the oracle where the effects are
+/// known.
+///
+/// # Errors
+/// When the case cannot be judged or a file not written.
+pub fn write_baselines(case: &Path, effects: Option<&[String]>) -> Result<(), GapError> {
+    let subject = Subject::open(case)?;
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
+    let library = Library::new(&problem, &[], &|_| ());
+    for (name, named) in [
+        ("largest-residual", baseline::largest_residual(&problem, &library)),
+        ("lasso", baseline::lasso(&problem, &library)),
+        ("best-subset", baseline::best_subset(&problem, &library)),
+    ] {
+        let cause = |named: &baseline::Named| {
+            serde_json::json!({
+                "effect": named.effect,
+                "channels": subject.names(named.channels.iter().copied()),
+                "probability": named.share,
+            })
+        };
+        let verdict = serde_json::json!({ "causes": named.iter().map(cause).collect::<Vec<_>>() });
+        put(
+            case,
+            &format!("verdict-{name}.json"),
+            &serde_json::to_string_pretty(&verdict)?,
+        )?;
+    }
+    if let Some(effects) = effects {
+        let diagnosis = diagnose(&subject, &baseline::oracle_withholds(effects), &|_, _| ());
+        let verdict = Verdict::new(&subject, &diagnosis, String::new());
+        put(case, "verdict-oracle.json", &serde_json::to_string_pretty(&verdict)?)?;
+    }
+    Ok(())
+}
+
 fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {
     let file = folder.join(name);
     std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
@@ -148,9 +204,10 @@ fn write_folder(
     })?;
     put(folder, "verdict.json", verdict)?;
     put(folder, "index.html", &page::html(subject, diagnosis, advice)?)?;
-    let mut unit = subject.twin.unit().clone();
-    unit.effects.extend(diagnosis.known.iter().cloned());
-    put(folder, "unit.toml", &unit.text())?;
+    put(folder, "unit.toml", &taught(subject, diagnosis).text())?;
+    if let Some(correction) = &diagnosis.correction {
+        put(folder, "calibration.toml", &correction.set(&subject.twin)?)?;
+    }
     println!("{}", folder.join("index.html").display());
     Ok(())
 }

@@ -7,14 +7,19 @@ use crate::{
     attribute::{Chosen, attribute},
     case::Subject,
     cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, probability_of_any, share_out},
-    confusion,
-    held::{Finished, Shrink},
-    leftover::{self, Leftover, STRETCHES, View},
+    confusion, contribution,
+    correction::Correction,
+    crossval::{self, Key},
+    held::{Finished, Shrink, ceiling_percent, stages::Stage},
+    imitation::{Imitation, imitation},
+    leftover::{self, Leftover},
     library::Library,
     model::Model,
+    place::{self, Place},
     problem::Problem,
     scatter::{Scatter, scatters},
     sight, temper,
+    trace::{Trace, cells, traces},
 };
 
 /// [nats] an effect on the scatter must gain.
@@ -39,23 +44,6 @@ const WANDERING: &str = "gyro-bias-walk";
 /// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.02;
 
-/// Channels whose residuals are shown.
-const TRACES: usize = 6;
-
-/// Points of a trace: more are not told apart on a page.
-const POINTS: usize = 1500;
-
-/// One channel's residual on the fit windows.
-#[derive(Clone, Debug)]
-pub struct Trace {
-    /// Its channel.
-    pub name: String,
-    /// ([s], [sigma]) by the nominal twin.
-    pub before: Vec<(f64, f64)>,
-    /// ([s], [sigma]) with effect and calibration in.
-    pub after: Vec<(f64, f64)>,
-}
-
 /// What a case says.
 pub struct Diagnosis {
     /// Root mean square residual on the fit windows, in sigma.
@@ -72,12 +60,26 @@ pub struct Diagnosis {
     pub none_of_these: f64,
     /// What the causes leave.
     pub leftover: Leftover,
+    /// Where the gap is.
+    pub place: Place,
     /// The held-out gap before and after.
     pub shrink: Shrink,
+    /// Percent that the true effect would shrink it; `None` without a cause.
+    pub ceiling_percent: Option<f64>,
+    /// The held-out gap in calibrated vectors and attitude.
+    pub stages: Vec<Stage>,
+    /// What the unit can correct of the causes.
+    pub correction: Option<Correction>,
+    /// What cross-validation says of the causes that are effects on readings.
+    pub keys: Vec<(&'static str, Key)>,
+    /// Per channel, by how much more it scatters than described, for an effect on the scatter.
+    pub louder: Vec<f64>,
     /// Effects that were withdrawn because they do not shrink it.
     pub withdrawn: Vec<&'static str>,
     /// [nats per effect] what each hypothesis gained alone; for the page.
     pub alone: Vec<(String, f64)>,
+    /// Which effects imitate which on this motion.
+    pub imitation: Imitation,
     /// Smallest size of each effect that this log would show.
     pub limits: Vec<confusion::Limit>,
     /// The effects as the unit's description would list them.
@@ -99,6 +101,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
+    progress("where", 0.0);
+    let place = place::locate(&problem, &quiet);
     let mut first = Model::around(&problem, &library, found.model(&library));
     let mut scatter = best_scatter(&problem, &first, withheld);
     // What wanders at random looks like a little of everything: if that alone says more than all that was chosen, it is that.
@@ -169,19 +173,17 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
         .collect();
-    let judge = |after: &[Vec<f64>], sigmas_after: &[f64]| {
-        subject.held.judge(Finished {
-            start_s: subject.twin.starts_s(),
-            sigmas: &problem.sigmas,
-            before: &before,
-            recalibrated: &quiet.predicted,
-            after,
-            sigmas_after,
-        })
+    let finished = |after, sigmas_after| Finished {
+        start_s: subject.twin.starts_s(),
+        sigmas: &problem.sigmas,
+        before: &before,
+        recalibrated: &quiet.predicted,
+        after,
+        sigmas_after,
     };
-    let mut shrink = judge(&model.predicted, &sigmas_after);
+    let mut shrink = subject.held.judge(finished(&model.predicted, &sigmas_after));
     let mut withdrawn = Vec::new();
-    let is_smaller = shrink.interval_percent[0] > 0.0 && shrink.beyond_recalibration[1] >= 0.0;
+    let is_smaller = shrink.supports_the_effect();
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
     let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
     if has_effect && (!is_smaller || is_patchwork || is_refused) {
@@ -228,13 +230,15 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     if found.chosen.is_empty() && scatter.is_none() {
         // Without the effects what is left is all there was.
         left = gate.clone();
-        shrink = judge(&quiet.predicted, &problem.sigmas);
+        shrink = subject.held.judge(finished(&quiet.predicted, &problem.sigmas));
     }
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
     let explained =
         explained_energy(&quiet, &model, &scattered) + scatter.as_ref().map_or(0.0, |scatter| 2.0 * scatter.gain);
     let mut causes = causes_of(&problem, &library, &found);
+    contribution::settle(&problem, &library, &found, &mut causes);
+    let keys = second_keys(&problem, &library, &model, &mut causes);
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
     let unlike = left.energy() / explained.max(f64::MIN_POSITIVE);
     let trust = 1.0 - unknown * unlike / (unlike + UNLIKE);
@@ -251,7 +255,38 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
     alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
     alternatives.dedup_by_key(|(name, _)| *name);
+    let is_named = !causes.is_empty();
+    let correction = is_named
+        .then(|| Correction::of(&subject.twin, &model.components))
+        .flatten();
+    let (after, sigmas_after) = if is_named {
+        (&model.predicted, &sigmas_after)
+    } else {
+        (&quiet.predicted, &problem.sigmas)
+    };
+    let responses = correction.as_ref().map(|correction| correction.responses.as_slice());
+    progress("attitude", 0.0);
+    let stages = subject
+        .held
+        .stages(&subject.twin, finished(after, sigmas_after), responses);
+    let ceiling = is_named.then(|| {
+        let parameters = causes.iter().map(|cause| cause.parameters.len()).sum();
+        let snr = (contribution::left(&quiet) - contribution::left(&model))
+            .max(0.0)
+            .sqrt();
+        ceiling_percent(shrink.before, parameters, snr)
+    });
     Diagnosis {
+        place,
+        ceiling_percent: ceiling,
+        stages,
+        correction,
+        keys,
+        louder: sigmas_after
+            .iter()
+            .zip(&problem.sigmas)
+            .map(|(after, before)| after / before)
+            .collect(),
         gap,
         gate,
         alternatives,
@@ -260,11 +295,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         leftover: left,
         shrink,
         alone: alone(&library, &found),
+        imitation: imitation(&library, &found),
         limits: confusion::limits(&library),
         known: model
             .components
             .iter()
-            .filter(|_| !causes.is_empty())
+            // What comes and goes is no property of the unit.
+            .filter(|component| is_named && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
         rivals: confusion::pair(&library, &found),
@@ -283,6 +320,21 @@ fn root_mean_square(problem: &Problem) -> f64 {
         samples += frame.series.rows.len();
     }
     (energy / samples.max(1) as f64).sqrt()
+}
+
+/// What cross-validation says of the model's effects; the causes, which are those in their order, are believed no more.
+fn second_keys(problem: &Problem, library: &Library, model: &Model, causes: &mut [Cause]) -> Vec<(&'static str, Key)> {
+    if causes.len() != model.components.len() {
+        // They were withdrawn.
+        return Vec::new();
+    }
+    let keys = crossval::keys(problem, library, model).into_iter();
+    let said = keys.zip(causes).filter_map(|(key, cause)| {
+        let key = key?;
+        cause.probability = cause.probability.min(key.confidence());
+        Some((cause.effect, key))
+    });
+    said.collect()
 }
 
 /// How many effects are chosen: packets lost at three instants are one.
@@ -334,59 +386,4 @@ fn explained_energy(quiet: &Model, model: &Model, scattered: &[usize]) -> f64 {
             .sum()
     };
     (energy(quiet) - energy(model)).max(0.0)
-}
-
-/// Residuals of the channels whose gap is largest.
-fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
-    let twin = problem.twin;
-    let mut order: Vec<(usize, f64)> = (0..problem.frames.len())
-        .map(|channel| {
-            (
-                channel,
-                problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64,
-            )
-        })
-        .collect();
-    order.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let trace = |(channel, _): &(usize, f64)| {
-        let series = &problem.frames[*channel].series;
-        let nominal = problem.predict(*channel, &[]);
-        let step = series.rows.len().div_ceil(POINTS).max(1);
-        let points = |predicted: &[f64]| {
-            let pairs = series.rows.iter().zip(&series.values).step_by(step);
-            pairs
-                .map(|(row, value)| {
-                    (
-                        twin.starts_s()[*row as usize],
-                        (value - predicted[*row as usize]) / problem.sigmas[*channel],
-                    )
-                })
-                .collect()
-        };
-        Trace {
-            name: twin.unit().channels[*channel].name.clone(),
-            before: points(&nominal),
-            after: points(&model.predicted[*channel]),
-        }
-    };
-    order.iter().take(TRACES).map(trace).collect()
-}
-
-/// The gap of each channel in each stretch of the fit windows.
-fn cells(problem: &Problem, views: &[View]) -> Vec<(String, Vec<f64>)> {
-    let cell = |(channel, view): (usize, &View)| {
-        let mut sums = vec![(0.0, 0.0); STRETCHES];
-        let scale = problem.frames[channel].weight_sigma / problem.sigmas[channel];
-        for (phase, value) in view.phase.iter().zip(problem.residual(channel, &[]).iter()) {
-            let sum = &mut sums[((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)];
-            *sum = (sum.0 + (value * scale).powi(2), sum.1 + 1.0);
-        }
-        (
-            view.name.clone(),
-            sums.into_iter()
-                .map(|(energy, samples)| f64::sqrt(energy / samples))
-                .collect(),
-        )
-    };
-    views.iter().enumerate().map(cell).collect()
 }

@@ -6,7 +6,14 @@
 //!
 //! The gap is the root mean square of the residual over the twin's own sigma, 1 for a perfect twin; the shrink is
 //! `100 (before - after) / (before - 1)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
-//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row.
+//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is 1; its
+//! ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
+//!
+//! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`].
+
+pub mod stages;
+
+use core::fmt;
 
 use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -23,9 +30,18 @@ const RESAMPLES: usize = 1000;
 const SEED: u64 = 0x5eed_0004;
 
 /// Samples of the hold windows.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Held {
     channels: Vec<Series>,
+}
+
+/// How many samples, not which: a derived form would print them.
+impl fmt::Debug for Held {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Held")
+            .field("counts", &self.counts())
+            .finish_non_exhaustive()
+    }
 }
 
 /// Predictions of every row of the log, channel by channel in physical units, made without the held-out samples.
@@ -120,6 +136,25 @@ impl Sums {
         } else {
             0.0
         }
+    }
+}
+
+impl Shrink {
+    /// Whether the held-out samples speak for the effect: the gap shrinks with 97.5 %, and recalibration alone does not
+    /// shrink it more. An attribution that fails this is withdrawn, whatever its evidence.
+    pub fn supports_the_effect(&self) -> bool {
+        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= 0.0
+    }
+}
+
+/// The largest shrink to be had, in percent: fitting `parameters` leaves a part `parameters / snr^2` of the excess energy
+/// (gap method, section 4.6), which a gap of `before` sigma counts as a root mean square.
+pub fn ceiling_percent(before: f64, parameters: usize, snr: f64) -> f64 {
+    let lost = (parameters as f64 / (snr * snr)).min(1.0);
+    if before - 1.0 > 0.01 && snr > 0.0 {
+        100.0 * (before - (1.0 + (before * before - 1.0) * lost).sqrt()) / (before - 1.0)
+    } else {
+        0.0
     }
 }
 
@@ -238,6 +273,35 @@ mod tests {
             after: &level(after),
             sigmas_after: &[1.0],
         })
+    }
+
+    #[test]
+    fn a_shrink_that_recalibration_beats_does_not_support_its_effect() {
+        assert!(judged(2.0, 1.0, 0.0).supports_the_effect());
+        assert!(!judged(2.0, 0.5, 1.0).supports_the_effect());
+        assert!(!judged(1.0, 1.0, 2.0).supports_the_effect());
+    }
+
+    #[test]
+    fn the_ceiling_is_all_but_what_the_fit_loses() {
+        assert!(ceiling_percent(2.0, 1, 1e6) > 99.99);
+        // Half of an excess energy of 3 is lost: sqrt(1 + 1.5) is left of 2.
+        let half = ceiling_percent(2.0, 2, 2.0);
+        assert!((half - 100.0 * (2.0 - 2.5f64.sqrt())).abs() < ROUNDING, "{half}");
+        assert_eq!(ceiling_percent(1.0, 1, 10.0), 0.0);
+    }
+
+    #[test]
+    fn printing_the_held_samples_prints_none() {
+        let series = Series {
+            rows: vec![3, 4],
+            values: vec![0.123456, 7.5],
+        };
+        let text = format!("{:?}", Held::new(vec![series]));
+        assert!(
+            text.contains('2') && !text.contains("7.5") && !text.contains("0.123"),
+            "{text}"
+        );
     }
 
     #[test]

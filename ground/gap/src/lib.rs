@@ -12,16 +12,22 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
+pub mod attitude;
 pub mod attribute;
+pub mod baseline;
 pub mod case;
 pub mod cause;
 pub mod command;
 pub mod confusion;
+pub mod contribution;
+pub mod correction;
+pub mod crossval;
 pub mod diagnose;
 pub mod evidence;
 pub mod gram;
 pub mod gross;
 pub mod held;
+pub mod imitation;
 pub mod joint;
 pub mod leftover;
 pub mod library;
@@ -30,15 +36,18 @@ pub mod model;
 pub mod next;
 pub mod onset;
 pub mod page;
+pub mod place;
 pub mod problem;
 pub mod products;
 pub mod refine;
 pub mod regime;
 pub mod scatter;
+pub mod shapley;
 pub mod sight;
 pub mod temper;
 pub mod terminal;
+pub mod trace;
 pub mod verdict;
 pub mod windows;
 
-pub use command::{Arguments, GapError, run, write_verdict};
+pub use command::{Arguments, GapError, run, write_baselines, write_verdict};

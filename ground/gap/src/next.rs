@@ -112,7 +112,7 @@ fn error(nats: f64) -> f64 {
 }
 
 /// Complementary error function of a positive number, to 1.2e-7 (Press et al., Numerical Recipes, 6.2).
-fn erfc(x: f64) -> f64 {
+pub(crate) fn erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.5 * x);
     const TERMS: [f64; 10] = [
         -1.265_512_23,

@@ -2,28 +2,42 @@
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Map, Marks, Panel};
 
-use crate::{
-    case::Subject,
-    diagnose::{Diagnosis, Trace},
-    terminal,
-};
+use crate::{case::Subject, diagnose::Diagnosis, terminal, trace::Trace};
 
-/// Effects shown in the plot of evidence.
-const SHOWN: usize = 16;
+/// Rows of a map of probabilities.
+const SHOWN: usize = 10;
+
+/// Rows of a table of shares.
+const SHARES: usize = 8;
 
 /// The page.
 ///
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn html(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Result<String, ChartError> {
-    let blocks = vec![
+    let mut blocks = vec![
         Block::Terminal(terminal::screen(subject, diagnosis, advice)),
         Block::Figure(residuals(diagnosis)?),
+        Block::Heading("Where".to_owned()),
+        Block::Text(
+            "Shares of the energy above noise and calibration; each column adds up to 100 %. Regimes: what a quantity of the \
+             motion explains of the energy from row to row (LMG)."
+                .to_owned(),
+        ),
+        shares(diagnosis),
         Block::Figure(map(diagnosis)?),
-        Block::Figure(evidence(diagnosis)?),
-        Block::Terminal(terminal::shrink(subject, diagnosis)),
-        Block::Terminal(terminal::limits(diagnosis)),
+        Block::Terminal(terminal::places(subject, diagnosis)),
+        Block::Figure(posterior(diagnosis)?),
     ];
+    if diagnosis.imitation.effects.len() > 1 {
+        blocks.push(Block::Figure(confusability(diagnosis)?));
+    }
+    blocks.extend([
+        Block::Heading("Shrink on held-out data".to_owned()),
+        Block::Terminal(terminal::shrink(subject, diagnosis)),
+        Block::Heading("Detection limits".to_owned()),
+        Block::Terminal(terminal::limits(diagnosis)),
+    ]);
     Ok(chart::html(
         &format!("Gap: {}", subject.opened.text.name),
         &subject.opened.text.about,
@@ -46,10 +60,32 @@ fn residuals(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
     Figure::of("Residuals on the fit windows", 2, &panels)
 }
 
-/// Excess energy by channel and stretch of time, before and after.
+/// Shares of the excess side by side.
+fn shares(diagnosis: &Diagnosis) -> Block {
+    let place = &diagnosis.place;
+    let columns = [
+        ("channel", &place.channels),
+        ("plate", &place.groups),
+        ("octave", &place.octaves),
+        ("regime", &place.regimes),
+    ];
+    let longest = columns.iter().map(|(_, parts)| parts.len()).max().unwrap_or(0);
+    let cell = |parts: &[(String, f64)], row: usize| match parts.get(row) {
+        Some((name, share)) => format!("{:.0} % {name}", 100.0 * share),
+        None => String::new(),
+    };
+    Block::Table {
+        columns: columns.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        rows: (0..longest.min(SHARES + 1))
+            .map(|row| columns.iter().map(|(_, parts)| cell(parts, row)).collect())
+            .collect(),
+    }
+}
+
+/// Excess energy by channel and stretch of time, before.
 fn map(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
     Figure::map(
-        "Root mean square residual by channel and time, before, in percent of the way from noise alone (0) to three sigma (100)",
+        "Residual by channel and twentieth of the fit windows, nominal twin: 0 is noise alone, 100 is three sigma or more",
         &Map {
             rows: diagnosis.cells.iter().map(|(name, _)| name.clone()).collect(),
             columns: (1..=diagnosis.cells.first().map_or(0, |(_, cells)| cells.len()))
@@ -64,26 +100,34 @@ fn map(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
     )
 }
 
-fn evidence(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
-    let bars: Vec<(f64, f64)> = diagnosis
-        .alone
-        .iter()
-        .take(SHOWN)
-        .enumerate()
-        .map(|(place, (_, gain))| (place as f64 + 1.0, *gain))
-        .collect();
-    let names: Vec<String> = diagnosis
-        .alone
-        .iter()
-        .take(SHOWN)
-        .enumerate()
-        .map(|(place, (name, _))| format!("{} {name}", place + 1))
-        .collect();
-    let panel = Panel {
-        title: names.join(", "),
-        x: Axis::linear("effect"),
-        y: Axis::linear("evidence alone [nats]"),
-        layers: vec![Layer::new("log evidence over nothing", 0, Marks::Bars(bars))],
-    };
-    Figure::of("Evidence of each effect alone, prior odds paid", 1, &[panel])
+/// What is probable: causes, alternatives, none of these.
+fn posterior(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
+    let causes = diagnosis.causes.iter().map(|cause| (cause.effect, cause.probability));
+    let others = diagnosis.alternatives.iter().copied();
+    let mut rows: Vec<(&str, f64)> = causes.chain(others).take(SHOWN).collect();
+    rows.push(("none of these", diagnosis.none_of_these));
+    Figure::map(
+        "Probability of each cause [%]; several may be there at once",
+        &Map {
+            rows: rows.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            columns: vec!["probability".to_owned()],
+            values: rows.iter().map(|(_, probability)| vec![*probability]).collect(),
+        },
+    )
+}
+
+/// Which effect can be mistaken for which.
+fn confusability(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
+    let imitation = &diagnosis.imitation;
+    let names: Vec<String> = imitation.effects.iter().map(|name| (*name).to_owned()).collect();
+    let columns = (1..=names.len()).map(|number| number.to_string()).collect();
+    let rows = names.iter().enumerate().map(|(at, name)| format!("{} {name}", at + 1));
+    Figure::map(
+        "Confusability: of the row's energy on this motion, how much the column's effect can imitate [%]",
+        &Map {
+            rows: rows.collect(),
+            columns,
+            values: imitation.shares.clone(),
+        },
+    )
 }

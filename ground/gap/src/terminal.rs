@@ -1,8 +1,17 @@
 //! The verdict on one screen.
 
+mod place;
+mod shrink;
+
 use std::fmt::Write;
 
+pub use place::{places, when};
+pub use shrink::shrink;
+
 use crate::{case::Subject, diagnose::Diagnosis};
+
+/// Columns of a screen.
+const WIDTH: usize = 118;
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
@@ -21,60 +30,64 @@ pub fn screen(subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, subject, diagnosis, next_experiment);
-    text
+    wrapped(&text)
 }
 
-/// Where the gap is: channels, shares, regimes, and what was left out.
-pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
-    let mut text = String::new();
-    for cause in &diagnosis.causes {
-        let names = subject.names(cause.channels.iter().copied()).join(" ");
-        let _ = writeln!(text, "{:>4.0} %  {names}\n        {}", 100.0 * cause.share, cause.when);
+/// Longer lines go on in the next, indented.
+fn wrapped(text: &str) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let mut width = 0;
+        for (at, word) in line.split(' ').enumerate() {
+            let length = word.chars().count();
+            if at > 0 && width + 1 + length > WIDTH {
+                out.push_str("\n        ");
+                width = 8;
+            } else if at > 0 {
+                out.push(' ');
+                width += 1;
+            }
+            out.push_str(word);
+            width += length;
+        }
+        out.push('\n');
     }
-    for aspect in diagnosis.leftover.aspects.iter().take(6) {
-        let _ = writeln!(text, "  left  {} ({:.1} sigma)", aspect.what, aspect.size);
-    }
-    text
-}
-
-/// How far it shrinks, channel by channel.
-pub fn shrink(subject: &Subject, diagnosis: &Diagnosis) -> String {
-    let shrink = &diagnosis.shrink;
-    let mut text = String::new();
-    let _ = writeln!(
-        text,
-        "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}",
-        shrink.before, shrink.recalibrated, shrink.after
-    );
-    let _ = writeln!(
-        text,
-        "shrink        {:.1} % [{:.1}, {:.1}] of the way to 1",
-        shrink.percent, shrink.interval_percent[0], shrink.interval_percent[1]
-    );
-    let _ = writeln!(
-        text,
-        "channel    before recal.  after       rms before        rms after"
-    );
-    for (channel, own) in subject.twin.unit().channels.iter().zip(&shrink.channels) {
-        let worse = if own.is_worse() { "  worse" } else { "" };
-        let _ = writeln!(
-            text,
-            "{:10} {:6.3} {:6.3} {:6.3}   {:14.6} {:16.6}{worse}",
-            channel.name, own.before, own.recalibrated, own.after, own.before_rms, own.after_rms
-        );
-    }
-    text
+    out
 }
 
 /// How large each effect could be and not be seen.
 pub fn limits(diagnosis: &Diagnosis) -> String {
     let mut text =
         String::from("a marginal signal-to-noise ratio of 5 on this log, at the place where it shows least\n");
-    for limit in &diagnosis.limits {
+    let (seen, unseen): (Vec<_>, Vec<_>) = diagnosis.limits.iter().partition(|limit| limit.size.is_finite());
+    for limit in seen {
         let _ = writeln!(
             text,
-            "{:28} {:10.3e} {:12} {} at {} ({:.2} of its usual size)",
+            "{:30} {:10.3e} {:12} {} at {} ({:.2} of its usual size)",
             limit.effect, limit.size, limit.unit, limit.parameter, limit.locality, limit.priors
+        );
+    }
+    if !unseen.is_empty() {
+        let names: Vec<&str> = unseen.iter().map(|limit| limit.effect).collect();
+        let _ = writeln!(
+            text,
+            "nothing on this log excites, somewhere at least: {}",
+            names.join(", ")
+        );
+    }
+    wrapped(&text)
+}
+
+/// Which effect, how sure, and what else it may be.
+pub fn why(subject: &Subject, diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = gross(&mut text, subject, diagnosis).and_then(|()| causes(&mut text, subject, diagnosis));
+    for (effect, key) in &diagnosis.keys {
+        let _ = writeln!(
+            text,
+            "        {effect} predicts blocks it was not fitted on by {:.1} +- {:.1} nats better",
+            key.gain, key.error
         );
     }
     text
@@ -133,7 +146,6 @@ fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
 }
 
 fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -> std::fmt::Result {
-    let shrink = &diagnosis.shrink;
     writeln!(text, "{}  {}", subject.opened.text.name, subject.opened.text.about)?;
     writeln!(
         text,
@@ -150,7 +162,36 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
         stream.lost, stream.repeated, stream.rejected, subject.unseen, subject.thinned
     )?;
+    place::line(text, diagnosis)?;
     gross(text, subject, diagnosis)?;
+    causes(text, subject, diagnosis)?;
+    held_out(text, subject, diagnosis)?;
+    if diagnosis.causes.is_empty() {
+        let weakest: Vec<String> = diagnosis
+            .limits
+            .iter()
+            .rev()
+            .take(LIMITS)
+            .map(|limit| format!("{} {:.2e} {}", limit.effect, limit.size, limit.unit))
+            .collect();
+        writeln!(
+            text,
+            "LIMITS  would be seen from: {}; all with `limits`",
+            weakest.join(", ")
+        )?;
+        let hidden = diagnosis.limits.iter().filter(|limit| limit.priors > 1.0).count();
+        if hidden > 0 {
+            writeln!(
+                text,
+                "        too weak to decide on {hidden} of {} effects: at their usual size they would not show",
+                diagnosis.limits.len()
+            )?;
+        }
+    }
+    writeln!(text, "NEXT    {next_experiment}")
+}
+
+fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
     if diagnosis.causes.is_empty() {
         let said = if diagnosis.none_of_these > 0.5 {
             "NONE OF THESE: nothing in the library explains what is there"
@@ -229,9 +270,18 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     {
         writeln!(text, "        left: {} ({:.1} sigma)", aspect.what, aspect.size)?;
     }
+    Ok(())
+}
+
+/// The held-out gap in three lines: channels, attitude, what got worse.
+fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
+    let shrink = &diagnosis.shrink;
+    let ceiling = diagnosis
+        .ceiling_percent
+        .map_or(String::new(), |percent| format!(" of at most {percent:.1} %"));
     writeln!(
         text,
-        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibration alone {:.3}); {:.1} % [{:.1}, {:.1}]",
+        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibration alone {:.3}, floor 1); {:.1} % [{:.1}, {:.1}]{ceiling}",
         shrink.before,
         shrink.after,
         shrink.recalibrated,
@@ -239,6 +289,16 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         shrink.interval_percent[0],
         shrink.interval_percent[1]
     )?;
+    for stage in diagnosis.stages.iter().filter(|stage| stage.unit == "deg") {
+        let corrected = stage
+            .corrected
+            .map_or(String::new(), |error| format!("; by the calibration set {error:.3}"));
+        writeln!(
+            text,
+            "        {}: {:.3} -> {:.3} deg (floor {:.3}){corrected}",
+            stage.name, stage.before, stage.after, stage.floor
+        )?;
+    }
     let units = &subject.twin.unit().channels;
     let worse: Vec<&str> = units
         .iter()
@@ -249,19 +309,24 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     if !worse.is_empty() {
         writeln!(text, "        worse: {}", worse.join(" "))?;
     }
-    if diagnosis.causes.is_empty() {
-        let weakest: Vec<String> = diagnosis
-            .limits
-            .iter()
-            .rev()
-            .take(LIMITS)
-            .map(|limit| format!("{} {:.2e} {}", limit.effect, limit.size, limit.unit))
-            .collect();
-        writeln!(
-            text,
-            "LIMITS  would be seen from: {}; all with `limits`",
-            weakest.join(", ")
-        )?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lines_go_on_indented_and_lose_no_word() {
+        let line = format!("NEXT    {}", "word ".repeat(60));
+        let found = wrapped(&line);
+        assert!(found.lines().all(|line| line.chars().count() <= WIDTH), "{found}");
+        assert_eq!(found.matches("word").count(), 60);
+        assert!(
+            found
+                .lines()
+                .nth(1)
+                .is_some_and(|line| line.starts_with("        word"))
+        );
     }
-    writeln!(text, "NEXT    {next_experiment}")
 }

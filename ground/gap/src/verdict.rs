@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{case::Subject, diagnose::Diagnosis};
+use crate::{case::Subject, diagnose::Diagnosis, terminal};
+
+/// Share of the excess that the channels named for an unexplained residual hold together.
+const MOST_OF_IT: f64 = 0.8;
 
 /// The whole file.
 #[derive(Debug, Serialize)]
@@ -85,7 +88,7 @@ impl Verdict {
             })
             .collect();
         if places.is_empty() && diagnosis.none_of_these > 0.5 {
-            places.extend(unexplained(subject, diagnosis));
+            places.extend(unexplained(diagnosis));
         }
         Verdict {
             case: subject.opened.text.name.clone(),
@@ -167,22 +170,22 @@ fn of_cause(subject: &Subject, cause: &crate::cause::Cause) -> Cause {
     }
 }
 
-/// Where an unexplained residual shows: channels by the square of how far they stand out.
-fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Option<Place> {
-    let mut sizes: BTreeMap<usize, f64> = BTreeMap::new();
-    for aspect in &diagnosis.leftover.aspects {
-        if let Some(channel) = aspect.channel {
-            let size = sizes.entry(channel).or_default();
-            *size = size.max(aspect.size);
+/// Where an unexplained residual shows: the channels that hold most of the excess, and their share of it.
+fn unexplained(diagnosis: &Diagnosis) -> Option<Place> {
+    let (mut channels, mut share) = (Vec::new(), 0.0);
+    for (name, part) in &diagnosis.place.channels {
+        if share >= MOST_OF_IT || *part <= 0.0 {
+            break;
         }
+        channels.push(name.clone());
+        share += part;
     }
-    let most = sizes.values().copied().fold(0.0, f64::max);
-    let mut channels: Vec<(usize, f64)> = sizes.into_iter().filter(|(_, size)| *size > 0.5 * most).collect();
-    channels.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let first = diagnosis.leftover.aspects.first()?;
-    Some(Place {
-        channels: subject.names(channels.into_iter().map(|(channel, _)| channel)),
-        share: 1.0,
-        when: first.what.clone(),
+    let passage = diagnosis.place.passage.as_ref().map(terminal::when);
+    let aspect = diagnosis.leftover.aspects.first().map(|aspect| aspect.what.clone());
+    let when = [aspect, passage].into_iter().flatten().collect::<Vec<_>>().join("; ");
+    (!channels.is_empty()).then(|| Place {
+        channels,
+        share: rounded(share, 3),
+        when,
     })
 }

@@ -4,12 +4,14 @@ use std::{fmt::Write, fs};
 
 use gap::{
     case::Subject,
+    command::taught,
     diagnose::{Diagnosis, diagnose},
     terminal,
     verdict::Verdict,
 };
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use serde_json::Value;
 use tempfile::TempDir;
 
 /// [s] of the log, at [`RATE_HZ`].
@@ -33,8 +35,8 @@ fit = [[0.0, 120.0]]
 hold = [[120.0, 240.0]]
 "#;
 
-/// Three gyros along the axes of b, turning about x, y and z in turn; gz reads `scale` too much.
-fn case(scale: f64) -> TempDir {
+/// Three gyros along the axes of b, turning about z; gz reads `scale` of the time [s] too much.
+fn case(scale: impl Fn(f64) -> f64) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros\"\n".to_owned();
     for (name, axis) in [
@@ -70,7 +72,7 @@ fn case(scale: f64) -> TempDir {
             "{t:.1},{:.7},{:.7},{:.7}",
             earth * angle.cos() + noise(),
             -earth * angle.sin() + noise(),
-            (1.0 + scale) * rate + noise()
+            (1.0 + scale(t)) * rate + noise()
         );
     }
     for (name, text) in [
@@ -84,17 +86,19 @@ fn case(scale: f64) -> TempDir {
     folder
 }
 
-fn diagnosed(scale: f64, withheld: &[&str]) -> (Subject, Diagnosis) {
-    let folder = case(scale);
+fn diagnosed_in(folder: &TempDir) -> (Subject, Diagnosis) {
     let subject = Subject::open(folder.path()).expect("opens");
-    let withheld: Vec<String> = withheld.iter().map(|name| (*name).to_owned()).collect();
-    let diagnosis = diagnose(&subject, &withheld, &|_, _| {});
+    let diagnosis = diagnose(&subject, &[], &|_, _| {});
     (subject, diagnosis)
+}
+
+fn diagnosed(scale: f64) -> (Subject, Diagnosis) {
+    diagnosed_in(&case(|_| scale))
 }
 
 #[test]
 fn a_scale_error_is_found_sized_and_shrunk() {
-    let (subject, diagnosis) = diagnosed(0.02, &[]);
+    let (subject, diagnosis) = diagnosed(0.02);
     let cause = diagnosis.causes.first().expect("a cause");
     assert_eq!(subject.names(cause.channels.iter().copied()), ["gz"]);
     let likely: Vec<&str> = diagnosis
@@ -122,7 +126,7 @@ fn a_scale_error_is_found_sized_and_shrunk() {
 
 #[test]
 fn a_healthy_unit_needs_nothing() {
-    let (subject, diagnosis) = diagnosed(0.0, &[]);
+    let (subject, diagnosis) = diagnosed(0.0);
     assert!(diagnosis.causes.is_empty() && diagnosis.withdrawn.is_empty());
     assert!(diagnosis.none_of_these < 0.1, "{}", diagnosis.none_of_these);
     let screen = terminal::screen(&subject, &diagnosis, "none");
@@ -130,32 +134,115 @@ fn a_healthy_unit_needs_nothing() {
 }
 
 #[test]
-fn the_verdict_has_every_key_of_the_format() {
-    let (subject, diagnosis) = diagnosed(0.02, &[]);
-    let text = serde_json::to_string(&Verdict::new(&subject, &diagnosis, "next".to_owned())).expect("finite");
-    let verdict: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    let keys = [
-        "case",
-        "format",
-        "gap",
-        "where",
-        "causes",
-        "alternatives",
-        "indistinguishable",
-        "none_of_these",
-        "next_experiment",
-        "shrink",
-    ];
-    for key in keys {
-        assert!(verdict.get(key).is_some(), "{key}");
-    }
-    assert_eq!(verdict["format"], "gap-verdict/1");
+fn a_scale_that_is_gone_in_the_hold_windows_is_withdrawn() {
+    let (subject, diagnosis) = diagnosed_in(&case(|t_s| if t_s < 120.0 { 0.02 } else { 0.0 }));
+    assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
+    assert!(!diagnosis.withdrawn.is_empty());
+    let screen = terminal::screen(&subject, &diagnosis, "");
+    assert!(screen.contains("withdrawn"), "{screen}");
+    // What is judged then is the twin without it.
+    assert_eq!(diagnosis.ceiling_percent, None);
+    assert!(diagnosis.correction.is_none() && diagnosis.known.is_empty());
+}
+
+#[test]
+fn a_twin_taught_the_effect_needs_nothing_more() {
+    let folder = case(|_| 0.02);
+    let (subject, diagnosis) = diagnosed_in(&folder);
+    let unit = taught(&subject, &diagnosis);
+    assert_eq!(unit.effects.len(), 1);
+    fs::write(folder.path().join("unit.toml"), unit.text()).expect("a file");
+    let (_, again) = diagnosed_in(&folder);
+    assert!(again.causes.is_empty(), "{:?}", again.causes);
+    // The gap of the fit is that of its noise: 1800 samples, three standard deviations.
     assert!(
-        verdict["causes"][0]["parameters"]
-            .as_object()
-            .is_some_and(|parameters| !parameters.is_empty())
+        diagnosis.gap > 1.5 && (again.gap - 1.0).abs() < 0.05,
+        "{} {}",
+        diagnosis.gap,
+        again.gap
     );
-    for key in ["hold_before", "hold_recalibrated", "hold_after", "percent"] {
-        assert!(verdict["shrink"][key].is_f64(), "{key}");
+}
+
+#[test]
+fn what_the_unit_can_correct_is_an_entry_of_its_calibration_set() {
+    let (subject, diagnosis) = diagnosed(0.02);
+    let correction = diagnosis.correction.as_ref().expect("a scale is the unit's to correct");
+    let text = correction.set(&subject.twin).expect("text");
+    let set = bench::set::Set::parse(&text).expect("a calibration set");
+    let entry = set.channels.iter().find(|entry| entry.name == "gz").expect("gz");
+    assert!((entry.sensitivity().norm() - 1.02).abs() < 0.002, "{text}");
+    let rate = diagnosis
+        .stages
+        .iter()
+        .find(|stage| stage.name == "rate")
+        .expect("three gyros");
+    assert!(
+        rate.after < 0.7 * rate.before && rate.percent.is_some_and(|percent| percent > 80.0),
+        "{rate:?}"
+    );
+    let corrected = rate.corrected.expect("corrected");
+    assert!(
+        corrected < 0.7 * rate.before && corrected > 0.9 * rate.floor,
+        "{rate:?}"
+    );
+}
+
+/// `verdict.json` as the format's page prints it.
+const FORMAT: &str = r#"{ "case": "S07", "format": "gap-verdict/1",
+  "gap":  { "before": 7.41, "floor": 1.00, "units": "sigma" },
+  "where": [ { "channels": ["g2"], "share": 0.83, "when": "rate about y above 60 deg/s" } ],
+  "causes": [ { "effect": "gyro-scale", "channels": ["g2"], "probability": 0.97,
+                "parameters": { "scale_error": { "value": 0.0123, "sigma": 0.0004, "unit": "1" } } } ],
+  "alternatives": [ { "effect": "gyro-nonlinearity", "probability": 0.02 } ],
+  "indistinguishable": [ ["gyro-scale", "reference-scale"] ],
+  "none_of_these": 0.01,
+  "next_experiment": "next",
+  "shrink": { "hold_before": 7.35, "hold_recalibrated": 6.90, "hold_after": 1.08, "percent": 98.7, "interval_percent": [98.1, 99.1] } }"#;
+
+/// Compares shapes: the same keys everywhere, values of the same type. Lists are compared by their first elements, and the
+/// names of parameters are the effect's own.
+fn check_shape(expected: &Value, found: &Value, at: &str) {
+    match (expected, found) {
+        (Value::Object(expected), Value::Object(found)) if at.ends_with("/parameters") => {
+            let first = |map: &serde_json::Map<String, Value>| map.values().next().cloned().expect("a parameter");
+            check_shape(&first(expected), &first(found), &format!("{at}/*"));
+        }
+        (Value::Object(expected), Value::Object(found)) => {
+            let keys = |map: &serde_json::Map<String, Value>| map.keys().cloned().collect::<Vec<_>>();
+            assert_eq!(keys(expected), keys(found), "{at}");
+            for (key, value) in expected {
+                check_shape(value, &found[key], &format!("{at}/{key}"));
+            }
+        }
+        (Value::Array(expected), Value::Array(found)) => {
+            if let (Some(expected), Some(found)) = (expected.first(), found.first()) {
+                check_shape(expected, found, &format!("{at}/0"));
+            }
+        }
+        (Value::Number(_), Value::Number(_)) | (Value::String(_), Value::String(_)) => {}
+        _ => panic!("{at}: {found} where the format has {expected}"),
+    }
+}
+
+#[test]
+fn the_verdict_is_exactly_the_formats() {
+    let (subject, diagnosis) = diagnosed(0.02);
+    let text = serde_json::to_string(&Verdict::new(&subject, &diagnosis, "next".to_owned())).expect("finite");
+    let found: Value = serde_json::from_str(&text).expect("JSON");
+    let format: Value = serde_json::from_str(FORMAT).expect("JSON");
+    check_shape(&format, &found, "");
+    assert_eq!(found["format"], format["format"]);
+    assert_eq!(found["gap"]["units"], "sigma");
+    let probabilities = found["causes"]
+        .as_array()
+        .expect("causes")
+        .iter()
+        .chain(found["alternatives"].as_array().expect("alternatives"));
+    for named in probabilities {
+        let probability = named["probability"].as_f64().expect("a number");
+        assert!(
+            (0.0..=1.0).contains(&probability)
+                && twin::effect::by_name(named["effect"].as_str().expect("a name")).is_some()
+        );
     }
 }

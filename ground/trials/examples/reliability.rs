@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             });
         }
     }
-    println!("\n{}", markdown(&table(&judged)));
+    println!("\n{}", markdown(&[("diagnosis".into(), table(&judged))]));
     reliability(&judged);
     Ok(())
 }

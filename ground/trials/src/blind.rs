@@ -19,13 +19,15 @@ use crate::{
     answer::Answer,
     deal::{self, DealError, Ring},
     draw::Draw,
-    score::{self, Judged, Verdict},
+    score::{self, Judged, Line, Verdict},
 };
 
 /// Hashes of the answers.
 const MANIFEST: &str = "manifest.json";
 /// Hashes of the verdicts.
 const ANSWERED: &str = "answered.json";
+/// The revealed answer of a case, in its folder.
+const ANSWER: &str = "answer.json";
 /// The verdict on a case, in its folder.
 pub const VERDICT: &str = "verdict.json";
 
@@ -48,6 +50,9 @@ pub enum BlindError {
         /// Why.
         source: serde_json::Error,
     },
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] chart::ChartError),
     /// A case was not dealt.
     #[error(transparent)]
     Deal(#[from] DealError),
@@ -59,6 +64,12 @@ pub enum BlindError {
         /// The list of hashes.
         manifest: &'static str,
     },
+    /// Answers are asked for before the verdicts were published.
+    #[error("{0} does not exist: publish the verdicts with `answer` before the answers are revealed")]
+    Unanswered(PathBuf),
+    /// Verdicts are published after the answers were revealed.
+    #[error("{0} is revealed: verdicts given after that prove nothing")]
+    Revealed(PathBuf),
     /// A case was revealed that is not in the manifest, or the other way round.
     #[error("{0} lists other cases than there are answers for: commit before revealing")]
     Other(PathBuf),
@@ -131,10 +142,14 @@ pub fn commit(folder: &Path, answers: &Path) -> Result<(), BlindError> {
 /// Publishes the hashes of the verdicts that stand in the cases' folders.
 ///
 /// # Errors
-/// When a file cannot be read or written.
+/// When an answer is revealed already, or a file cannot be read or written.
 pub fn answer(folder: &Path) -> Result<usize, BlindError> {
     let mut hashes = BTreeMap::new();
     for case in cases(folder)? {
+        let revealed = case.join(ANSWER);
+        if revealed.exists() {
+            return Err(BlindError::Revealed(revealed));
+        }
         let verdict = case.join(VERDICT);
         if verdict.exists() {
             hashes.insert(stem(&case), hash(&read(&verdict)?));
@@ -144,11 +159,16 @@ pub fn answer(folder: &Path) -> Result<usize, BlindError> {
     Ok(hashes.len())
 }
 
-/// Puts the answers beside the cases, after checking that they are those that were committed to.
+/// Puts the answers beside the cases, after checking that the verdicts are published and that the answers are those that
+/// were committed to.
 ///
 /// # Errors
-/// When an answer is not the one that was committed to.
+/// When the verdicts are not published, or an answer is not the one that was committed to.
 pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
+    let answered = folder.join(ANSWERED);
+    if !answered.exists() {
+        return Err(BlindError::Unanswered(answered));
+    }
     let manifest_path = folder.join(MANIFEST);
     let manifest: BTreeMap<String, String> = parse(&manifest_path)?;
     let kept = files(answers)?;
@@ -163,22 +183,22 @@ pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
             });
         }
         let bytes = read(&path)?;
-        let shown = folder.join(stem(&path)).join("answer.json");
+        let shown = folder.join(stem(&path)).join(ANSWER);
         fs::write(&shown, bytes).map_err(|source| BlindError::File { path: shown, source })?;
     }
     Ok(())
 }
 
-/// The table of revealed cases, all hashes checked.
+/// Revealed cases with their verdicts, all hashes checked.
 ///
 /// # Errors
 /// When a verdict or an answer was changed after its hash was published.
-pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
+pub fn judged(folder: &Path) -> Result<Vec<Judged>, BlindError> {
     let manifest: BTreeMap<String, String> = parse(&folder.join(MANIFEST))?;
     let answered: BTreeMap<String, String> = parse(&folder.join(ANSWERED))?;
     let mut judged = Vec::new();
     for (name, published) in manifest {
-        let path = folder.join(&name).join("answer.json");
+        let path = folder.join(&name).join(ANSWER);
         if answer_hash(&path)? != published {
             return Err(BlindError::Changed {
                 path,
@@ -202,7 +222,49 @@ pub fn score(folder: &Path) -> Result<(String, Vec<Judged>), BlindError> {
             verdict,
         });
     }
-    Ok((score::markdown(&score::table(&judged)), judged))
+    Ok(judged)
+}
+
+/// Revealed cases with the effects that are in them.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn revealed(folder: &Path) -> Result<Vec<(PathBuf, Vec<String>)>, BlindError> {
+    let mut revealed = Vec::new();
+    for case in cases(folder)? {
+        let path = case.join(ANSWER);
+        if path.exists() {
+            let kept: Kept = parse(&path)?;
+            let effects = kept.answer.effects.into_iter().map(|cause| cause.effect).collect();
+            revealed.push((case, effects));
+        }
+    }
+    Ok(revealed)
+}
+
+/// The tables of the diagnosis and of every baseline that left a `verdict-NAME.json`, by name.
+///
+/// # Errors
+/// When a verdict cannot be read.
+pub fn tools(folder: &Path, judged: &[Judged]) -> Result<Vec<(String, Vec<Line>)>, BlindError> {
+    let mut names: Vec<String> = Vec::new();
+    for case in cases(folder)? {
+        for path in files(&case)? {
+            let name = stem(&path).strip_prefix("verdict-").map(str::to_owned);
+            names.extend(name.filter(|name| !names.contains(name)));
+        }
+    }
+    names.sort();
+    let mut tools = vec![("diagnosis".to_owned(), score::table(judged))];
+    for name in names {
+        let mut others = judged.to_vec();
+        for other in &mut others {
+            let path = folder.join(&other.answer.case).join(format!("verdict-{name}.json"));
+            other.verdict = if path.exists() { Some(parse(&path)?) } else { None };
+        }
+        tools.push((name, score::table(&others)));
+    }
+    Ok(tools)
 }
 
 /// A case in one line: what it was, what was said.
@@ -312,41 +374,4 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), BlindError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_changed_after_its_hash_was_published_is_found() {
-        let place = tempfile::tempdir().expect("a folder");
-        let (folder, answers) = (place.path().join("cases"), place.path().join("answers"));
-        let hand = Hand {
-            r0: 1,
-            r1: 0,
-            r3: 0,
-            r4: 0,
-        };
-        make(&folder).expect("a folder");
-        deal(&folder, &answers, hand, 1).expect("dealt");
-        commit(&folder, &answers).expect("committed");
-        let verdict = folder.join("T001").join(VERDICT);
-        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.0}"#).expect("written");
-        assert_eq!(answer(&folder).expect("answered"), 1);
-        reveal(&folder, &answers).expect("revealed");
-        let (table, judged) = score(&folder).expect("scored");
-        assert!(table.contains("| false name, nothing wrong | 1 | 0.000 |"), "{table}");
-        assert_eq!(judged.len(), 1);
-
-        fs::write(&verdict, r#"{"causes":[],"none_of_these":0.1}"#).expect("written");
-        assert!(matches!(
-            score(&folder),
-            Err(BlindError::Changed { manifest: ANSWERED, .. })
-        ));
-        let kept = answers.join("T001.json");
-        let other = fs::read_to_string(&kept).expect("kept").replace("\"R0\"", "\"R1\"");
-        fs::write(&kept, other).expect("written");
-        assert!(matches!(
-            reveal(&folder, &answers),
-            Err(BlindError::Changed { manifest: MANIFEST, .. })
-        ));
-    }
-}
+mod tests;

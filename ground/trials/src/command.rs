@@ -8,10 +8,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use chart::Block;
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::blind::{self, BlindError, Hand, VERDICT};
+use crate::{
+    blind::{self, BlindError, Hand, VERDICT},
+    reliability::Reliability,
+    score,
+};
 
 /// Runs a blind challenge on the diagnosis, or on any other that reads cases and writes verdicts
 #[derive(Args)]
@@ -66,7 +71,12 @@ enum Step {
         #[arg(long)]
         answers: PathBuf,
     },
-    /// Scores verdicts against revealed answers, if neither was changed since its hash was published
+    /// Has simpler methods, and an oracle that knows the effects, judge the revealed cases too, for `score` to set beside
+    Baselines {
+        /// Folder of the cases
+        folder: PathBuf,
+    },
+    /// Scores verdicts against revealed answers, if neither was changed since its hash was published; leaves report.html
     Score {
         /// Folder of the cases
         folder: PathBuf,
@@ -76,11 +86,14 @@ enum Step {
 /// Writes verdict.json into the folder of a case.
 pub type Diagnose = dyn Fn(&Path) -> Result<(), Box<dyn Error>>;
 
+/// Writes `verdict-NAME.json` of every baseline into the folder of a case whose effects are these.
+pub type Baselines = dyn Fn(&Path, &[String]) -> Result<(), Box<dyn Error>>;
+
 /// Takes a step of the protocol; `diagnose` is asked for cases without a verdict.
 ///
 /// # Errors
 /// When a file cannot be read or written, or was changed after its hash was published.
-pub fn run(arguments: &Arguments, diagnose: &Diagnose) -> Result<(), BlindError> {
+pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) -> Result<(), BlindError> {
     match &arguments.step {
         Step::Deal {
             folder,
@@ -102,15 +115,53 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose) -> Result<(), BlindError>
         Step::Commit { folder, answers } => blind::commit(folder, answers),
         Step::Answer { folder } => answer(folder, diagnose),
         Step::Reveal { folder, answers } => blind::reveal(folder, answers),
-        Step::Score { folder } => {
-            let (table, judged) = blind::score(folder)?;
-            for case in judged {
-                println!("{}", blind::line(&case));
+        Step::Baselines { folder } => {
+            let revealed = blind::revealed(folder)?;
+            let progress = bar(revealed.len());
+            for (case, effects) in revealed {
+                progress.set_message(case.display().to_string());
+                if let Err(error) = baselines(&case, &effects) {
+                    progress.suspend(|| eprintln!("{}: {error}", case.display()));
+                }
+                progress.inc(1);
             }
-            println!("\n{table}");
+            progress.finish_and_clear();
             Ok(())
         }
+        Step::Score { folder } => score(folder),
     }
+}
+
+fn bar(length: usize) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta}").unwrap_or(ProgressStyle::default_bar());
+    ProgressBar::new(length as u64).with_style(style)
+}
+
+fn score(folder: &Path) -> Result<(), BlindError> {
+    let judged = blind::judged(folder)?;
+    let lines: Vec<String> = judged.iter().map(blind::line).collect();
+    let tools = blind::tools(folder, &judged)?;
+    let table = score::markdown(&tools);
+    println!("{}\n\n{table}", lines.join("\n"));
+    let stated = Reliability::of(&judged);
+    let blocks = [
+        Block::Figure(stated.figure()?),
+        Block::Terminal(table),
+        Block::Terminal(lines.join("\n")),
+    ];
+    let page = chart::html(
+        "Trials of the diagnosis",
+        "Cases whose cause was withheld, scored.",
+        &blocks,
+    );
+    let path = folder.join("report.html");
+    std::fs::write(&path, page).map_err(|source| BlindError::File {
+        path: path.clone(),
+        source,
+    })?;
+    println!("{}", path.display());
+    Ok(())
 }
 
 fn answer(folder: &Path, diagnose: &Diagnose) -> Result<(), BlindError> {
@@ -118,9 +169,7 @@ fn answer(folder: &Path, diagnose: &Diagnose) -> Result<(), BlindError> {
         .into_iter()
         .filter(|case| !case.join(VERDICT).exists())
         .collect();
-    let style =
-        ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta}").unwrap_or(ProgressStyle::default_bar());
-    let progress = ProgressBar::new(open.len() as u64).with_style(style);
+    let progress = bar(open.len());
     for case in open {
         progress.set_message(case.display().to_string());
         if let Err(error) = diagnose(&case) {

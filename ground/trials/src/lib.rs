@@ -14,6 +14,7 @@ mod draw;
 mod flight;
 pub mod interval;
 pub mod motion;
+pub mod reliability;
 pub mod scene;
 pub mod score;
 mod sensitivity;

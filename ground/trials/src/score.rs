@@ -6,45 +6,12 @@
 
 use std::fmt::Write as _;
 
-use serde::Deserialize;
+mod verdict;
+
+use verdict::LARGEST_SET;
+pub use verdict::{Named, Shrink, Verdict};
 
 use crate::{answer::Answer, interval::clopper_pearson};
-
-/// What of verdict.json is scored; unknown fields are passed over.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Verdict {
-    /// Causes, the likeliest first; none when the twin needs nothing or nothing is named.
-    pub causes: Vec<Named>,
-    /// Other names with their probability.
-    pub alternatives: Vec<Named>,
-    /// Sets that this motion cannot tell apart.
-    pub indistinguishable: Vec<Vec<String>>,
-    /// Probability that something outside the library is needed.
-    pub none_of_these: f64,
-    /// What became of the gap on the hold window.
-    pub shrink: Option<Shrink>,
-}
-
-/// A name with its probability.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Named {
-    /// The effect.
-    pub effect: String,
-    /// Where.
-    pub channels: Vec<String>,
-    /// How sure.
-    pub probability: f64,
-}
-
-/// Shrinkage on the hold window.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct Shrink {
-    /// Of the gap above its floor.
-    pub percent: Option<f64>,
-}
 
 /// A case with what was said about it.
 #[derive(Clone, Debug)]
@@ -55,54 +22,8 @@ pub struct Judged {
     pub verdict: Option<Verdict>,
 }
 
-/// Names are said from this probability on.
-const SAID: f64 = 0.5;
-
-/// Alternatives from this probability on belong to the declared set, which holds at most [`LARGEST_SET`] names.
-const IN_SET: f64 = 0.05;
-const LARGEST_SET: usize = 3;
-
 /// Effects of at least this size are expected to be found.
 const MARGINAL_SNR: f64 = 8.0;
-
-impl Verdict {
-    fn said(&self) -> impl Iterator<Item = &Named> {
-        self.causes.iter().filter(|cause| cause.probability >= SAID)
-    }
-
-    fn is_unknown(&self) -> bool {
-        self.none_of_these >= SAID
-    }
-
-    fn declared(&self) -> Vec<&str> {
-        let mut set: Vec<&str> = self.causes.iter().take(1).map(|cause| cause.effect.as_str()).collect();
-        for group in &self.indistinguishable {
-            if set.first().is_some_and(|first| group.iter().any(|name| name == first)) {
-                set.extend(group.iter().map(String::as_str));
-            }
-        }
-        set.extend(
-            self.alternatives
-                .iter()
-                .filter(|named| named.probability >= IN_SET)
-                .map(|named| named.effect.as_str()),
-        );
-        let mut distinct: Vec<&str> = Vec::new();
-        for name in set {
-            if !distinct.contains(&name) {
-                distinct.push(name);
-            }
-        }
-        distinct
-    }
-
-    fn probability_of(&self, name: &str) -> f64 {
-        let all = self.causes.iter().chain(&self.alternatives);
-        all.filter(|named| named.effect == name)
-            .map(|named| named.probability)
-            .fold(0.0, f64::max)
-    }
-}
 
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq)]
@@ -308,17 +229,31 @@ fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
     ]
 }
 
-/// The table as Markdown.
-pub fn markdown(lines: &[Line]) -> String {
-    let mut text = String::from("| figure | cases | value | 95 % interval | target |\n|---|---:|---:|---|---|\n");
-    for line in lines {
+/// The tables of several tools side by side as Markdown; intervals are those of the first.
+pub fn markdown(tools: &[(String, Vec<Line>)]) -> String {
+    let Some(((first, lines), others)) = tools.split_first() else {
+        return String::new();
+    };
+    let names: String = others.iter().map(|(name, _)| format!(" {name} |")).collect();
+    let rules = "---:|".repeat(others.len());
+    let mut text =
+        format!("| figure | cases | {first} | 95 % interval | target |{names}\n|---|---:|---:|---|---|{rules}\n");
+    for (at, line) in lines.iter().enumerate() {
         let interval = line
             .interval
             .map_or(String::new(), |(least, most)| format!("{least:.3} to {most:.3}"));
+        let beside: String = others
+            .iter()
+            .map(|(_, lines)| {
+                lines
+                    .get(at)
+                    .map_or(" |".to_owned(), |line| format!(" {:.3} |", line.value))
+            })
+            .collect();
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| {} | {} | {:.3} | {interval} | {} |",
+            "| {} | {} | {:.3} | {interval} | {} |{beside}",
             line.what, line.trials, line.value, line.target
         );
     }
@@ -326,92 +261,4 @@ pub fn markdown(lines: &[Line]) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::answer::Cause;
-
-    fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
-        let cause = |name: &&str| Cause {
-            effect: name.to_string(),
-            in_library: true,
-            channels: vec!["g1".into()],
-            strength: 1.0,
-        };
-        Judged {
-            answer: Answer {
-                case: "T".into(),
-                ring: ring.into(),
-                seed: 0,
-                effects: truth.iter().map(cause).collect(),
-                snr_marginal: 20.0,
-            },
-            verdict: verdict.map(|text| serde_json::from_str(text).expect("a verdict")),
-        }
-    }
-
-    fn value(lines: &[Line], what: &str) -> f64 {
-        lines.iter().find(|line| line.what == what).expect(what).value
-    }
-
-    const RIGHT: &str = r#"{"causes":[{"effect":"gyro-bias","channels":["g1"],"probability":0.9}],"none_of_these":0.02,
-        "alternatives":[{"effect":"gyro-g2","probability":0.08}],"shrink":{"percent":97.0}}"#;
-    const WRONG: &str = r#"{"causes":[{"effect":"gyro-g2","channels":["g1","g2"],"probability":0.9}],
-        "indistinguishable":[["gyro-bias","gyro-g2"]],"none_of_these":0.0}"#;
-    const UNKNOWN: &str = r#"{"causes":[],"none_of_these":0.9}"#;
-    const NOTHING: &str = r#"{"causes":[],"none_of_these":0.01}"#;
-
-    #[test]
-    fn right_and_wrong_names_are_told_apart() {
-        let lines = table(&[
-            judged("R1", &["gyro-bias"], Some(RIGHT)),
-            judged("R1", &["gyro-bias"], Some(WRONG)),
-        ]);
-        assert_eq!(value(&lines, "top-1"), 0.5);
-        assert_eq!(value(&lines, "truth in declared set of at most 3"), 1.0);
-        assert_eq!(value(&lines, "gap detected (one effect)"), 1.0);
-        assert_eq!(value(&lines, "mean probability on the truth"), 0.45);
-        assert!((value(&lines, "localisation F1 (channels)") - (1.0 + 2.0 / 3.0) / 2.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_name_where_there_is_none_is_false() {
-        let lines = table(&[
-            judged("R0", &[], Some(RIGHT)),
-            judged("R0", &[], Some(NOTHING)),
-            judged("R3", &["slow-tone"], Some(RIGHT)),
-            judged("R3", &["slow-tone"], Some(UNKNOWN)),
-        ]);
-        assert_eq!(value(&lines, "false name, nothing wrong"), 0.5);
-        assert_eq!(value(&lines, "unknown called, nothing wrong"), 0.0);
-        assert_eq!(value(&lines, "false name, novel"), 0.5);
-        assert_eq!(value(&lines, "none of these, novel"), 0.5);
-    }
-
-    #[test]
-    fn giving_up_counts_against_the_tool() {
-        let lines = table(&[
-            judged("R0", &[], None),
-            judged("R1", &["gyro-bias"], None),
-            judged("R3", &["slow-tone"], None),
-        ]);
-        for (what, worst) in [
-            ("false name, nothing wrong", 1.0),
-            ("top-1", 0.0),
-            ("false name, novel", 1.0),
-            ("none of these, novel", 0.0),
-        ] {
-            assert_eq!(value(&lines, what), worst, "{what}");
-        }
-    }
-
-    #[test]
-    fn two_effects_are_counted_one_by_one() {
-        let both = r#"{"causes":[{"effect":"gyro-bias","probability":0.9},{"effect":"lever-arm","probability":0.9}]}"#;
-        let lines = table(&[
-            judged("R4", &["gyro-bias", "hard-iron"], Some(both)),
-            judged("R4", &["gyro-bias", "lever-arm"], Some(both)),
-        ]);
-        assert_eq!(value(&lines, "two effects: precision"), 0.75);
-        assert_eq!(value(&lines, "two effects: recall"), 0.75);
-    }
-}
+mod tests;

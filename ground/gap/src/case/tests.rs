@@ -134,6 +134,49 @@ fn a_motion_that_ends_before_the_log_is_refused() {
 }
 
 #[test]
+fn clocks_that_never_meet_are_refused() {
+    let later = motion(6)
+        .replace("t_s", "T")
+        .replace('\n', "\n100")
+        .replace("T,", "t_s,");
+    let later = later.trim_end_matches("100");
+    check(
+        "motion.csv",
+        Some(later),
+        &["motion.csv", "t_s", "runs from 100", "0 %"],
+    );
+}
+
+#[test]
+fn a_channel_that_packets_do_not_have_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+    put("case.toml", &CASE.replace("\"csv\"", "\"packets\""));
+    put("unit.toml", &UNIT.replace("[[channel]]", "cycle_s = 0.2\n[[channel]]"));
+    put("measured.csv", "");
+    put("motion.csv", &motion(6));
+    let error = Subject::open(folder.path()).err().expect("an error").to_string();
+    assert!(
+        error.contains("measured.csv") && error.contains("gz") && error.contains("packets"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_unknown_unit_of_measure_or_key_of_the_unit_is_named() {
+    check(
+        "unit.toml",
+        Some(&UNIT.replace("noise_sigma", "noise_sigma_dps")),
+        &["unit.toml", "noise_sigma_dps"],
+    );
+    check(
+        "unit.toml",
+        Some(&UNIT.replace("\"gyro\"", "\"barometer\"")),
+        &["unit.toml", "barometer"],
+    );
+}
+
+#[test]
 fn channels_and_columns_must_be_the_same() {
     check(
         "measured.csv",

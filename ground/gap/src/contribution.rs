@@ -1,0 +1,51 @@
+//! What each of several effects contributes, where they overlap: shares of the excess that add up.
+//!
+//! In: the chosen effects. Out: an energy for each, the Shapley value ([`crate::shapley`]) of what every set of them takes
+//! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
+
+use crate::{
+    attribute::Attribution,
+    cause::Cause,
+    library::Library,
+    model::Model,
+    problem::Problem,
+    refine::{model_of, refine},
+    shapley,
+};
+
+/// Effects for which every set is fitted: 32 fits.
+const MOST: usize = 5;
+
+/// Replaces the causes' energies by their contributions. The causes are the chosen effects, in their order; one alone keeps
+/// its own.
+pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes: &mut [Cause]) {
+    let chosen = &found.chosen;
+    if chosen.len() < 2 || chosen.len() > MOST || causes.len() != chosen.len() {
+        return;
+    }
+    let left = |set: u32| {
+        let members: Vec<&crate::attribute::Chosen> = (0..chosen.len())
+            .filter(|at| set >> at & 1 == 1)
+            .map(|at| &chosen[at])
+            .collect();
+        let hypotheses: Vec<usize> = members.iter().map(|chosen| chosen.hypothesis).collect();
+        let start: Vec<_> = members.iter().map(|chosen| chosen.theta.clone()).collect();
+        let refined = refine(problem, library, &hypotheses, &start);
+        left(&Model::around(
+            problem,
+            library,
+            model_of(library, &hypotheses, &refined.thetas),
+        ))
+    };
+    let energies = shapley::shares(chosen.len(), |set| -left(set));
+    causes
+        .iter_mut()
+        .zip(energies)
+        .for_each(|(cause, energy)| cause.share = energy.max(0.0));
+}
+
+/// What a model leaves: residual energy, and how far it strained the calibration.
+pub fn left(model: &Model) -> f64 {
+    let open: f64 = model.fitted.nuisance.iter().map(|values| values.norm_squared()).sum();
+    model.energies().iter().sum::<f64>() + open
+}

@@ -1,0 +1,298 @@
+//! What the unit itself can correct: an effect as parameters of its calibration set.
+//!
+//! In: the effects found. Out: a [`Correction`]: how each channel responds with them in, for the estimation
+//! ([`Response`]), and the set as text, in the format of `ground calibration` ([`bench::set`]), every channel in it.
+//!
+//! Bias, axis, scale and place are read off the effect's own action on the channel's chain; a temperature coefficient is
+//! the effect's parameter; a delay or a lag is a delay. What is not always on, what changes the scatter, and what is the
+//! reference's fault is not the unit's to correct and is left out.
+//!
+//! The set's format has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
+//! passes over: the first belongs into the estimator's `Delays`, the second into the unit's `place_b`.
+
+use bench::set::{Entry, Set, SetError};
+use nalgebra::{Matrix3, Vector3};
+use twin::{
+    effect::{Active, Site},
+    predict::{Chain, Channel, Kind, Twin},
+};
+
+use crate::{attitude::Response, problem::Component};
+
+/// How an effect enters a calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// As bias, axis, scale or place.
+    Chain,
+    /// As a bias per kelvin.
+    BiasPerK,
+    /// As a scale per kelvin.
+    ScalePerK,
+    /// As a delay, the same for every channel touched.
+    Delay,
+    /// As a delay that grows with the place in the reading order.
+    Skew,
+}
+
+const WAYS: [(&str, Way); 24] = [
+    ("gyro-bias", Way::Chain),
+    ("accel-bias", Way::Chain),
+    ("hard-iron", Way::Chain),
+    ("gyro-scale", Way::Chain),
+    ("accel-scale", Way::Chain),
+    ("gyro-misalignment", Way::Chain),
+    ("accel-misalignment", Way::Chain),
+    ("soft-iron", Way::Chain),
+    ("plate-rotation", Way::Chain),
+    ("plate-swap", Way::Chain),
+    ("mag-axis-order", Way::Chain),
+    ("lever-arm", Way::Chain),
+    ("gyro-lag", Way::Chain),
+    ("gyro-bias-temperature", Way::BiasPerK),
+    ("accel-bias-temperature", Way::BiasPerK),
+    ("mag-offset-temperature", Way::BiasPerK),
+    ("gyro-scale-temperature", Way::ScalePerK),
+    ("accel-scale-temperature", Way::ScalePerK),
+    ("mag-scale-temperature", Way::ScalePerK),
+    ("latency", Way::Delay),
+    ("gyro-latency", Way::Delay),
+    ("accel-latency", Way::Delay),
+    ("mag-latency", Way::Delay),
+    ("read-skew", Way::Skew),
+];
+
+/// What the unit's calibration needs.
+#[derive(Clone, Debug)]
+pub struct Correction {
+    /// In the unit's channel order.
+    pub responses: Vec<Response>,
+    /// Effects it corrects.
+    pub effects: Vec<&'static str>,
+    /// Channels it changes.
+    pub channels: Vec<usize>,
+}
+
+impl Correction {
+    /// Of the effects among these that the unit can correct; `None` where there is none.
+    pub fn of(twin: &Twin, components: &[Component]) -> Option<Self> {
+        let unit = twin.unit();
+        let mut correction = Correction {
+            responses: unit.channels.iter().map(Response::nominal).collect(),
+            effects: Vec::new(),
+            channels: Vec::new(),
+        };
+        for component in components.iter().filter(|component| component.span.is_none()) {
+            let active = &component.active;
+            let name = active.cause.effect.page().name;
+            let Some((_, way)) = WAYS.iter().find(|(known, _)| *known == name) else {
+                continue;
+            };
+            correction.effects.push(name);
+            for index in active.cause.channels(unit) {
+                add(*way, active, twin, index, &mut correction.responses[index]);
+                correction.channels.push(index);
+            }
+        }
+        correction.channels.sort_unstable();
+        correction.channels.dedup();
+        (!correction.channels.is_empty()).then_some(correction)
+    }
+
+    /// The calibration set.
+    ///
+    /// # Errors
+    /// When the set cannot be written as text.
+    pub fn set(&self, twin: &Twin) -> Result<String, SetError> {
+        let unit = twin.unit();
+        let temperatures = twin.feels(0).into_iter().map(|feel| feel.temperature_c);
+        let range_c = temperatures.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| {
+            (low.min(t), high.max(t))
+        });
+        let mut set = Set::new(unit.name.clone());
+        let sensed = || {
+            let pairs = unit.channels.iter().zip(&self.responses);
+            pairs.filter(|(channel, _)| channel.sensor != Kind::Thermometer)
+        };
+        set.channels = sensed()
+            .map(|(channel, response)| entry(channel, response, twin.environment().temperature_c, range_c))
+            .collect();
+        let mut text = String::new();
+        for line in set.text()?.lines() {
+            text.push_str(line);
+            text.push('\n');
+            let named = sensed().find(|(channel, _)| line == format!("name = \"{}\"", channel.name));
+            if let Some((channel, response)) = named {
+                if response.delay_s != 0.0 {
+                    text.push_str(&format!("delay_s = {:.6}\n", response.delay_s));
+                }
+                if response.lever_m != channel.lever_m {
+                    let [x, y, z] = response.lever_m.into();
+                    text.push_str(&format!("lever_m = [{x:.5}, {y:.5}, {z:.5}]\n"));
+                }
+            }
+        }
+        Ok(text)
+    }
+}
+
+/// Adds an effect to the response of one channel that it touches.
+fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Response) {
+    let unit = twin.unit();
+    let channel = &unit.channels[index];
+    let starts_s = twin.starts_s();
+    let site = Site {
+        unit,
+        index,
+        channel,
+        environment: twin.environment(),
+        log_s: (
+            starts_s.first().copied().unwrap_or_default(),
+            starts_s.last().copied().unwrap_or_default(),
+        ),
+    };
+    let own = (0..active.theta.len()).find(|parameter| active.cause.touched_by(*parameter, unit).contains(&index));
+    let theta = own.map_or(0.0, |parameter| active.theta[parameter]);
+    match way {
+        Way::Chain => {
+            let mut chain = Chain::of(channel);
+            active.act(&site, &mut chain);
+            response.sensitivity_b += chain.aim.axis_b - channel.axis_b;
+            response.bias += chain.bias - channel.bias;
+            response.lever_m += chain.aim.lever_m - channel.lever_m;
+            response.delay_s += chain.lag_s;
+        }
+        Way::BiasPerK => response.bias_per_k += theta,
+        Way::ScalePerK => response.scale_per_k += theta,
+        Way::Delay => response.delay_s += theta,
+        Way::Skew => response.delay_s -= theta * site.read_position() as f64,
+    }
+}
+
+/// A channel of the set: `counts = (1 + k dT) S.x + b + b' dT`, its covariance that of the unit's description.
+fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64, f64)) -> Entry {
+    let counts = 1.0 / channel.lsb;
+    let is_warm = (response.bias_per_k != 0.0 || response.scale_per_k != 0.0) && range_c.0 < range_c.1;
+    let mut bias_counts = vec![response.bias * counts];
+    let mut scale_per_k = Vec::new();
+    if response.bias_per_k != 0.0 {
+        bias_counts.push(response.bias_per_k * counts);
+    }
+    if response.scale_per_k != 0.0 {
+        scale_per_k.push(response.scale_per_k);
+    }
+    let axis_b: Vector3<f64> = channel.axis_b;
+    let along = axis_b * axis_b.transpose();
+    let of_sensitivity = (along * channel.scale_sigma.powi(2)
+        + (Matrix3::identity() - along) * channel.axis_sigma_rad.powi(2))
+        * counts.powi(2);
+    let size = 3 + bias_counts.len() + scale_per_k.len();
+    let variance = |row: usize, column: usize| match (row, column) {
+        (0..3, 0..3) => of_sensitivity[(row, column)],
+        (3, 3) => (channel.bias_sigma * counts).powi(2),
+        _ => 0.0,
+    };
+    Entry {
+        name: channel.name.clone(),
+        sensor: match channel.sensor {
+            Kind::Accelerometer => "accelerometer",
+            Kind::Magnetometer => "magnetometer",
+            Kind::Gyro | Kind::Thermometer => "gyro",
+        }
+        .to_owned(),
+        part: String::new(),
+        method: "gap".to_owned(),
+        sensitivity_b: (response.sensitivity_b * counts).into(),
+        bias_counts,
+        scale_per_k,
+        reference_c: is_warm.then_some(standard_c),
+        valid_c: is_warm.then_some([range_c.0, range_c.1]),
+        scatter_counts: channel.sigma() * counts,
+        freedom: 0,
+        covariance: (0..size)
+            .map(|row| (0..size).map(|column| variance(row, column)).collect())
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+    use twin::{
+        effect::{Cause, Locality, by_name},
+        environment::Environment,
+        motion::Tumble,
+        predict::{Scene, emems},
+    };
+
+    use super::*;
+    use crate::windows::Span;
+
+    fn twin() -> Twin {
+        let environment = Environment::laboratory();
+        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 20.0, 0.05);
+        Twin::new(emems(|_| 0.0), environment, scene, vec![0.0, 5.0, 10.0]).expect("a twin")
+    }
+
+    fn component(effect: &str, locality: Locality, theta: &[f64]) -> Component {
+        let cause = Cause {
+            effect: by_name(effect).expect("in the library"),
+            locality,
+            variant: 0.0,
+        };
+        Component {
+            active: Active {
+                cause,
+                theta: DVector::from_column_slice(theta).iter().copied().collect(),
+            },
+            span: None,
+        }
+    }
+
+    #[test]
+    fn every_way_is_of_an_effect_in_the_library() {
+        assert!(WAYS.iter().all(|(name, _)| by_name(name).is_some()));
+    }
+
+    #[test]
+    fn the_set_of_hard_iron_and_a_scale_is_read_back_by_the_bench_and_the_unit() {
+        let twin = twin();
+        let iron = component("hard-iron", Locality::Common, &[1.0, -2.0, 0.5]);
+        let scale = component("gyro-scale", Locality::Channel("g2".to_owned()), &[0.01]);
+        let correction = Correction::of(&twin, &[iron, scale]).expect("correctable");
+        let set = Set::parse(&correction.set(&twin).expect("text")).expect("a set");
+        let of = |name: &str| {
+            let index = twin.unit().channel(name).expect("a channel");
+            let entry = set.channels.iter().find(|entry| entry.name == name).expect("an entry");
+            (&twin.unit().channels[index], entry)
+        };
+        let (channel, gyro) = of("g2");
+        assert!((gyro.sensitivity().norm() * channel.lsb - 1.01).abs() < 1e-12);
+        let (channel, mag) = of("m3y");
+        let expected = channel.axis_b.dot(&Vector3::new(1.0, -2.0, 0.5)) / channel.lsb;
+        assert!((mag.bias_counts[0] - expected).abs() < 1e-9);
+        let ranges = emems::calibration::Ranges::of(&emems::unit::Settings::NOMINAL);
+        let image = bench::set::image::image(&set, ranges).expect("the unit accepts it");
+        assert!(image.nominal.is_empty());
+    }
+
+    #[test]
+    fn delays_and_places_stand_in_the_set_and_are_passed_over() {
+        let twin = twin();
+        let late = component("gyro-latency", Locality::Common, &[0.012]);
+        let lever = component("lever-arm", Locality::Group("plate 2".to_owned()), &[0.01, 0.0, 0.0]);
+        let correction = Correction::of(&twin, &[late, lever]).expect("correctable");
+        let text = correction.set(&twin).expect("text");
+        assert_eq!(text.matches("delay_s = 0.012000").count(), 4, "{text}");
+        assert_eq!(text.matches("lever_m").count(), 3);
+        assert!(Set::parse(&text).is_ok());
+    }
+
+    #[test]
+    fn what_passes_or_is_the_references_fault_is_not_the_units_to_correct() {
+        let twin = twin();
+        let mut iron = component("hard-iron", Locality::Common, &[1.0, 0.0, 0.0]);
+        iron.span = Some(Span { from: 0.0, to: 5.0 });
+        let tilt = component("table-tilt", Locality::Unit, &[0.01, 0.0]);
+        assert!(Correction::of(&twin, &[iron, tilt]).is_none());
+    }
+}

@@ -1,0 +1,166 @@
+//! Does an effect predict data it was not fitted on? Cross-validation over contiguous blocks of the fit windows.
+//!
+//! In: the finished model. Out: for each of its effects a [`Key`]: how much better the model predicts left-out blocks with
+//! the effect than without it, `sum of 1/2 (r_without^2 - r_with^2)`, with its standard error over [`BLOCKS`] blocks
+//! (expected log predictive density; Vehtari, Gelman and Gabry 2017; blocks, because neighbouring rows are alike).
+//!
+//! Evidence is the first key, this is the second: where they disagree the smaller confidence holds. An effect that shows
+//! in one block only (a shock, a lost packet) cannot be predicted from the others, so there it has no say.
+//!
+//! The calibration is refitted in every fold; the model is linear about the parameters found.
+
+use nalgebra::DVector;
+
+use crate::{
+    joint::{Columns, Joint},
+    library::Library,
+    model::Model,
+    next::erfc,
+    problem::{Component, Problem},
+};
+
+/// Blocks, each left out in turn.
+const BLOCKS: usize = 10;
+
+/// Share of an effect's energy in one block from which it counts as an event.
+const EVENT: f64 = 0.5;
+
+/// What cross-validation says of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// [nats] by how much left-out blocks are better predicted.
+    pub gain: f64,
+    /// [nats] its standard error.
+    pub error: f64,
+}
+
+impl Key {
+    /// Probability that the gain is above zero.
+    pub fn confidence(&self) -> f64 {
+        if self.error > 0.0 {
+            1.0 - 0.5 * erfc_of(self.gain / self.error)
+        } else {
+            f64::from(u8::from(self.gain > 0.0))
+        }
+    }
+}
+
+/// `erfc(z / sqrt 2)` of either sign.
+fn erfc_of(z: f64) -> f64 {
+    let tail = erfc(z.abs() / core::f64::consts::SQRT_2);
+    if z >= 0.0 { tail } else { 2.0 - tail }
+}
+
+/// A key for each effect of the model, in its order; `None` for one that is an event.
+pub fn keys(problem: &Problem, library: &Library, model: &Model) -> Vec<Option<Key>> {
+    let blocks = blocks(problem);
+    let with = losses(problem, library, model, &blocks);
+    let key = |index: usize| {
+        if is_event(problem, &model.components, index, &blocks) {
+            return None;
+        }
+        let mut others = model.components.clone();
+        others.remove(index);
+        let without = losses(problem, library, &Model::around(problem, library, others), &blocks);
+        Some(key_of(&without, &with))
+    };
+    (0..model.components.len()).map(key).collect()
+}
+
+fn key_of(without: &[f64], with: &[f64]) -> Key {
+    let gains: Vec<f64> = without.iter().zip(with).map(|(without, with)| without - with).collect();
+    let count = gains.len() as f64;
+    let gain: f64 = gains.iter().sum();
+    let variance = gains.iter().map(|one| (one - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
+    Key {
+        gain,
+        error: (count * variance).sqrt(),
+    }
+}
+
+/// By channel, the block of each fitted sample.
+fn blocks(problem: &Problem) -> Vec<Vec<usize>> {
+    let rows = crate::place::cells::fitted_rows(problem);
+    let block = |row: &u32| rows.partition_point(|one| *one < *row as usize) * BLOCKS / rows.len().max(1);
+    let frames = problem.frames.iter();
+    frames
+        .map(|frame| frame.series.rows.iter().map(block).collect())
+        .collect()
+}
+
+/// Whether most of an effect is in one block.
+fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &[Vec<usize>]) -> bool {
+    let mut others = components.to_vec();
+    let own = others.remove(index);
+    let mut energies = [0.0; BLOCKS];
+    for channel in own.active.cause.channels(problem.twin.unit()) {
+        let apart = problem.residual(channel, &others) - problem.residual(channel, components);
+        for (value, block) in apart.iter().zip(&blocks[channel]) {
+            energies[*block] += value * value;
+        }
+    }
+    let most = energies.iter().copied().fold(0.0, f64::max);
+    most > EVENT * energies.iter().sum::<f64>()
+}
+
+/// Half the squared error on each block, left out of the fit.
+fn losses(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usize>]) -> Vec<f64> {
+    let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
+    for component in &model.components {
+        let parameters = component.active.cause.parameters(problem.twin.unit());
+        sigmas.extend(parameters.iter().map(|parameter| parameter.prior_sigma));
+    }
+    let fitted = &model.fitted;
+    let about_zero: Vec<DVector<f64>> = (model.joint.columns().zip(&fitted.rest).zip(&fitted.nuisance))
+        .map(|((columns, rest), nuisance)| rest + &columns.nuisance * nuisance + &columns.effects * &fitted.parameters)
+        .collect();
+    let part = |block: usize, is_left_out: bool| -> (Vec<Columns>, Vec<DVector<f64>>) {
+        let channels = model.joint.columns().zip(&about_zero).zip(blocks);
+        let chosen = channels.map(|((columns, values), blocks)| {
+            let rows: Vec<usize> = (0..blocks.len())
+                .filter(|at| (blocks[*at] == block) == is_left_out)
+                .collect();
+            let columns = Columns {
+                nuisance: columns.nuisance.select_rows(&rows),
+                effects: columns.effects.select_rows(&rows),
+            };
+            (columns, values.select_rows(&rows))
+        });
+        chosen.unzip()
+    };
+    let loss = |block: usize| -> f64 {
+        let (columns, values) = part(block, false);
+        let found = Joint::new(columns, &sigmas).fit(&values);
+        let (columns, values) = part(block, true);
+        let channels = columns.iter().zip(&values).zip(&found.nuisance);
+        let squares = channels.map(|((columns, values), nuisance)| {
+            (values - &columns.nuisance * nuisance - &columns.effects * &found.parameters).norm_squared()
+        });
+        0.5 * squares.sum::<f64>()
+    };
+    (0..BLOCKS).map(loss).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_steady_gain_is_believed_and_one_lucky_block_is_not() {
+        let steady = key_of(
+            &[12.0, 11.0, 13.0, 12.5, 11.5, 12.0, 11.0, 13.0, 12.0, 12.0],
+            &[10.0; 10],
+        );
+        assert!(steady.confidence() > 0.999, "{steady:?}");
+        let mut lucky = [10.0; 10];
+        lucky[3] = 30.0;
+        let lucky = key_of(&lucky, &[10.1; 10]);
+        assert!(lucky.confidence() < 0.85, "{lucky:?}");
+    }
+
+    #[test]
+    fn an_effect_that_predicts_worse_is_not_believed() {
+        let worse = key_of(&[10.0, 10.1, 9.9, 10.0], &[11.0, 11.2, 10.9, 11.0]);
+        assert!(worse.confidence() < 0.01, "{worse:?}");
+    }
+}

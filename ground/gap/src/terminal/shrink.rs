@@ -1,0 +1,72 @@
+//! How far the held-out gap shrinks, in words.
+
+use std::fmt::{Result, Write};
+
+use crate::{case::Subject, diagnose::Diagnosis, held::stages::Stage};
+
+/// How far it shrinks: in total, by stage and by channel.
+pub fn shrink(subject: &Subject, diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write(&mut text, subject, diagnosis);
+    text
+}
+
+fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result {
+    let shrink = &diagnosis.shrink;
+    writeln!(
+        text,
+        "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}, floor 1",
+        shrink.before, shrink.recalibrated, shrink.after
+    )?;
+    let ceiling = diagnosis.ceiling_percent.map_or(String::new(), |percent| {
+        format!("; the true effect could shrink it by {percent:.2} %")
+    });
+    writeln!(
+        text,
+        "shrink        {:.1} % [{:.1}, {:.1}] of the way to the floor{ceiling}",
+        shrink.percent, shrink.interval_percent[0], shrink.interval_percent[1]
+    )?;
+    stages(text, &diagnosis.stages)?;
+    writeln!(
+        text,
+        "channel    before recal.  after       rms before        rms after"
+    )?;
+    for (channel, own) in subject.twin.unit().channels.iter().zip(&shrink.channels) {
+        let worse = if own.is_worse() { "  worse" } else { "" };
+        writeln!(
+            text,
+            "{:10} {:6.3} {:6.3} {:6.3}   {:14.6} {:16.6}{worse}",
+            channel.name, own.before, own.recalibrated, own.after, own.before_rms, own.after_rms
+        )?;
+    }
+    Ok(())
+}
+
+fn stages(text: &mut String, stages: &[Stage]) -> Result {
+    if stages.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        text,
+        "{:36} {:>9} {:>9} {:>9} {:>9} {:>9}  shrink [%]",
+        "stage", "before", "recal.", "after", "set", "floor"
+    )?;
+    for stage in stages {
+        let corrected = stage.corrected.map_or("-".to_owned(), |error| format!("{error:.4}"));
+        let percent = stage.percent.map_or("-".to_owned(), |percent| {
+            let [low, high] = stage.interval_percent;
+            format!("{percent:.1} [{low:.1}, {high:.1}]")
+        });
+        writeln!(
+            text,
+            "{:36} {:9.4} {:9.4} {:9.4} {corrected:>9} {:9.4}  {percent}",
+            format!("{} [{}]", stage.name, stage.unit),
+            stage.before,
+            stage.recalibrated,
+            stage.after,
+            stage.floor
+        )?;
+    }
+    Ok(())
+}

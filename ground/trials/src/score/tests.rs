@@ -1,0 +1,87 @@
+use super::*;
+use crate::answer::Cause;
+
+fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
+    let cause = |name: &&str| Cause {
+        effect: name.to_string(),
+        in_library: true,
+        channels: vec!["g1".into()],
+        strength: 1.0,
+    };
+    Judged {
+        answer: Answer {
+            case: "T".into(),
+            ring: ring.into(),
+            seed: 0,
+            effects: truth.iter().map(cause).collect(),
+            snr_marginal: 20.0,
+        },
+        verdict: verdict.map(|text| serde_json::from_str(text).expect("a verdict")),
+    }
+}
+
+fn value(lines: &[Line], what: &str) -> f64 {
+    lines.iter().find(|line| line.what == what).expect(what).value
+}
+
+const RIGHT: &str = r#"{"causes":[{"effect":"gyro-bias","channels":["g1"],"probability":0.9}],"none_of_these":0.02,
+    "alternatives":[{"effect":"gyro-g2","probability":0.08}],"shrink":{"percent":97.0}}"#;
+const WRONG: &str = r#"{"causes":[{"effect":"gyro-g2","channels":["g1","g2"],"probability":0.9}],
+    "indistinguishable":[["gyro-bias","gyro-g2"]],"none_of_these":0.0}"#;
+const UNKNOWN: &str = r#"{"causes":[],"none_of_these":0.9}"#;
+const NOTHING: &str = r#"{"causes":[],"none_of_these":0.01}"#;
+
+#[test]
+fn right_and_wrong_names_are_told_apart() {
+    let lines = table(&[
+        judged("R1", &["gyro-bias"], Some(RIGHT)),
+        judged("R1", &["gyro-bias"], Some(WRONG)),
+    ]);
+    assert_eq!(value(&lines, "top-1"), 0.5);
+    assert_eq!(value(&lines, "truth in declared set of at most 3"), 1.0);
+    assert_eq!(value(&lines, "gap detected (one effect)"), 1.0);
+    assert_eq!(value(&lines, "mean probability on the truth"), 0.45);
+    assert!((value(&lines, "localisation F1 (channels)") - (1.0 + 2.0 / 3.0) / 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_name_where_there_is_none_is_false() {
+    let lines = table(&[
+        judged("R0", &[], Some(RIGHT)),
+        judged("R0", &[], Some(NOTHING)),
+        judged("R3", &["slow-tone"], Some(RIGHT)),
+        judged("R3", &["slow-tone"], Some(UNKNOWN)),
+    ]);
+    assert_eq!(value(&lines, "false name, nothing wrong"), 0.5);
+    assert_eq!(value(&lines, "unknown called, nothing wrong"), 0.0);
+    assert_eq!(value(&lines, "false name, novel"), 0.5);
+    assert_eq!(value(&lines, "none of these, novel"), 0.5);
+}
+
+#[test]
+fn giving_up_counts_against_the_tool() {
+    let lines = table(&[
+        judged("R0", &[], None),
+        judged("R1", &["gyro-bias"], None),
+        judged("R3", &["slow-tone"], None),
+    ]);
+    for (what, worst) in [
+        ("false name, nothing wrong", 1.0),
+        ("top-1", 0.0),
+        ("false name, novel", 1.0),
+        ("none of these, novel", 0.0),
+    ] {
+        assert_eq!(value(&lines, what), worst, "{what}");
+    }
+}
+
+#[test]
+fn two_effects_are_counted_one_by_one() {
+    let both = r#"{"causes":[{"effect":"gyro-bias","probability":0.9},{"effect":"lever-arm","probability":0.9}]}"#;
+    let lines = table(&[
+        judged("R4", &["gyro-bias", "hard-iron"], Some(both)),
+        judged("R4", &["gyro-bias", "lever-arm"], Some(both)),
+    ]);
+    assert_eq!(value(&lines, "two effects: precision"), 0.75);
+    assert_eq!(value(&lines, "two effects: recall"), 0.75);
+}

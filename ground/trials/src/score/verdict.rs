@@ -1,0 +1,88 @@
+//! What of verdict.json is scored, and how it is read.
+//!
+//! In: the file. Out: the names it says, the set it declares, the probability it gives a name. Unknown fields are passed
+//! over, so any tool that writes the keys below can be scored.
+
+use serde::Deserialize;
+
+/// What of verdict.json is scored; unknown fields are passed over.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Verdict {
+    /// Causes, the likeliest first; none when the twin needs nothing or nothing is named.
+    pub causes: Vec<Named>,
+    /// Other names with their probability.
+    pub alternatives: Vec<Named>,
+    /// Sets that this motion cannot tell apart.
+    pub indistinguishable: Vec<Vec<String>>,
+    /// Probability that something outside the library is needed.
+    pub none_of_these: f64,
+    /// What became of the gap on the hold window.
+    pub shrink: Option<Shrink>,
+}
+
+/// A name with its probability.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Named {
+    /// The effect.
+    pub effect: String,
+    /// Where.
+    pub channels: Vec<String>,
+    /// How sure.
+    pub probability: f64,
+}
+
+/// Shrinkage on the hold window.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Shrink {
+    /// Of the gap above its floor.
+    pub percent: Option<f64>,
+}
+
+/// Names are said from this probability on.
+const SAID: f64 = 0.5;
+
+/// Alternatives from this probability on belong to the declared set, which holds at most [`LARGEST_SET`] names.
+const IN_SET: f64 = 0.05;
+pub(super) const LARGEST_SET: usize = 3;
+
+impl Verdict {
+    pub(super) fn said(&self) -> impl Iterator<Item = &Named> {
+        self.causes.iter().filter(|cause| cause.probability >= SAID)
+    }
+
+    pub(super) fn is_unknown(&self) -> bool {
+        self.none_of_these >= SAID
+    }
+
+    pub(super) fn declared(&self) -> Vec<&str> {
+        let mut set: Vec<&str> = self.causes.iter().take(1).map(|cause| cause.effect.as_str()).collect();
+        for group in &self.indistinguishable {
+            if set.first().is_some_and(|first| group.iter().any(|name| name == first)) {
+                set.extend(group.iter().map(String::as_str));
+            }
+        }
+        set.extend(
+            self.alternatives
+                .iter()
+                .filter(|named| named.probability >= IN_SET)
+                .map(|named| named.effect.as_str()),
+        );
+        let mut distinct: Vec<&str> = Vec::new();
+        for name in set {
+            if !distinct.contains(&name) {
+                distinct.push(name);
+            }
+        }
+        distinct
+    }
+
+    pub(super) fn probability_of(&self, name: &str) -> f64 {
+        let all = self.causes.iter().chain(&self.alternatives);
+        all.filter(|named| named.effect == name)
+            .map(|named| named.probability)
+            .fold(0.0, f64::max)
+    }
+}
