@@ -117,7 +117,7 @@ fn the_log_names_the_set_it_was_recorded_with() {
     let words = set_words(&other());
     let recorded = |flight: Flight, at: u64| flight.say(at * S, b"G_MVG_MV").say((at + 1) * S, b"G_MG");
     let before = recorded(flight().say(2 * S, &words).say(6 * S, b"G_CL"), 7).fly(12 * S);
-    assert_eq!(named(before), [name.clone()]);
+    assert_eq!(named(before), std::slice::from_ref(&name));
     let between = recorded(flight(), 2)
         .say(6 * S, b"G_MEG_ME")
         .say(7 * S, &words)

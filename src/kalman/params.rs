@@ -109,8 +109,8 @@ pub struct Delays {
 const DEG: f32 = core::f32::consts::PI / 180.0;
 
 impl Params {
-    /// For a unit moved by hand or machine in a room, its site unknown. Chosen on seven real recordings; half and twice
-    /// of any value cost less than a tenth of the error, but for the delays.
+    /// For a unit moved by hand or machine in a room, its site unknown. Chosen on seven real recordings, on which
+    /// they leave 0.99 deg at 285 Hz; on nine others 1.63 deg.
     pub const ROOM: Params = Params {
         window_s: 1.0,
         angle_noise: 0.15 * DEG,

@@ -8,6 +8,8 @@
 //! each other's terms: *ours* comes back by construction, but for noise; drift of the hardware between the calibration
 //! and the orbit, of which the thesis' 4.61 deg are made, is in none of them.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use nalgebra::{Matrix4x3, Vector3, Vector4};
 use twin::part::signal::Noise;
 
@@ -41,8 +43,8 @@ const FACTORY: Parameters = Parameters {
     bias: [0.0002, -0.0006, -0.0004, -0.0006],
     axes: [
         [0.577_350_27, 0.0, 0.816_496_58],
-        [0.577_350_27, -0.707_106_78, -0.408_248_29],
-        [0.577_350_27, 0.707_106_78, -0.408_248_29],
+        [0.577_350_27, -FRAC_1_SQRT_2, -0.408_248_29],
+        [0.577_350_27, FRAC_1_SQRT_2, -0.408_248_29],
         [1.0, 0.0, 0.0],
     ],
     printed_deg: Some(552.0),
@@ -123,8 +125,8 @@ pub fn fly(seed: u64) -> Vec<(&'static Parameters, Found)> {
 
 /// As text.
 pub fn table(seed: u64) -> String {
-    let mut text = format!(
-        "Orbit of 100 min at 0.06 deg/s, 128 Hz        angle [deg]   error   printed   drift about y, z [deg/h]\n"
+    let mut text = String::from(
+        "Orbit of 100 min at 0.06 deg/s, 128 Hz        angle [deg]   error   printed   drift about y, z [deg/h]\n",
     );
     for (set, found) in fly(seed) {
         let [x, y, z]: [f64; 3] = found.angle_deg.into();
