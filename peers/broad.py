@@ -1,8 +1,9 @@
 """Attitude filters of others on the recordings of BROAD, each from its own package with its defaults.
 
 In: a folder of recordings. Out, on standard output: CSV `filter,recording,mode,total,heading,inclination` in degrees,
-scored as attitude/src/score.rs scores ours. Modes: full (285.7 Hz), five (5 Hz, rates averaged within the period,
-single samples of the rest) and motion (begun 10 s into the motion).
+scored as ground/attitude/src/score.rs scores ours. Modes: full (285.7 Hz), five (5 Hz, each period's rotation composed
+of the samples' and given as a rate, single samples of the rest: what ours is given) and motion (begun 10 s into the
+motion).
 Packages: `python3 -m venv peers/.venv && peers/.venv/bin/pip install -r peers/requirements.txt`.
 """
 
@@ -61,22 +62,26 @@ NORTH_WEST_UP = np.array([[np.sqrt(0.5), 0, 0, np.sqrt(0.5)]])
 
 
 def start(acc, mag):
-    """TRIAD to north-west-up from the first sample."""
+    """TRIAD to east-north-up from the first sample."""
     up = acc / np.linalg.norm(acc)
-    west = np.cross(up, mag)
-    west /= np.linalg.norm(west)
-    matrix = np.stack([np.cross(west, up), west, up])
-    return ahrs.Quaternion(dcm=matrix).to_array()
+    east = np.cross(mag, up)
+    east /= np.linalg.norm(east)
+    return ahrs.Quaternion(dcm=np.stack([east, np.cross(up, east), up])).to_array()
 
 
-def run_ahrs(kind, dt, gyr, acc, mag):
+def run_ahrs(kind, to_east_north_up, dt, gyr, acc, mag):
+    """Of a filter whose frame is turned to east-north-up by a quaternion, or is that (`None`)."""
     filter_ = kind(Dt=dt)
     q = start(acc[0], mag[0])
+    if to_east_north_up is not None:
+        q = multiply(to_east_north_up * [1, -1, -1, -1], q[None])[0]
     out = np.empty((len(gyr), 4))
     for k in range(len(gyr)):
         q = filter_.updateMARG(q, gyr[k], acc[k], mag[k], dt=dt)
         out[k] = q
-    return multiply(np.repeat(NORTH_WEST_UP, len(out), axis=0), out)
+    if to_east_north_up is None:
+        return out
+    return multiply(np.repeat(to_east_north_up, len(out), axis=0), out)
 
 
 def run_triad(dt, gyr, acc, mag):
@@ -90,11 +95,24 @@ def run_triad(dt, gyr, acc, mag):
 FILTERS = {
     "VQF": lambda *data: run_vqf(vqf.VQF, *data),
     "BasicVQF": lambda *data: run_vqf(vqf.BasicVQF, *data),
-    "Madgwick": lambda *data: run_ahrs(ahrs.filters.Madgwick, *data),
-    "Mahony": lambda *data: run_ahrs(ahrs.filters.Mahony, *data),
+    "Madgwick": lambda *data: run_ahrs(ahrs.filters.Madgwick, NORTH_WEST_UP, *data),
+    # Its reference field has no x: y is magnetic north.
+    "Mahony": lambda *data: run_ahrs(ahrs.filters.Mahony, None, *data),
     "xio Fusion": run_imufusion,
     "TRIAD alone": run_triad,
 }
+
+
+def composed(rates, dt):
+    """Rates that turn in one period of `dt * rates.shape[1]` by what these turn in it, sample by sample."""
+    q = np.tile([1.0, 0.0, 0.0, 0.0], (len(rates), 1))
+    for k in range(rates.shape[1]):
+        half = rates[:, k] * dt / 2
+        norm = np.linalg.norm(half, axis=1, keepdims=True)
+        q = multiply(q, np.hstack([np.cos(norm), half * np.sinc(norm / np.pi)]))
+    norm = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(norm, q[:, :1])
+    return q[:, 1:] * angle / np.maximum(norm, 1e-12) / (dt * rates.shape[1])
 
 
 def modes(rows):
@@ -103,7 +121,7 @@ def modes(rows):
     count = len(rows) // FIVE_HZ
     five = rows[: count * FIVE_HZ].reshape(count, FIVE_HZ, -1)
     last = five[:, -1].copy()
-    last[:, 1:4] = five[:, :, 1:4].mean(axis=1)
+    last[:, 1:4] = composed(five[:, :, 1:4], dt)
     yield "five", dt * FIVE_HZ, last
     moving = np.argmax(rows[:, 17] > 0)
     yield "motion", dt, rows[np.searchsorted(rows[:, 0], rows[moving, 0] + 10) :]

@@ -45,21 +45,54 @@ const ORTHONORMAL: f32 = 1e-3;
 /// 0.06 deg from the vertical, where f32 rounding of the matrix reaches a degree in either.
 const GIMBAL_LOCK: f32 = 1e-3;
 
-/// Below this half-angle [rad] the series of the sine is exact in f32: its second term left out is half^4/120.
-const SMALL_HALF_ANGLE: f32 = 0.03;
+/// Up to this angle [rad] the series below are exact in f32: what they leave out is less than 3e-9.
+const SERIES: f32 = 1.0;
+
+/// Taylor coefficients of `sin(h)/h` and `cos(h)` in `h^2`.
+const SINE: [f32; 6] = [
+    1.0,
+    -1.0 / 6.0,
+    1.0 / 120.0,
+    -1.0 / 5040.0,
+    1.0 / 362_880.0,
+    -1.0 / 39_916_800.0,
+];
+const COSINE: [f32; 6] = [1.0, -0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0];
+
+/// `sin(x)/x` and `cos(x)` by `x^2`, which is at most that of [`SERIES`].
+///
+/// libm's go through f64, which the target computes in software: a thousand instructions for both.
+fn series(square: f32) -> (f32, f32) {
+    let sum = |of: [f32; 6]| {
+        of.into_iter()
+            .rev()
+            .fold(0.0, |sum, coefficient| sum * square + coefficient)
+    };
+    (sum(SINE), sum(COSINE))
+}
+
+/// Sine and cosine of an angle [rad].
+pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
+    let square = angle * angle;
+    if square < SERIES * SERIES {
+        let (sinc, cos) = series(square);
+        return (angle * sinc, cos);
+    }
+    ComplexField::sin_cos(angle)
+}
 
 /// Quaternion of a rotation vector: exact for any angle, `(cos a/2, sin(a/2)/a v)`.
 pub fn from_rotation_vector(angle: Vector3<f32>) -> UnitQuaternion<f32> {
     let half = angle * 0.5;
     let square = half.norm_squared();
-    if square < SMALL_HALF_ANGLE * SMALL_HALF_ANGLE {
-        let sinc = 1.0 - square / 6.0;
-        let scalar = 1.0 - square * (0.5 - square / 24.0);
-        return UnitQuaternion::new_unchecked(Quaternion::from_parts(scalar, half * sinc));
-    }
-    let norm = ComplexField::sqrt(square);
-    let (sin, cos) = ComplexField::sin_cos(norm);
-    UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, half * (sin / norm)))
+    let (sinc, cos) = if square < SERIES * SERIES {
+        series(square)
+    } else {
+        let norm = ComplexField::sqrt(square);
+        let (sin, cos) = ComplexField::sin_cos(norm);
+        (sin / norm, cos)
+    };
+    UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, half * sinc))
 }
 
 /// The shorter rotation vector of a quaternion [rad].

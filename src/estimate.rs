@@ -120,6 +120,16 @@ impl Estimator {
         }
     }
 
+    /// Begins afresh with another set, in place: two estimators are more than the unit's stack should hold.
+    #[inline(never)]
+    pub fn renew(&mut self, set: &Set, site: &Site) {
+        self.set = *set;
+        self.temperatures = Temperatures::default();
+        self.monitor = Monitor::new(set);
+        self.filter = Filter::new(site.params(set));
+        self.last_us = None;
+    }
+
     /// Of a unit with these settings and the compiled-in parameters.
     ///
     /// Not inlined, as the others here: what they build on the way would lie on the stack under all that the unit does.
@@ -223,7 +233,7 @@ impl Estimator {
         if !near {
             return None;
         }
-        let (sin, cos) = ComplexField::sin_cos(self.filter.reference.declination);
+        let (sin, cos) = attitude::sin_cos(self.filter.reference.declination);
         let down = sighting(&vectors.force_b, -1.0, Vector3::z())?;
         let north = sighting(&vectors.field_b_ut, 1.0, Vector3::new(cos, sin, 0.0))?;
         triad(&down, &north).ok().map(|found| found.q_nb)

@@ -23,12 +23,15 @@ mod consensus;
 mod gyros;
 mod health;
 mod repeat;
+mod root;
+#[cfg(test)]
+mod tests;
 mod trace;
 mod triads;
 mod vector_rate;
 mod watch;
 
-use nalgebra::{ComplexField, Vector3};
+use nalgebra::Vector3;
 
 use crate::{
     calibration::{Channel, Measured, Set},
@@ -40,7 +43,8 @@ use crate::{
 use gyros::Gyros;
 pub use health::{SensorHealth, Verdict};
 use repeat::Repeats;
-use triads::Triads;
+use root::{reciprocal_root, root};
+use triads::{Apart, Triads};
 use vector_rate::{Direction, RateError, VectorRate};
 
 /// [s] standard deviation of an accelerometer's conversion within its 20 ms at 50 Hz: it has its own clock.
@@ -70,6 +74,18 @@ pub struct Vectors {
     pub health: SensorHealth,
 }
 
+/// What sensors of one kind gave in one cycle.
+struct Cycle<'a, const N: usize> {
+    /// [unit] along each axis.
+    values: &'a [f32; N],
+    /// Axes that have a value.
+    present: u16,
+    /// Axes that repeat themselves.
+    frozen: u16,
+    /// [s] since the cycle before; `None` after a gap.
+    dt_s: Option<f32>,
+}
+
 /// All 28 axes under watch.
 #[derive(Clone, Debug)]
 pub struct Monitor {
@@ -80,6 +96,8 @@ pub struct Monitor {
     acc_repeats: [Repeats<3>; PLATES],
     mag_repeats: [Repeats<3>; PLATES],
     gyro_repeats: [Repeats<1>; PLATES],
+    /// [m] of the longest lever arm.
+    arm: f32,
     last: Option<Turning>,
     /// [rad/s] known bias of the rate.
     bias_b: Vector3<f32>,
@@ -112,6 +130,10 @@ impl Monitor {
             acc_repeats: core::array::from_fn(|plate| triad(&set.acc, plate)),
             mag_repeats: core::array::from_fn(|plate| triad(&set.mag, plate)),
             gyro_repeats: core::array::from_fn(|plate| Repeats::new([counts(&set.gyro[plate])])),
+            arm: set
+                .place_b
+                .iter()
+                .fold(0.0, |most: f32, place_b| most.max(place_b.norm())),
             last: None,
             bias_b: Vector3::zeros(),
         }
@@ -138,7 +160,7 @@ impl Monitor {
     pub fn step(&mut self, set: &Set, reading: &Reading, measured: &Measured, dt_s: f32) -> Vectors {
         let dt_s = (dt_s > 0.0 && dt_s < LONGEST_S).then_some(dt_s);
         let present = measured.present;
-        let rate_b = self.gyro.step(&gyros::Cycle {
+        let rate_b = self.gyro.step(&Cycle {
             values: &measured.gyro,
             present: present.of(Kind::Gyro),
             frozen: frozen(&mut self.gyro_repeats, present.of(Kind::Gyro), |plate| {
@@ -148,27 +170,29 @@ impl Monitor {
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
-        let rate = turning.rate_b.norm() + turning.missing;
-        let force_b = self.acc.step(&triads::Cycle {
-            values: &values,
-            present: present.of(Kind::Accelerometer),
-            frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), |plate| {
-                reading.acc_p[plate]
-            }),
-            rate,
-            dt_s,
-            apart: unsure,
-        });
-        let field_b_ut = self.mag.step(&triads::Cycle {
-            values: &measured.mag,
-            present: present.of(Kind::Magnetometer),
-            frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), |plate| {
-                reading.mag_p[plate]
-            }),
-            rate,
-            dt_s,
-            apart: 0.0,
-        });
+        let rate = length(&turning.rate_b) + turning.missing;
+        let force_b = self.acc.step(
+            &Cycle {
+                values: &values,
+                present: present.of(Kind::Accelerometer),
+                frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), |plate| {
+                    reading.acc_p[plate]
+                }),
+                dt_s,
+            },
+            &Apart { rate, by_place: unsure },
+        );
+        let field_b_ut = self.mag.step(
+            &Cycle {
+                values: &measured.mag,
+                present: present.of(Kind::Magnetometer),
+                frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), |plate| {
+                    reading.mag_p[plate]
+                }),
+                dt_s,
+            },
+            &Apart { rate, by_place: 0.0 },
+        );
         self.settle_gyros(measured, rate, dt_s, [&force_b, &field_b_ut, &rate_b]);
         self.last = Some(turning);
         let health = SensorHealth::default()
@@ -204,25 +228,19 @@ impl Monitor {
         let missing = turning.missing.max(self.last.map_or(0.0, |last| last.missing));
         // The difference quotient is the acceleration of half an interval ago, and has the noise of two rates.
         let lag = change.map_or(0.0, |(last, _)| {
-            (turning.acceleration_b - last.acceleration_b).norm() / 2.0
+            length(&(turning.acceleration_b - last.acceleration_b)) / 2.0
         });
-        let noise = change.map_or(0.0, |(_, dt_s)| {
-            ComplexField::sqrt(2.0 * rate_b.covariance_b.trace() / 3.0) / dt_s
-        });
-        let rate = turning.rate_b.norm() + missing;
+        let noise = change.map_or(0.0, |(_, dt_s)| root(2.0 * rate_b.covariance_b.trace() / 3.0) / dt_s);
+        let rate = length(&turning.rate_b) + missing;
         let squared = rate * rate;
-        let arm = set
-            .place_b
-            .iter()
-            .fold(0.0, |most: f32, place_b| most.max(place_b.norm()));
-        let unsure = set.place_sigma * (turning.acceleration_b.norm() + squared)
-            + arm * (lag + noise + missing * (rate + missing));
+        let unsure = set.place_sigma * (length(&turning.acceleration_b) + squared)
+            + self.arm * (lag + noise + missing * (rate + missing));
         (turning, unsure)
     }
 
     fn settle_gyros(&mut self, measured: &Measured, rate: f32, dt_s: Option<f32>, found: [&Solution; 3]) {
         let [force_b, field_b_ut, rate_b] = found;
-        let still_gravity = GRAVITY.contains(&force_b.vector_b.norm());
+        let still_gravity = GRAVITY.contains(&length(&force_b.vector_b));
         let directions = [
             direction(force_b, ACC_TIMING_S * rate).filter(|_| still_gravity && !self.acc.undecided),
             direction(field_b_ut, MAG_TIMING_S * rate).filter(|_| !self.mag.undecided),
@@ -238,12 +256,16 @@ impl Monitor {
 
 /// A solution as a direction, with the angle [rad] it turns by within its sampling instant's uncertainty.
 fn direction(solution: &Solution, turned: f32) -> Option<Direction> {
-    let length = solution.vector_b.norm();
-    let variance = solution.covariance_b.trace() / (3.0 * length * length) + turned * turned;
-    (solution.known == Known::All && variance < 0.01).then(|| Direction {
-        along_b: solution.vector_b / length,
+    let per_length = reciprocal_root(solution.vector_b.norm_squared());
+    let variance = solution.covariance_b.trace() * (per_length * per_length / 3.0) + turned * turned;
+    (solution.known == Known::All && per_length > 0.0 && variance < 0.01).then(|| Direction {
+        along_b: solution.vector_b * per_length,
         variance,
     })
+}
+
+fn length(vector: &Vector3<f32>) -> f32 {
+    root(vector.norm_squared())
 }
 
 /// [m/s2] forces along the axes as at the centre: less `w' x r + w x (w x r)` of each plate's place.

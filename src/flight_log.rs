@@ -112,6 +112,13 @@ pub struct Status {
     pub last: Option<(Key, u64)>,
 }
 
+impl Status {
+    /// [min] until the log is full, at a record each `period_ms`.
+    pub fn minutes_left(&self, period_ms: u64) -> u64 {
+        u64::from(self.capacity.saturating_sub(self.used)) * period_ms / 60_000
+    }
+}
+
 /// The log on a chip.
 pub struct FlightLog<N> {
     chip: N,
@@ -124,6 +131,8 @@ pub struct FlightLog<N> {
     opened: bool,
     /// This boot has its header in the log.
     begun: bool,
+    /// The header says something else since.
+    described_anew: bool,
     /// The next page, in a block erased since this start.
     head: Option<PageAddress>,
     /// The block after it, erased ahead of time.
@@ -164,6 +173,7 @@ impl<N: Nand> FlightLog<N> {
             home: (0, None),
             opened: false,
             begun: false,
+            described_anew: false,
             head: None,
             ahead: None,
             next_block: LOG_START,
@@ -178,6 +188,12 @@ impl<N: Nand> FlightLog<N> {
         }
     }
 
+    /// From the next record on the log is of a unit as `header` has it; before it comes that header.
+    pub fn describe(&mut self, header: BootHeader) {
+        self.header = header;
+        self.described_anew = true;
+    }
+
     /// Keeps an entry. `Ok` means it is durable. Takes one program of a page, and an erase where
     /// [`FlightLog::free_time`] had no chance to do it ahead; the first of a boot writes superblock and header first.
     pub async fn append(&mut self, entry: &Entry) -> Result<Key, LogError> {
@@ -190,14 +206,24 @@ impl<N: Nand> FlightLog<N> {
     async fn try_append(&mut self, entry: &Entry) -> Result<Key, LogError> {
         if !self.begun {
             self.begin(entry.start_us).await?;
+        } else if self.described_anew {
+            self.header.opened_us = entry.start_us;
+            let key = self.next_key();
+            self.put_record(record::encode_header(key, &self.header)).await?;
         }
+        self.described_anew = false;
         let key = self.next_key();
-        let record = record::encode_entry(key, entry);
+        self.put_record(record::encode_entry(key, entry)).await?;
+        self.status.last = Some((key, entry.start_us));
+        Ok(key)
+    }
+
+    /// Programs a page with a record and the one before it.
+    async fn put_record(&mut self, record: RecordBytes) -> Result<(), LogError> {
         page::compose(&mut self.page, &record, &self.last);
         self.put_page().await?;
         self.last = record;
-        self.status.last = Some((key, entry.start_us));
-        Ok(key)
+        Ok(())
     }
 
     /// A bounded part of what is better done before it is needed (one erase at most); whether there is more.

@@ -59,6 +59,11 @@ pub fn gyro_axes_b() -> Matrix4x3<f32> {
 /// do not.
 pub fn rate_from_gyros(present: u8) -> Option<SMatrix<f32, 3, 4>> {
     let mut axes_b = gyro_axes_b();
+    if present & 0xF == 0xF {
+        // With all four `G^T G` is diagonal.
+        let of_axis = Vector3::new(1.0 / 1.35, 1.0 / 1.35, 1.0 / 1.3);
+        return Some(SMatrix::from_fn(|axis, plate| axes_b[(plate, axis)] * of_axis[axis]));
+    }
     for plate in 0..4 {
         if present >> plate & 1 == 0 {
             axes_b.set_row(plate, &RowVector3::zeros());

@@ -160,9 +160,9 @@ impl Filter {
             self.lose(since_s);
             return outcome;
         }
-        self.propagate(step, covered_s, gap_s.max(0.0), rotation);
+        let dcm_nb = self.propagate(step, covered_s, gap_s.max(0.0), rotation);
         if rotation {
-            self.gather(step);
+            self.gather(step, &dcm_nb);
         }
         if self.window.duration_s >= self.params.window_s - HALF_A_MILLISECOND {
             self.close(&mut outcome, step.lift_off);
@@ -174,14 +174,15 @@ impl Filter {
         outcome
     }
 
-    /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known.
-    fn propagate(&mut self, step: &Step, covered_s: f32, gap_s: f32, rotation: bool) {
+    /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
+    fn propagate(&mut self, step: &Step, covered_s: f32, gap_s: f32, rotation: bool) -> Matrix3<f32> {
         let before = dcm_nb(&self.q_nb);
         let gyro_b = if rotation { step.angle_b } else { Vector3::zeros() };
         let turned_b = gyro_b - self.gyro_matrix * gyro_b - self.bias_b * covered_s + self.rate_b * gap_s;
         let earth_n = self.params.earth_rate_n * -(covered_s + gap_s);
         self.q_nb = renormalised(from_rotation_vector(earth_n) * self.q_nb * from_rotation_vector(turned_b));
-        let mean = (before + dcm_nb(&self.q_nb)) * 0.5;
+        let after = dcm_nb(&self.q_nb);
+        let mean = (before + after) * 0.5;
         let params = &self.params;
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
             + params.turn_noise * params.turn_noise * turned_b.norm();
@@ -197,11 +198,11 @@ impl Filter {
             variance += square(params.saturated_rate_sd * covered_s);
         }
         self.window.turn(&mean, &gyro_b, covered_s, gap_s, variance);
+        after
     }
 
     /// The samples of a step, each carried to n with the attitude at its own instant.
-    fn gather(&mut self, step: &Step) {
-        let dcm = dcm_nb(&self.q_nb);
+    fn gather(&mut self, step: &Step, dcm: &Matrix3<f32>) {
         let delays = self.params.delays;
         let (rate_b, window_s) = (self.rate_b, self.params.window_s);
         let carried = |sampled: Option<Sampled>, delay_s: f32| {

@@ -47,27 +47,39 @@ impl Solution {
 
     /// What an axis should have measured, and the variance of that.
     pub fn along(&self, axis_b: &Vector3<f32>) -> (f32, f32) {
-        (axis_b.dot(&self.vector_b), axis_b.dot(&(self.covariance_b * axis_b)))
+        let [x, y, z] = [axis_b.x, axis_b.y, axis_b.z];
+        let p = &self.covariance_b;
+        let variance =
+            x * (x * p.m11 + 2.0 * (y * p.m12 + z * p.m13)) + y * (y * p.m22 + 2.0 * z * p.m23) + z * z * p.m33;
+        (axis_b.dot(&self.vector_b), variance)
     }
 }
 
 /// The vector behind `values`, one along each of `axes_b` with the variance beside it; axes whose bit in `wanted` is
 /// clear are left out, as are those beyond the shortest of the three.
 pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted: u16) -> Solution {
-    let mut information = Matrix3::zeros();
+    // Written out: a symmetric matrix has six elements, and this sum is most of what a cycle costs.
+    let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut weighted = Vector3::zeros();
     let mut used = 0;
     for (k, ((axis_b, value), variance)) in axes_b.iter().zip(values).zip(variances).take(16).enumerate() {
         let weight = 1.0 / variance;
-        if wanted >> k & 1 == 0 || !value.is_finite() || !weight.is_finite() || weight <= 0.0 {
+        // Comparisons with NaN are false.
+        let usable = value.is_finite() && weight > 0.0 && weight <= f32::MAX;
+        if wanted >> k & 1 == 0 || !usable {
             continue;
         }
         let row = axis_b * weight;
-        information += row * axis_b.transpose();
+        xx += row.x * axis_b.x;
+        xy += row.x * axis_b.y;
+        xz += row.x * axis_b.z;
+        yy += row.y * axis_b.y;
+        yz += row.y * axis_b.z;
+        zz += row.z * axis_b.z;
         weighted += row * *value;
         used |= 1 << k;
     }
-    let (covariance_b, known) = gaps::invert(&information);
+    let (covariance_b, known) = gaps::invert(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
     Solution {
         vector_b: covariance_b * weighted,
         covariance_b,

@@ -1,36 +1,42 @@
-//! `ground decode`: a stream that was kept, as tables.
+//! `ground decode`: a stream that was kept, or the recorder's chip, as tables.
 //!
-//! In: a file of packets, however damaged, gzip or not, or standard input. Out: CSV on standard output, gaps and
-//! rejected bytes on standard error; or with `--out` a folder with everything. Memory does not grow with the file.
+//! In: a file of packets, however damaged, or a raw image of the NAND, gzip or not, or standard input. Out: CSV on standard
+//! output, gaps and rejected bytes on standard error; or with `--out` a folder with everything. An image is told by its
+//! first [`HEAD`] bytes, where superblock and log begin. Memory does not grow with a stream; an image is bounded by the
+//! largest chip.
+
+mod image;
+mod input;
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Read, Write},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     time::Duration,
 };
 
-use flate2::read::MultiGzDecoder;
-
+use emems::nand::PAGE_BYTES;
 use packets::stream::Bytes5To8;
+use recorder::log::{self, LogError};
 
+use self::input::Input;
 use crate::{
     digest::{Digest, Entry},
     folder::{self, Folder, FolderError},
     table,
 };
 
-/// Bytes read at once.
-const PIECE: usize = 64 * 1024;
+/// [bytes] 62 blocks of an image, four of them the superblock's.
+const HEAD: u64 = 1 << 20;
 
 /// Decodes packets to CSV and lists gaps and bytes that are no packet
 ///
 /// Reads 156-byte packets (and derived frames) from a file however cut, spliced or mixed with other text: every intact
 /// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale
-/// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell; time is counter times cycle.
+/// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell; time is counter times cycle. A raw image of the
+/// recorder's NAND (528 bytes a page) is recognised and gives its newest epoch's records; `recover` gives the others.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded"
+    after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded\n  ground decode nand.bin --out decoded"
 )]
 pub struct Arguments {
     /// File of packets, gzip if it ends in .gz; - for standard input
@@ -38,13 +44,14 @@ pub struct Arguments {
     /// Values in counts instead of SI, with counter, error bits and flags
     #[arg(long, conflicts_with = "out")]
     pub counts: bool,
-    /// Write a folder in DIR instead: counts.csv, si.csv, log.txt, summary.txt, plots in index.html
+    /// Write a folder in DIR instead: counts.csv, si.csv, log.txt, summary.txt, plots in index.html; of an image also
+    /// records.parquet
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Bytes 5 to 8 are a CRC-16 (streams after Table A.2), not the error identifier
     #[arg(long)]
     pub crc: bool,
-    /// Time between two packets
+    /// Time between two packets of a stream; an image says it itself
     #[arg(long, value_name = "TIME", default_value = "200ms", value_parser = cycle)]
     pub cycle: Duration,
 }
@@ -62,6 +69,14 @@ pub enum DecodeError {
         /// Why.
         source: io::Error,
     },
+    /// It is an image, but not of a log that this program reads.
+    #[error("{path}: {source}")]
+    Image {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: LogError,
+    },
     /// Standard output or error cannot be written.
     #[error("the output cannot be written: {0}")]
     Output(#[from] io::Error),
@@ -73,23 +88,52 @@ pub enum DecodeError {
 /// Runs `ground decode`.
 ///
 /// # Errors
-/// When the file cannot be read or the output not written; never because of what is in the file.
+/// When the file cannot be read or the output not written, or it is an image of a newer log; never because of what else is
+/// in the file.
 pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
-    let cycle_s = arguments.cycle.as_secs_f64();
-    match &arguments.out {
-        None => to_text(
-            arguments,
-            cycle_s,
-            &mut BufWriter::new(io::stdout().lock()),
-            &mut BufWriter::new(io::stderr().lock()),
-        ),
-        Some(parent) => to_folder(arguments, cycle_s, parent),
+    let mut input = Input::open(&arguments.file)?;
+    // A stream that is still being sent is not kept waiting: its first bytes are text, those of an image are not.
+    let mut head = input.first(PAGE_BYTES as u64)?;
+    if !head.is_ascii() {
+        head.extend(input.first(HEAD)?);
     }
+    let stdout = &mut BufWriter::new(io::stdout().lock());
+    let stderr = &mut BufWriter::new(io::stderr().lock());
+    let cycle_s = arguments.cycle.as_secs_f64();
+    match (log::is_image(&head), &arguments.out) {
+        (true, None) => image::to_text(&image::log(input, head)?, arguments.counts, stdout, stderr),
+        (true, Some(parent)) => image::to_folder(&image::log(input, head)?, &name(arguments), parent),
+        (false, None) => to_text(arguments, cycle_s, input.after(head), stdout, stderr),
+        (false, Some(parent)) => to_folder(arguments, cycle_s, input.after(head), parent),
+    }
+}
+
+fn name(arguments: &Arguments) -> String {
+    let name = arguments
+        .file
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned());
+    name.filter(|name| name != "-").unwrap_or("stdin".into())
+}
+
+fn stem(name: &str) -> &str {
+    name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("log")
+}
+
+fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str) -> Result<(), DecodeError> {
+    let (rest, summary, envelope) = digest.finish();
+    folder.entries(&rest)?;
+    let rows = summary.rows();
+    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
+    print!("{}", folder::text_of(&rows));
+    println!("{}", path.join("index.html").display());
+    Ok(())
 }
 
 fn to_text(
     arguments: &Arguments,
     cycle_s: f64,
+    input: Input,
     rows: &mut dyn Write,
     remarks: &mut dyn Write,
 ) -> Result<(), DecodeError> {
@@ -117,7 +161,7 @@ fn to_text(
         }
         Ok(())
     };
-    read(&arguments.file, |piece| Ok(put(&digest.push(None, piece))?))?;
+    input.read(|piece| Ok(put(&digest.push(None, piece))?))?;
     let (rest, summary, _) = digest.finish();
     put(&rest)?;
     rows.flush()?;
@@ -125,55 +169,12 @@ fn to_text(
     Ok(remarks.flush()?)
 }
 
-fn to_folder(arguments: &Arguments, cycle_s: f64, parent: &Path) -> Result<(), DecodeError> {
-    let name = arguments
-        .file
-        .file_name()
-        .map_or("stdin".into(), |name| name.to_string_lossy());
-    let stem = name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("log");
-    let mut folder = Folder::create(parent, if stem == "-" { "stdin" } else { stem }, cycle_s)?;
+fn to_folder(arguments: &Arguments, cycle_s: f64, input: Input, parent: &Path) -> Result<(), DecodeError> {
+    let name = name(arguments);
+    let mut folder = Folder::create(parent, stem(&name), cycle_s)?;
     let mut digest = Digest::new(bytes_5_to_8(arguments));
-    read(&arguments.file, |piece| Ok(folder.entries(&digest.push(None, piece))?))?;
-    let (rest, summary, envelope) = digest.finish();
-    folder.entries(&rest)?;
-    let rows = summary.rows();
-    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
-    print!("{}", folder::text_of(&rows));
-    println!("{}", path.join("index.html").display());
-    Ok(())
-}
-
-/// Reads a file to its end, piece by piece.
-fn read(path: &Path, mut take: impl FnMut(&[u8]) -> Result<(), DecodeError>) -> Result<(), DecodeError> {
-    let fail = |offset| {
-        move |source| DecodeError::Read {
-            path: path.to_owned(),
-            offset,
-            source,
-        }
-    };
-    let mut bytes: Box<dyn Read> = if path == Path::new("-") {
-        Box::new(io::stdin().lock())
-    } else {
-        let file = File::open(path).map_err(fail(0))?;
-        if path.extension().is_some_and(|extension| extension == "gz") {
-            Box::new(MultiGzDecoder::new(file))
-        } else {
-            Box::new(file)
-        }
-    };
-    let (mut piece, mut offset) = (vec![0; PIECE], 0);
-    loop {
-        match bytes.read(&mut piece) {
-            Ok(0) => return Ok(()),
-            Ok(length) => {
-                take(piece.get(..length).unwrap_or_default())?;
-                offset += length as u64;
-            }
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(fail(offset)(error)),
-        }
-    }
+    input.read(|piece| Ok(folder.entries(&digest.push(None, piece))?))?;
+    finish(folder, digest, stem(&name), &name)
 }
 
 fn bytes_5_to_8(arguments: &Arguments) -> Bytes5To8 {
@@ -194,6 +195,8 @@ fn cycle(text: &str) -> Result<Duration, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use emems::{packet::encode, sample::Reading};
     use flate2::{Compression, write::GzEncoder};
 
@@ -223,7 +226,9 @@ mod tests {
         }
         packed.finish().expect("finish");
         let (mut rows, mut remarks) = (Vec::new(), Vec::new());
-        to_text(&arguments(&file), 0.2, &mut rows, &mut remarks).expect("decode");
+        let mut input = Input::open(&file).expect("open");
+        let head = input.first(7).expect("a beginning");
+        to_text(&arguments(&file), 0.2, input.after(head), &mut rows, &mut remarks).expect("decode");
         let rows = String::from_utf8(rows).expect("text");
         let times: Vec<_> = rows
             .lines()
@@ -237,19 +242,6 @@ mod tests {
             ),
             "{remarks}"
         );
-    }
-
-    #[test]
-    fn a_file_that_is_cut_or_missing_is_named_with_its_offset() {
-        let place = tempfile::tempdir().expect("temporary folder");
-        let missing = read(&place.path().join("none.txt"), |_| Ok(())).expect_err("missing");
-        assert!(
-            missing.to_string().contains("none.txt cannot be read at byte 0"),
-            "{missing}"
-        );
-        let cut = place.path().join("cut.gz");
-        std::fs::write(&cut, b"\x1f\x8b\x08\x00").expect("write");
-        assert!(read(&cut, |_| Ok(())).is_err());
     }
 
     #[test]

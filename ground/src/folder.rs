@@ -138,6 +138,14 @@ impl Folder {
         self.log.line(&format!("{at_s:12.6} {line}"))
     }
 
+    /// Keeps a remark on all of it.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn remark(&mut self, line: &str) -> Result<(), FolderError> {
+        self.log.line(line)
+    }
+
     /// Keeps what was found in the telemetry: rows, and remarks on what is missing or broken.
     ///
     /// # Errors

@@ -159,3 +159,11 @@ pub fn world(name: &str) -> Arc<dyn TruthSource> {
         .unwrap_or_else(|| panic!("the twin has no motion {name}"))
         .into()
 }
+
+/// A calibration set as the words that send it.
+pub fn set_words(set: &emems::calibration::Set) -> Vec<u8> {
+    let bytes = set.encode();
+    let word = |(place, bytes): (usize, &[u8; 4])| format!("G_CW{place:04X}{:08X}", u32::from_be_bytes(*bytes));
+    let words = bytes.as_chunks::<4>().0.iter().enumerate();
+    words.flat_map(|word_at| word(word_at).into_bytes()).collect()
+}

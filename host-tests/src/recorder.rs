@@ -114,7 +114,7 @@ impl Flown {
     pub fn boot(&mut self, records: u32, cut: Option<(u64, Tear)>) {
         self.chip.power_on();
         self.chip.befalls.cut = cut.map(|(after, tear)| (self.chip.operations + after, tear));
-        let mut log = FlightLog::new(&mut self.chip, BootHeader::default());
+        let mut log = log(&mut self.chip);
         let ended: Result<(), LogError> = block_on(async {
             log.mount().await?;
             for _ in 0..records {
@@ -162,6 +162,30 @@ impl Flown {
             refused: self.refused,
         }
     }
+}
+
+/// The log on a chip, not mounted.
+pub fn log(chip: &mut Cells) -> FlightLog<&mut Cells> {
+    FlightLog::new(chip, BootHeader::default())
+}
+
+/// A chip of so many blocks with three boots of records: 40, 3 and 50.
+pub fn three_boots(blocks: u16, seed: u64) -> Flown {
+    let mut flown = Flown::on(Cells::new(blocks, &[], seed));
+    for records in [40, 3, 50] {
+        flown.boot(records, None);
+    }
+    flown
+}
+
+/// The tally of a flight of which nothing may be amiss.
+///
+/// # Panics
+/// When something is.
+pub fn nothing_lost(mut flown: Flown) -> Tally {
+    let tally = flown.judge(&BTreeSet::new());
+    assert!(tally.is_clean(), "{tally:?} {:?}", flown.chip.breaks);
+    tally
 }
 
 /// Every whole packet record on the chip, by key; counts those that are not what [`entry`] makes.

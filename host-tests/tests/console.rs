@@ -2,7 +2,7 @@
 
 use emems::packet;
 use host_tests::world;
-use host_tests::{Flight, Flown, MS, S};
+use host_tests::{Flight, Flown, MS, S, set_words};
 
 fn still() -> Flight {
     Flight::ideal(world("still"))
@@ -112,19 +112,6 @@ fn every_sensor_passes_its_self_test_and_packets_go_on() {
     assert!(flown.second(11).iter().all(|reading| reading.errors.0 == 0));
 }
 
-/// A calibration set as the words that send it.
-fn words(set: &emems::calibration::Set) -> Vec<u8> {
-    let bytes = set.encode();
-    let word = |(place, bytes): (usize, &[u8; 4])| format!("G_CW{place:04X}{:08X}", u32::from_be_bytes(*bytes));
-    bytes
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .enumerate()
-        .flat_map(|word_at| word(word_at).into_bytes())
-        .collect()
-}
-
 /// The set the unit says it uses.
 fn read_back(flown: &Flown) -> Vec<u8> {
     let replies = flown.replies();
@@ -145,7 +132,7 @@ fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
     own.identity.unit = 7;
     own.identity.set = 5;
     own.gyro[2].bias_counts = -12.5;
-    let sent = words(&own);
+    let sent = set_words(&own);
     let good = still().say(S, &sent).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
     assert!(good.replied("G_CL ok: set 5 of unit 7"), "{:?}", good.replies());
     assert_eq!(read_back(&good), own.encode());
@@ -164,7 +151,7 @@ fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
 
     let mut foreign = own;
     foreign.identity.unit = 9;
-    let foreign = [&sent[..], b"G_CL", &words(&foreign)[..], b"G_CL"].concat();
+    let foreign = [&sent[..], b"G_CL", &set_words(&foreign)[..], b"G_CL"].concat();
     let numbered = still().say(S, &foreign).say(6 * S, b"G_CR").fly(8 * S);
     let why = "G_CL no: of unit 9, this is unit 7";
     assert!(numbered.replied(why), "{:?}", numbered.replies());

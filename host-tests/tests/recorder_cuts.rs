@@ -1,7 +1,8 @@
 //! The flight log under power cuts: every operation, every way to tear, one after another and at random.
 //!
-//! The per-change set is what runs here without asking. The long sets:
+//! The per-change set is what runs here without asking. The long set, some 20 minutes of two cores:
 //! `EMEMS_RUNS=1000000 cargo host-test --test recorder_cuts many_cuts -- --nocapture`, with `EMEMS_SEED` to go elsewhere.
+//! A run that is not clean is printed with its number, from which everything in it is drawn.
 
 use std::collections::BTreeSet;
 

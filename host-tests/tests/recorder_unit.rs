@@ -40,7 +40,7 @@ fn recording() -> Flight {
 /// Packets on the chip, by key.
 fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
     let mut found = std::collections::BTreeMap::new();
-    for block in LOG_START..LOG_START + 20 {
+    for block in LOG_START..LOG_START + 40 {
         for page in 0..PAGES_PER_BLOCK {
             let mut bytes = chip.read(PageAddress { block, page });
             let whole = page::correct(&mut bytes);
@@ -115,7 +115,7 @@ fn recording_begins_at_lift_off_with_the_packet_that_shows_it() {
 }
 
 #[test]
-fn a_power_cut_in_flight_ends_in_flight_and_recording() {
+fn f09_a_power_cut_in_flight_ends_in_flight_and_recording() {
     for (number, after) in [0, 37, 81, 123, 160, 199].into_iter().enumerate() {
         let strikes = LIFT_OFF + 5 * S + after * MS;
         let flown = rocket()
@@ -138,7 +138,7 @@ fn a_power_cut_in_flight_ends_in_flight_and_recording() {
 }
 
 #[test]
-fn a_power_cut_without_lift_off_resumes_from_the_log_alone() {
+fn f09_a_power_cut_without_lift_off_resumes_from_the_log_alone() {
     let strikes = 5 * S + 77 * MS;
     let flown = recording()
         .fault(strikes, Fault::PowerCut(3))
@@ -160,20 +160,82 @@ fn a_power_cut_without_lift_off_resumes_from_the_log_alone() {
     );
 }
 
+/// F8, F9: however the unit went down, and whatever it was at.
 #[test]
-fn a_reset_in_flight_is_followed_by_a_durable_record_within_400_ms() {
-    let strikes = LIFT_OFF + 5 * S + 77 * MS;
-    let flown = rocket().fault(strikes, Fault::Reset).fly(strikes + BACK);
-    let boots: BTreeSet<u32> = logged(flown.nand.clone().expect("a chip"))
-        .iter()
-        .map(|(key, _)| key.boot)
-        .collect();
-    assert_eq!(boots.len(), 2, "a record of the second boot");
+fn f08_f09_a_record_is_durable_400_ms_after_a_reset_or_a_power_cut_in_flight() {
+    let mut latest = 0;
+    for fault in [Fault::Reset, Fault::PowerCut(2), Fault::PowerCut(8)] {
+        for after in [0, 3, 9, 12, 77, 150] {
+            let strikes = LIFT_OFF + 5 * S + after * MS;
+            let is_back = |wait: Nanos| {
+                let flown = rocket().fault(strikes, fault).fly(strikes + wait);
+                let logged = logged(flown.nand.clone().expect("a chip"));
+                logged.iter().map(|(key, _)| key.boot).collect::<BTreeSet<_>>().len() == 2
+            };
+            assert!(is_back(BACK), "{fault:?} {after} ms into a cycle");
+            // To a millisecond.
+            let mut back = 0..BACK / MS;
+            while back.end - back.start > 1 {
+                let middle = back.start + (back.end - back.start) / 2;
+                if is_back(middle * MS) {
+                    back.end = middle;
+                } else {
+                    back.start = middle;
+                }
+            }
+            println!("{fault:?} {after} ms into a cycle: durable after {} ms", back.end);
+            latest = latest.max(back.end);
+        }
+    }
+    println!("at most {latest} ms");
+}
+
+/// F8: 200 resets, each at another instant of the cycle, also in the middle of an operation, which they tear.
+#[test]
+fn f08_resets_at_random_instants_lose_no_record_and_end_in_flight() {
+    const RESETS: u64 = 20;
+    for run in 0..10 {
+        let mut flight = rocket();
+        let mut at = LIFT_OFF + S;
+        for number in 0..RESETS {
+            let draw = (run * RESETS + number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+            at += BACK + draw % (600 * MS);
+            flight = flight.fault(at, Fault::Reset);
+        }
+        let flown = flight.fly(at + BACK);
+        let logged = logged(flown.nand.clone().expect("a chip"));
+        let boots: BTreeSet<u32> = logged.iter().map(|(key, _)| key.boot).collect();
+        assert_eq!(boots.len() as u64, RESETS + 1, "run {run}");
+        let kept: BTreeSet<_> = logged.iter().map(|(_, packet)| *packet).collect();
+        let sent = flown.packets.iter().filter(|(at, _)| *at > LIFT_OFF + S);
+        let missing = sent.filter(|(_, reading)| !kept.contains(&packet::encode(reading)));
+        assert_eq!(missing.count(), 0, "run {run}");
+        // What is missing is seen by its number: at most the packets of the time it took to be back.
+        let counters = counters(&logged);
+        assert!(
+            counters
+                .windows(2)
+                .all(|pair| pair[1] > pair[0] && pair[1] - pair[0] <= 2),
+            "{counters:?}"
+        );
+    }
+}
+
+/// Recording goes with the packets, as often as they come.
+#[test]
+fn at_50_hz_every_packet_is_recorded_and_the_room_left_is_said() {
+    let mut flight = recording();
+    flight.settings.period_ms = 20;
+    let flown = flight.say(4 * S, b"G_ST").fly(6 * S);
+    check_no_gap_but_at(&flown, &[]);
+    assert!(logged(flown.nand.clone().expect("a chip")).len() >= 190);
+    assert!(flown.replied("of 130944 pages, 0 bad blocks"), "{:?}", flown.replies());
+    assert!(flown.replied("43 min left"), "{:?}", flown.replies());
 }
 
 /// F15, in the unit.
 #[test]
-fn a_dead_or_absent_chip_costs_neither_packets_nor_the_console() {
+fn f15_a_dead_or_absent_chip_costs_neither_packets_nor_the_console() {
     let dies = rocket().fault(LIFT_OFF + S, Fault::NandDead(true));
     let flown = dies.say(LIFT_OFF + 3 * S, b"G_DLG_ST").fly(LIFT_OFF + 6 * S);
     assert!(flown.replied("recorder: the NAND stays busy"), "{:?}", flown.replies());
@@ -242,7 +304,7 @@ fn f19_a_dump_goes_on_where_it_was_interrupted() {
 
 /// F16, in the unit.
 #[test]
-fn a_full_recorder_says_so_and_packets_go_on() {
+fn f16_a_full_recorder_says_so_and_packets_go_on() {
     let mut flight = recording();
     // All blocks but two begin with a page of this log.
     let chip = &mut flight.plant.nand.cells;

@@ -170,6 +170,12 @@ impl Set {
         bytes::encode(self)
     }
 
+    /// CRC-32 over what it says, as sent and stored with it.
+    pub fn checksum(&self) -> u32 {
+        let bytes = self.encode();
+        u32::from_le_bytes(core::array::from_fn(|k| bytes[bytes::ENCODED_BYTES - 4 + k]))
+    }
+
     /// Axes of a kind; none for the thermometers.
     pub fn axes(&self, kind: Kind) -> &[Axis] {
         match kind {

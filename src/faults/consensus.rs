@@ -6,14 +6,24 @@
 //! If some do not, the axis that disagrees most is left out, and again, while there is redundancy. Of one wild sensor, or two
 //! on different plates, the wild axes disagree most at every step, as each shows in the others at a third at most.
 
-use nalgebra::{ComplexField, Vector3};
+use nalgebra::Vector3;
 
+use super::root::reciprocal_root;
 use crate::redundancy::{Known, Solution, solve};
 
 /// Standard deviations. Beyond it a value is not used; it changes the vector by at most a quarter of that unnoticed.
 pub(super) const GATE: f32 = 6.0;
 /// An axis that explains itself to more than this part has no redundancy left.
 const UNCHECKED: f32 = 0.05;
+
+/// A vector out of those that agree.
+pub(super) struct Agreement {
+    pub(super) solution: Solution,
+    /// What it expects of each axis, and the variance of that.
+    pub(super) expected: [(f32, f32); 12],
+    /// Whether it was decidable who agrees.
+    pub(super) decided: bool,
+}
 
 /// Values along axes.
 pub(super) struct Values<'a> {
@@ -49,58 +59,56 @@ impl Disagreement {
             variance: variance / free,
         })
     }
-
-    /// In standard deviations, if it is beyond the gate. Looked at squared first: the root is seldom needed.
-    fn beyond_gate(&self) -> Option<f32> {
-        if self.by * self.by <= GATE * GATE * self.variance {
-            return None;
-        }
-        Some(self.by.abs() / ComplexField::sqrt(self.variance)).filter(|sigmas| *sigmas > GATE)
-    }
 }
 
 impl Values<'_> {
-    pub(super) fn solve(&self, wanted: u16) -> Solution {
-        solve(self.axes_b, self.values, self.variances, wanted)
+    fn solve(&self, wanted: u16) -> Agreement {
+        let solution = solve(self.axes_b, self.values, self.variances, wanted);
+        let expected = self.axes_b.map(|axis_b| solution.along(&axis_b));
+        Agreement {
+            solution,
+            expected,
+            decided: true,
+        }
     }
 
-    pub(super) fn disagreement(&self, k: usize, solution: &Solution) -> Option<Disagreement> {
-        let used = solution.used >> k & 1 == 1;
-        Disagreement::of(self.values[k], self.variances[k], solution.along(&self.axes_b[k]), used)
+    pub(super) fn disagreement(&self, k: usize, found: &Agreement) -> Option<Disagreement> {
+        let used = found.solution.used >> k & 1 == 1;
+        Disagreement::of(self.values[k], self.variances[k], found.expected[k], used)
     }
 
-    /// The used axis that disagrees most, if any beyond the gate.
-    fn worst(&self, solution: &Solution) -> Option<usize> {
+    /// The used axis that disagrees most, if any beyond the gate. With the leverage `l` a residual `r` is a disagreement of
+    /// `r / sqrt(v (1 - l))` standard deviations; looked at squared first, as the root is seldom needed.
+    fn worst(&self, found: &Agreement) -> Option<usize> {
         let mut worst = (GATE, None);
-        for k in (0..12).filter(|k| solution.used >> k & 1 == 1) {
-            let beyond = self
-                .disagreement(k, solution)
-                .and_then(|disagreement| disagreement.beyond_gate());
-            if let Some(sigmas) = beyond.filter(|sigmas| *sigmas > worst.0) {
-                worst = (sigmas, Some(k));
+        for k in (0..12).filter(|k| found.solution.used >> k & 1 == 1) {
+            let (expected, explained) = found.expected[k];
+            let (residual, free) = (self.values[k] - expected, self.variances[k] - explained);
+            if residual * residual > GATE * GATE * free && free > UNCHECKED * self.variances[k] {
+                let sigmas = residual.abs() * reciprocal_root(free);
+                if sigmas > worst.0 {
+                    worst = (sigmas, Some(k));
+                }
             }
         }
         worst.1
     }
 
-    /// The vector of those of `candidates` that agree, and whether it was decidable which do.
-    pub(super) fn agreed(&self, candidates: u16) -> (Solution, bool) {
-        let all = self.solve(candidates);
-        if all.known != Known::All || self.worst(&all).is_none() {
-            return (all, true);
+    /// The vector of those of `candidates` that agree.
+    pub(super) fn agreed(&self, candidates: u16) -> Agreement {
+        let mut found = self.solve(candidates);
+        if found.solution.known != Known::All {
+            return found;
         }
-        self.one_by_one(all, candidates.count_ones())
-    }
-
-    fn one_by_one(&self, mut solution: Solution, most: u32) -> (Solution, bool) {
-        for _ in 0..most {
-            let Some(worst) = self.worst(&solution) else { break };
-            let fewer = self.solve(solution.used & !(1 << worst));
-            if fewer.known != Known::All {
-                return (solution, false);
+        for _ in 0..candidates.count_ones() {
+            let Some(worst) = self.worst(&found) else { break };
+            let fewer = self.solve(found.solution.used & !(1 << worst));
+            if fewer.solution.known != Known::All {
+                found.decided = false;
+                break;
             }
-            solution = fewer;
+            found = fewer;
         }
-        (solution, true)
+        found
     }
 }

@@ -19,7 +19,9 @@
 use nalgebra::{ComplexField, SMatrix, Vector3, Vector4};
 
 use super::{
+    Cycle,
     health::Verdict,
+    root::reciprocal_root,
     trace::Limits,
     watch::{QUIET, Watch},
 };
@@ -44,19 +46,10 @@ const ALL: u16 = 0b1111;
 /// Quiet cycles after which a suspicion is dropped.
 const QUIET_CYCLES: u8 = 52;
 
-/// One cycle.
-pub(super) struct Cycle<'a> {
-    pub(super) values: &'a [f32; PLATES],
-    pub(super) present: u16,
-    pub(super) frozen: u16,
-    pub(super) dt_s: Option<f32>,
-}
-
 /// Four gyros under watch.
 #[derive(Clone, Debug)]
 pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
-    noise: [f32; PLATES],
     /// Unit vector of the parity.
     across: [f32; PLATES],
     /// Least squares by all four, and without each.
@@ -83,16 +76,17 @@ impl Gyros {
     pub(super) fn new(axes: &[Axis; PLATES], uncertainty: Uncertainty, timing_s: f32) -> Self {
         let allowed = uncertainty.bias * uncertainty.bias;
         let axes_b = core::array::from_fn(|k| axes[k].axis_b);
+        let across = across(&axes_b);
+        let noise: [f32; PLATES] = core::array::from_fn(|k| axes[k].noise * axes[k].noise);
         Gyros {
             axes_b,
-            across: across(&axes_b),
+            across,
             rate_from_all: matrix(&axes_b, ALL),
             rate_without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k))),
-            noise: core::array::from_fn(|k| axes[k].noise),
             uncertainty,
             timing_s,
-            parity: Watch::new(allowed),
-            watches: [Watch::new(allowed); PLATES],
+            parity: Watch::new((0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(), allowed),
+            watches: noise.map(|noise| Watch::new(noise, allowed)),
             course_b: None,
             usual_b: None,
             cycles: 0.0,
@@ -115,13 +109,13 @@ impl Gyros {
     }
 
     /// Takes a cycle.
-    pub(super) fn step(&mut self, cycle: &Cycle) -> Solution {
+    pub(super) fn step(&mut self, cycle: &Cycle<PLATES>) -> Solution {
         for k in (0..PLATES).filter(|k| cycle.frozen >> k & 1 == 1) {
             self.blame(k, Verdict::Frozen);
         }
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle, candidates);
-        let variances = core::array::from_fn(|k| self.noise[k] * self.noise[k] + systematic);
+        let variances = core::array::from_fn(|k| self.watches[k].noise + systematic);
         let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
         if candidates == ALL {
             solution = self.check(cycle, &variances, systematic, solution);
@@ -139,7 +133,7 @@ impl Gyros {
 
     /// [rad2/s2] what does not average out: scale and direction away from where the parity was learned, and angular
     /// acceleration within the uncertainty of the sampling instants.
-    fn systematic(&self, cycle: &Cycle, candidates: u16) -> f32 {
+    fn systematic(&self, cycle: &Cycle<PLATES>, candidates: u16) -> f32 {
         let rough_b = if candidates == ALL {
             self.rate_from_all * Vector4::from(*cycle.values)
         } else {
@@ -164,13 +158,12 @@ impl Gyros {
     }
 
     /// The parity of all four; the rate of those left.
-    fn check(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
-        let across = self.across;
-        let sum = |part: &dyn Fn(usize) -> f32| (0..PLATES).map(part).sum::<f32>();
-        let parity = sum(&|k| across[k] * cycle.values[k]) - self.parity.offset;
-        let noise = ComplexField::sqrt(sum(&|k| across[k] * across[k] * self.noise[k] * self.noise[k]));
-        let variance = noise * noise + systematic + self.parity.offset_variance;
-        if let Some(leapt) = self.leap(cycle, variances, parity / noise) {
+    fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
+        let sum: f32 = (0..PLATES).map(|k| self.across[k] * cycle.values[k]).sum();
+        let parity = sum - self.parity.offset;
+        let noise = self.parity.noise;
+        let variance = noise + systematic + self.parity.offset_variance;
+        if let Some(leapt) = self.leap(cycle, variances, parity * reciprocal_root(noise)) {
             self.watches[leapt].strike(true);
             if self.watches[leapt].alarm(LIMITS) >= 1.0 {
                 self.blame(leapt, Verdict::Disagreeing);
@@ -180,9 +173,8 @@ impl Gyros {
         if self.leaping.is_none() {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
-        self.parity.note(parity, noise, systematic);
-        self.parity.learn(parity, variance, noise, LIMITS);
-        let alarm = self.parity.alarm(LIMITS);
+        self.parity.note(parity, 1.0, systematic);
+        let alarm = self.parity.learn(parity, variance, LIMITS);
         self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
         } else {
@@ -201,7 +193,7 @@ impl Gyros {
     }
 
     /// The gyro that has leapt in this cycle or goes on leaping, if the parity is `sigmas` and it is one only.
-    fn leap(&mut self, cycle: &Cycle, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
+    fn leap(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], sigmas: f32) -> Option<usize> {
         let before = core::mem::replace(&mut self.last_sigmas, sigmas.abs());
         if sigmas.abs() < LEAP {
             self.leaping = None;
@@ -218,7 +210,7 @@ impl Gyros {
     }
 
     /// The one gyro without which the rate changed far less than without any other, if there is one.
-    fn alone(&self, cycle: &Cycle, variances: &[f32; PLATES]) -> Option<usize> {
+    fn alone(&self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES]) -> Option<usize> {
         let course_b = self.course_b?;
         let changes: [f32; PLATES] = core::array::from_fn(|k| {
             let without = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << k));
@@ -249,14 +241,14 @@ impl Gyros {
     }
 
     /// Watches the excluded gyro, if it is the only one that is missing.
-    fn reconsider(&mut self, cycle: &Cycle, variances: &[f32; PLATES], systematic: f32, solution: &Solution) {
+    fn reconsider(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, solution: &Solution) {
         let watched = cycle.present & self.excluded();
         for k in (0..PLATES).filter(|k| watched >> k & 1 == 1) {
             let (expected, variance) = solution.along(&self.axes_b[k]);
             let share = (variances[k] + variance) / variances[k];
             let watch = &mut self.watches[k];
-            let noise = self.noise[k] * ComplexField::sqrt(share);
-            watch.note(cycle.values[k] - watch.offset - expected, noise, systematic * share);
+            let disagreement = cycle.values[k] - watch.offset - expected;
+            watch.note(disagreement, share, systematic);
             watch.reconsider();
         }
     }

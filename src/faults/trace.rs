@@ -6,8 +6,6 @@
 //! adds to `(sum s)^2`. Kept as integers of 1/64, so that running sums are exact for ever, and clipped at 127, so that one
 //! wild sample does not fill the window alone.
 
-use nalgebra::ComplexField;
-
 /// Cycles: those within one second of the first faulty one at 5 Hz, itself included.
 pub(super) const SHORT: usize = 6;
 /// Cycles: those within five seconds.
@@ -70,17 +68,28 @@ impl Trace {
             disagreement: clipped(disagreement),
             systematic: clipped(systematic),
         };
-        let left = self.ring[(usize::from(self.next) + LONG - SHORT) % LONG];
-        self.short[0] += i32::from(new.disagreement) - i32::from(left.disagreement);
-        self.short[1] += i32::from(new.systematic) - i32::from(left.systematic);
-        let old = core::mem::replace(&mut self.ring[usize::from(self.next)], new);
-        let square = |value: i16| i32::from(value) * i32::from(value);
-        self.sum += i32::from(new.disagreement) - i32::from(old.disagreement);
-        self.squares += square(new.disagreement) - square(old.disagreement);
-        self.systematic += i32::from(new.systematic) - i32::from(old.systematic);
-        self.systematic_squares += square(new.systematic) - square(old.systematic);
-        self.next = (self.next + 1) % LONG as u8;
-        self.held = (self.held + 1).min(LONG as u8);
+        let next = usize::from(self.next) % LONG;
+        let left = self.ring[if next < SHORT {
+            next + LONG - SHORT
+        } else {
+            next - SHORT
+        }];
+        let old = core::mem::replace(&mut self.ring[next], new);
+        // The sums of 26 squares of 8128 stay within 32 bits; arithmetic that would check it is a tenth of the step.
+        let moved = |sum: &mut i32, new: i32, old: i32| *sum = sum.wrapping_add(new).wrapping_sub(old);
+        let square = |value: i16| i32::from(value).wrapping_mul(i32::from(value));
+        moved(&mut self.short[0], new.disagreement.into(), left.disagreement.into());
+        moved(&mut self.short[1], new.systematic.into(), left.systematic.into());
+        moved(&mut self.sum, new.disagreement.into(), old.disagreement.into());
+        moved(&mut self.squares, square(new.disagreement), square(old.disagreement));
+        moved(&mut self.systematic, new.systematic.into(), old.systematic.into());
+        moved(
+            &mut self.systematic_squares,
+            square(new.systematic),
+            square(old.systematic),
+        );
+        self.next = if next + 1 < LONG { next as u8 + 1 } else { 0 };
+        self.held = self.held.saturating_add(1).min(LONG as u8);
     }
 
     /// Whether it holds [`LONG`] cycles.
@@ -111,8 +120,13 @@ impl Trace {
 }
 
 fn clipped(sigmas: f32) -> i16 {
-    let sigmas = if sigmas.is_nan() { MOST_SIGMAS } else { sigmas };
-    ComplexField::round(sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS) * PER_SIGMA) as i16
+    const MOST: i32 = (MOST_SIGMAS * PER_SIGMA) as i32;
+    if sigmas.is_nan() {
+        return MOST as i16;
+    }
+    // To the nearest; the cast saturates and takes off what is behind the point.
+    let half = if sigmas < 0.0 { -0.5 } else { 0.5 };
+    ((sigmas * PER_SIGMA + half) as i32).clamp(-MOST, MOST) as i16
 }
 
 fn squared_sigmas(squares: i32) -> f32 {

@@ -12,7 +12,13 @@
 
 use nalgebra::{ComplexField, Vector3};
 
-use super::{consensus::Values, health::Verdict, trace::Limits, watch::Watch};
+use super::{
+    Cycle,
+    consensus::{Agreement, Values},
+    health::Verdict,
+    trace::Limits,
+    watch::Watch,
+};
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::{PLATES, TRIAD_AXES},
@@ -35,22 +41,18 @@ const RESEMBLES: f32 = 3.0;
 /// ... and from what it should measure by more than this many.
 const DIFFERS: f32 = 6.0;
 
-/// One cycle.
-pub(super) struct Cycle<'a> {
-    pub(super) values: &'a [f32; TRIAD_AXES],
-    pub(super) present: u16,
-    pub(super) frozen: u16,
+/// Why sensors of one kind differ whatever the vector is.
+pub(super) struct Apart {
+    /// [rad/s] rate within the uncertainty of the sampling instants.
     pub(super) rate: f32,
-    pub(super) dt_s: Option<f32>,
-    /// [unit] standard deviation of what differs from plate to plate whatever the vector is.
-    pub(super) apart: f32,
+    /// [unit] standard deviation of what differs from place to place.
+    pub(super) by_place: f32,
 }
 
 /// Twelve axes under watch.
 #[derive(Clone, Debug)]
 pub(super) struct Triads {
     axes_b: [Vector3<f32>; TRIAD_AXES],
-    noise: [f32; TRIAD_AXES],
     uncertainty: Uncertainty,
     /// [s] by how much the sensors' sampling instants are unsure.
     timing_s: f32,
@@ -69,10 +71,9 @@ impl Triads {
     pub(super) fn new(axes: &[Axis; TRIAD_AXES], uncertainty: Uncertainty, timing_s: f32) -> Self {
         Triads {
             axes_b: core::array::from_fn(|k| axes[k].axis_b),
-            noise: core::array::from_fn(|k| axes[k].noise),
             uncertainty,
             timing_s,
-            watches: [Watch::new(uncertainty.bias * uncertainty.bias); TRIAD_AXES],
+            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, uncertainty.bias * uncertainty.bias)),
             likeness: [[0.0; 4]; TRIAD_AXES],
             usual_b: None,
             last_b: None,
@@ -93,49 +94,49 @@ impl Triads {
     }
 
     /// Takes a cycle.
-    pub(super) fn step(&mut self, cycle: &Cycle) -> Solution {
+    pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) -> Solution {
         for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
             self.watches[k].exclude(Verdict::Frozen);
         }
         let values = core::array::from_fn(|k| cycle.values[k] - self.watches[k].offset);
         let candidates = cycle.present & !self.excluded();
-        let systematic = self.systematic(cycle, &values, candidates);
-        let variances =
-            core::array::from_fn(|k| self.noise[k] * self.noise[k] + systematic + self.watches[k].offset_variance);
+        let systematic = self.systematic(cycle.dt_s, apart, &values, candidates);
+        let variances = core::array::from_fn(|k| {
+            let watch = &self.watches[k];
+            watch.noise + systematic + watch.offset_variance
+        });
         let axes_b = self.axes_b;
         let axes = Values {
             axes_b: &axes_b,
             values: &values,
             variances: &variances,
         };
-        let (solution, decided) = axes.agreed(candidates);
-        self.undecided = !decided;
-        if solution.known != Known::All {
+        let found = axes.agreed(candidates);
+        self.undecided = !found.decided;
+        if found.solution.known != Known::All {
             self.last_b = None;
-            return solution;
+        } else if found.decided {
+            let alarms = self.watch(cycle.present, systematic, &axes, &found);
+            self.judge(&alarms, &axes, &found.solution);
+            self.remember(&found.solution);
         }
-        if decided {
-            self.watch(cycle.present, systematic, &axes, &solution);
-            self.judge(&axes, &solution);
-            self.remember(&solution);
-        }
-        solution
+        found.solution
     }
 
     /// [unit2] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
     /// motion within the uncertainty of the sampling instants, and what differs by place.
-    fn systematic(&self, cycle: &Cycle, values: &[f32; TRIAD_AXES], candidates: u16) -> f32 {
+    fn systematic(&self, dt_s: Option<f32>, apart: &Apart, values: &[f32; TRIAD_AXES], candidates: u16) -> f32 {
         let rough_b = self.rough(values, candidates);
         let Uncertainty { scale, direction, .. } = self.uncertainty;
         let relative = scale * scale + direction * direction;
         let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
-        let turned = cycle.rate * cycle.rate * rough_b.norm_squared();
-        let changed = match (self.last_b, cycle.dt_s) {
+        let turned = apart.rate * apart.rate * rough_b.norm_squared();
+        let changed = match (self.last_b, dt_s) {
             (Some(last_b), Some(dt_s)) => (rough_b - last_b).norm_squared() / (dt_s * dt_s),
             _ => 0.0,
         };
         let timing = self.timing_s * self.timing_s * turned.max(changed);
-        relative * from_usual + timing + cycle.apart * cycle.apart
+        relative * from_usual + timing + apart.by_place * apart.by_place
     }
 
     /// A vector good enough to say how uncertain it is: that of the complete plate nearest to the last one, as wild values
@@ -162,37 +163,40 @@ impl Triads {
         }
     }
 
-    fn watch(&mut self, present: u16, systematic: f32, axes: &Values, solution: &Solution) {
-        for k in (0..TRIAD_AXES).filter(|k| present >> k & 1 == 1) {
-            let Some(disagreement) = axes.disagreement(k, solution) else {
-                continue;
-            };
-            let watch = &mut self.watches[k];
-            // The parts of the disagreement's variance are in the same proportion as the axis's own.
-            let share = disagreement.variance / axes.variances[k];
-            watch.note(
-                disagreement.by,
-                self.noise[k] * ComplexField::sqrt(share),
-                systematic * share,
-            );
-            if watch.excluded() {
-                watch.reconsider();
-                self.resemble(k, axes, solution);
-            } else {
-                watch.strike(solution.used >> k & 1 == 0);
-                if solution.used >> k & 1 == 1 {
-                    watch.learn(disagreement.by, disagreement.variance, self.noise[k], LIMITS);
+    /// Notes what each axis disagrees by; how near each that is believed is to an alarm.
+    fn watch(&mut self, present: u16, systematic: f32, axes: &Values, found: &Agreement) -> [f32; TRIAD_AXES] {
+        let mut alarms = [0.0; TRIAD_AXES];
+        for (k, (watch, alarm)) in self.watches.iter_mut().zip(&mut alarms).enumerate() {
+            let (read, used) = (present >> k & 1 == 1, found.solution.used >> k & 1 == 1);
+            let disagreement = axes.disagreement(k, found).filter(|_| read);
+            if let Some(disagreement) = disagreement {
+                // The parts of the disagreement's variance are in the same proportion as the axis's own.
+                watch.note(disagreement.by, disagreement.variance / axes.variances[k], systematic);
+            }
+            match disagreement {
+                Some(_) if watch.excluded() => watch.reconsider(),
+                Some(disagreement) if used => {
+                    watch.strike(false);
+                    *alarm = watch.learn(disagreement.by, disagreement.variance, LIMITS);
+                }
+                _ if watch.excluded() => {}
+                gated => {
+                    if gated.is_some() {
+                        watch.strike(true);
+                    }
+                    *alarm = watch.alarm(LIMITS);
                 }
             }
         }
+        let doubted = present & self.excluded();
+        for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
+            self.resemble(k, axes, &found.solution);
+        }
+        alarms
     }
 
     /// Excludes the axis with the loudest alarm, if there is one.
-    fn judge(&mut self, axes: &Values, solution: &Solution) {
-        let alarms: [f32; TRIAD_AXES] = core::array::from_fn(|k| match self.watches[k].excluded() {
-            true => 0.0,
-            false => self.watches[k].alarm(LIMITS),
-        });
+    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], axes: &Values, solution: &Solution) {
         let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
         if alarms[worst] < 1.0 {
             return;

@@ -9,10 +9,9 @@
 //! departs from it. So a step is seen at the noise's level, not at the calibration's. What creeps in slowly is learned too,
 //! until the offset is more than the calibration can be off by: that is an alarm of its own.
 
-use nalgebra::ComplexField;
-
 use super::{
     health::Verdict,
+    root::{reciprocal_root, root},
     trace::{LONG, Limits, Trace, WILD},
 };
 
@@ -37,6 +36,8 @@ const NOISY: f32 = 4.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watch {
     trace: Trace,
+    /// [unit2] variance of its noise.
+    pub(super) noise: f32,
     /// [unit] learned disagreement.
     pub(super) offset: f32,
     /// [unit2] of the offset.
@@ -50,10 +51,11 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// An axis not seen yet, whose offset may have this variance.
-    pub(super) fn new(allowed: f32) -> Self {
+    /// An axis not seen yet, with noise of this variance, whose offset may have the other.
+    pub(super) fn new(noise: f32, allowed: f32) -> Self {
         Watch {
             trace: Trace::EMPTY,
+            noise,
             offset: 0.0,
             offset_variance: allowed,
             allowed,
@@ -74,16 +76,17 @@ impl Watch {
         self.trace.full()
     }
 
-    /// Takes a cycle's disagreement beyond the offset, with the standard deviation of its noise and the variance of what is
-    /// systematic in it.
-    pub(super) fn note(&mut self, disagreement: f32, noise: f32, systematic: f32) {
-        let systematic = ComplexField::sqrt(systematic + self.offset_variance) / noise;
+    /// Takes a cycle's disagreement beyond the offset; its variance and the systematic part of it are those of the axis
+    /// times `share`.
+    pub(super) fn note(&mut self, disagreement: f32, share: f32, systematic: f32) {
+        let per_noise = reciprocal_root(self.noise * share);
+        let systematic = root(systematic * share + self.offset_variance) * per_noise;
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
-        let mut sigmas = disagreement / noise;
+        let mut sigmas = disagreement * per_noise;
         // The root is worth its while only beyond what it is at least.
         if sigmas.abs() > WILD {
-            let most = WILD * ComplexField::sqrt(1.0 + systematic * systematic);
-            sigmas = sigmas.clamp(-most, most);
+            let most = WILD * root(1.0 + systematic * systematic);
+            sigmas = sigmas.max(-most).min(most);
         }
         self.trace.push(sigmas, systematic);
     }
@@ -95,25 +98,30 @@ impl Watch {
 
     /// How near it is to an alarm, squared; above 1 there is one.
     pub(super) fn alarm(&self, limits: Limits) -> f32 {
-        let over = self.trace.over_squared(limits);
+        self.loudness(self.trace.over_squared(limits))
+    }
+
+    fn loudness(&self, over: f32) -> f32 {
         if self.strikes >= STRIKES {
             // At the third strike the alarm is as loud as the disagreement, so that the worst of several goes first.
-            let loud = f32::from(self.strikes) / f32::from(STRIKES) + ComplexField::sqrt(over);
+            let loud = f32::from(self.strikes) / f32::from(STRIKES) + root(over);
             return loud * loud;
         }
         let crept = self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed);
         over.max(crept)
     }
 
-    /// Learns from a disagreement of this variance in all, unless something may be wrong.
-    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, noise: f32, limits: Limits) {
-        if self.alarm(limits) > QUIET && self.trace.full() {
-            return;
+    /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
+    /// [`Watch::alarm`] has it.
+    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits) -> f32 {
+        let over = self.trace.over_squared(limits);
+        if self.loudness(over) <= QUIET || !self.trace.full() {
+            let gain = self.offset_variance / variance;
+            self.offset += gain * disagreement;
+            let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
+            self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten).min(self.allowed);
         }
-        let gain = self.offset_variance / variance;
-        self.offset += gain * disagreement;
-        let forgotten = noise / MEMORY;
-        self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten * forgotten).min(self.allowed);
+        self.loudness(over)
     }
 
     /// Begins its window anew, as after a change of what it is compared with.
@@ -127,7 +135,7 @@ impl Watch {
     pub(super) fn exclude(&mut self, verdict: Verdict) {
         if !self.excluded() {
             self.relapses = (self.relapses + 1).min(6);
-            let most = OFFSET_LIMIT * ComplexField::sqrt(self.allowed);
+            let most = OFFSET_LIMIT * root(self.allowed);
             self.offset = if self.offset.abs() < most { self.offset } else { 0.0 };
         }
         self.verdict = verdict;

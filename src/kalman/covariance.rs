@@ -25,6 +25,9 @@ pub const GYRO_MATRIX: usize = 6;
 /// First of the velocity.
 pub const VELOCITY: usize = 15;
 
+/// What bias and gyro matrix drive: attitude and velocity.
+const DRIVEN: [usize; 5] = [0, 1, 2, VELOCITY, VELOCITY + 1];
+
 /// Floors of the variances: below them f32 rounding of the sums above is no longer small beside them. Attitude \[rad^2\]
 /// (0.002 deg), bias, gyro matrix, velocity.
 const FLOORS: [f32; 4] = [1e-9, 1e-13, 1e-11, 1e-8];
@@ -73,11 +76,16 @@ impl Covariance {
         let tilt = params.gravity * means.vertical_s;
         self.add_row(VELOCITY, 1, -tilt);
         self.add_row(VELOCITY + 1, 0, tilt);
-        let mut drive = SMatrix::<f32, 5, DRIVERS>::zeros();
-        drive.fixed_rows_mut::<3>(0).copy_from(&window.drive);
-        drive.row_mut(3).copy_from(&(window.mean_drive.row(1) * -tilt));
-        drive.row_mut(4).copy_from(&(window.mean_drive.row(0) * tilt));
-        self.drive(&drive);
+        let row = |of: &SMatrix<f32, 3, DRIVERS>, axis: usize, factor: f32| {
+            core::array::from_fn(|driver| of[(axis, driver)] * factor)
+        };
+        self.drive(&[
+            row(&window.drive, 0, 1.0),
+            row(&window.drive, 1, 1.0),
+            row(&window.drive, 2, 1.0),
+            row(&window.mean_drive, 1, -tilt),
+            row(&window.mean_drive, 0, tilt),
+        ]);
         self.wander(window.angle_variance, tilt);
         self.drift(params, means.duration_s);
         for axis in VELOCITY..STATES {
@@ -99,21 +107,26 @@ impl Covariance {
     }
 
     /// Attitude and velocity gain `drive` times bias and gyro matrix.
-    fn drive(&mut self, drive: &SMatrix<f32, 5, DRIVERS>) {
-        const DRIVEN: [usize; 5] = [0, 1, 2, VELOCITY, VELOCITY + 1];
-        let p = &mut self.0;
-        let gained: SMatrix<f32, 5, STATES> = drive * p.fixed_rows::<DRIVERS>(BIAS);
-        let own = gained.fixed_columns::<DRIVERS>(BIAS) * drive.transpose();
+    fn drive(&mut self, drive: &[[f32; DRIVERS]; DRIVEN.len()]) {
+        let p: &mut [[f32; STATES]; STATES] = &mut self.0.data.0;
+        let dot = |a: &[f32], b: &[f32; DRIVERS]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
+        let gained = drive.map(|drive| p.map(|column| dot(&column[BIAS..VELOCITY], &drive)));
+        let own = |k: usize, l: usize| dot(&gained[k][BIAS..VELOCITY], &drive[l]);
         for (k, row) in DRIVEN.into_iter().enumerate() {
             for column in BIAS..VELOCITY {
-                let sum = p[(row, column)] + gained[(k, column)];
-                p[(row, column)] = sum;
-                p[(column, row)] = sum;
+                let sum = p[row][column] + gained[k][column];
+                p[row][column] = sum;
+                p[column][row] = sum;
             }
             for (l, column) in DRIVEN.into_iter().enumerate().skip(k) {
-                let sum = p[(row, column)] + gained[(k, column)] + gained[(l, row)] + 0.5 * (own[(k, l)] + own[(l, k)]);
-                p[(row, column)] = sum;
-                p[(column, row)] = sum;
+                let both = if k == l {
+                    own(k, k)
+                } else {
+                    0.5 * (own(k, l) + own(l, k))
+                };
+                let sum = p[row][column] + gained[k][column] + gained[l][row] + both;
+                p[row][column] = sum;
+                p[column][row] = sum;
             }
         }
     }
@@ -143,27 +156,32 @@ impl Covariance {
 
     /// What a scalar with these factors on the error state and noise `variance` sees.
     pub(super) fn seen(&self, rows: &[(usize, f32)], variance: f32) -> Seen {
-        let mut column = SVector::zeros();
+        let mut column = [0.0; STATES];
         for (index, factor) in rows {
-            column += self.0.column(*index) * *factor;
+            for (sum, element) in column.iter_mut().zip(&self.0.data.0[*index]) {
+                *sum += element * factor;
+            }
         }
         let explained: f32 = rows.iter().map(|(index, factor)| column[*index] * factor).sum();
         Seen {
-            column,
+            column: SVector::from(column),
             variance: explained + variance,
         }
     }
 
-    /// After a scalar: Joseph's form.
+    /// After a scalar: Joseph's form, by columns of the upper triangle; the lower one is its mirror image.
     pub(super) fn update(&mut self, seen: &Seen) {
-        let p = &seen.column;
-        let gain = p / seen.variance;
+        let p: &[f32; STATES] = &seen.column.data.0[0];
+        let gain = p.map(|p| p / seen.variance);
+        let spread = gain.map(|gain| gain * seen.variance);
+        let columns: &mut [[f32; STATES]; STATES] = &mut self.0.data.0;
         for column in 0..STATES {
+            let (gain_c, p_c) = (gain[column], p[column]);
             for row in 0..=column {
-                let cross = gain[row] * p[column] + p[row] * gain[column];
-                let sum = self.0[(row, column)] - cross + seen.variance * gain[row] * gain[column];
-                self.0[(row, column)] = sum;
-                self.0[(column, row)] = sum;
+                let cross = gain[row] * p_c + p[row] * gain_c;
+                let sum = columns[column][row] - cross + spread[row] * gain_c;
+                columns[column][row] = sum;
+                columns[row][column] = sum;
             }
         }
     }

@@ -17,6 +17,7 @@ use super::{
     Params, Quantity, square,
     window::{FieldSums, MeanField},
 };
+use crate::attitude::sin_cos;
 
 /// The expected field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,11 +81,11 @@ impl Reference {
         if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
             return None;
         }
-        let (sin, cos) = ComplexField::sin_cos(self.dip);
+        let (sin, cos) = sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
         let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
         // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
-        let (sin_d, cos_d) = ComplexField::sin_cos(self.declination);
+        let (sin_d, cos_d) = sin_cos(self.declination);
         Some(Compared {
             scalars: [
                 Scalar {
@@ -106,7 +107,7 @@ impl Reference {
 
     /// Where the field lies as seen from above, in n.
     pub(super) fn heading_n(&self) -> Vector3<f32> {
-        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        let (sin, cos) = sin_cos(self.declination);
         Vector3::new(cos, sin, 0.0)
     }
 
@@ -127,7 +128,7 @@ impl Reference {
 
     /// Components along magnetic north and magnetic east.
     fn magnetic(&self, v_n: &Vector3<f32>) -> (f32, f32) {
-        let (sin, cos) = ComplexField::sin_cos(self.declination);
+        let (sin, cos) = sin_cos(self.declination);
         (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 

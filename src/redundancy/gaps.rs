@@ -26,11 +26,11 @@ const UNKNOWN: f32 = 1e-5;
 /// Covariance on what is known, and what is.
 pub(super) fn invert(information: &Matrix3<f32>) -> (Matrix3<f32>, Known) {
     let mean = information.trace() / 3.0;
-    if !(mean > 0.0 && mean.is_finite()) {
+    if !(mean > 0.0 && mean.is_normal()) {
         return (Matrix3::zeros(), Known::Nothing);
     }
     // Scaled to a mean eigenvalue of one, so that no product over- or underflows.
-    let scaled = information / mean;
+    let scaled = information * (1.0 / mean);
     let adjugate = adjugate(&scaled);
     let determinant = scaled.row(0).transpose().dot(&adjugate.column(0));
     // Products of eigenvalues: of all three, and the sum of those of two.
@@ -48,13 +48,22 @@ pub(super) fn invert(information: &Matrix3<f32>) -> (Matrix3<f32>, Known) {
         let inverse = self::adjugate(&filled) / filled.determinant() - filler;
         return (inverse / mean, Known::Across(unknown_b));
     }
-    (adjugate / (determinant * mean), Known::All)
+    (adjugate * (1.0 / (determinant * mean)), Known::All)
 }
 
-/// Of a symmetric matrix: `A adj(A) = det(A) I`. The columns are cross products of the rows of `A`.
+/// Of a symmetric matrix: `A adj(A) = det(A) I`, six cofactors.
 fn adjugate(a: &Matrix3<f32>) -> Matrix3<f32> {
-    let [x, y, z] = [0, 1, 2].map(|k| a.column(k).into_owned());
-    Matrix3::from_columns(&[y.cross(&z), z.cross(&x), x.cross(&y)])
+    let (xx, yy, zz) = (
+        a.m22 * a.m33 - a.m23 * a.m23,
+        a.m11 * a.m33 - a.m13 * a.m13,
+        a.m11 * a.m22 - a.m12 * a.m12,
+    );
+    let (xy, xz, yz) = (
+        a.m13 * a.m23 - a.m12 * a.m33,
+        a.m12 * a.m23 - a.m13 * a.m22,
+        a.m12 * a.m13 - a.m11 * a.m23,
+    );
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
 fn largest_column(a: &Matrix3<f32>) -> Vector3<f32> {

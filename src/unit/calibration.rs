@@ -1,13 +1,18 @@
 //! The calibration set over the umbilical: taken word by word, used when whole and sound, read back.
 //!
-//! A set in use is that of this unit and these ranges, or the one compiled in; any error leaves it as it was. It lasts
-//! until the next start. Words that are taken are not answered: 284 answers would only lengthen the line's queue, and what
+//! A set in use is that of this unit and these ranges, or the one compiled in; any error leaves it as it was. The
+//! estimation begins afresh with it in the next cycle, the log names it from its next record on. It lasts until the next
+//! start. Words that are taken are not answered: 284 answers would only lengthen the line's queue, and what
 //! was lost is named when the set is to be used.
 
-use core::fmt;
+use core::fmt::{self, Write as _};
 
 use super::shared::Shared;
-use crate::{calibration::Ranges, command::Command};
+use crate::{
+    calibration::{Ranges, Set},
+    command::Command,
+    flight_log::record::Name,
+};
 
 /// Bytes a line of the set read back.
 const LINE_BYTES: usize = 32;
@@ -37,6 +42,8 @@ fn load(shared: &Shared) {
     match sent {
         Ok(set) => {
             *shared.calibration.borrow_mut() = set;
+            *shared.set_name.borrow_mut() = name(&set);
+            shared.set_loaded.set(true);
             shared.arriving.take();
             shared.say(format_args!(
                 "G_CL ok: set {} of unit {}",
@@ -45,6 +52,14 @@ fn load(shared: &Shared) {
         }
         Err(why) => shared.say(format_args!("G_CL no: {why}")),
     }
+}
+
+/// Number and checksum, which tell sets apart that were given one number.
+fn name(set: &Set) -> Name {
+    let mut name = Name::new();
+    // A number of more than seven digits leaves no room for the whole checksum.
+    let _ = write!(name, "{}:{:08X}", set.identity.set, set.checksum());
+    name
 }
 
 struct Hex<'a>(&'a [u8]);

@@ -33,6 +33,9 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator) {
                 Health::INTERNAL_OSCILLATOR,
                 shared.start.oscillator == Oscillator::Internal,
             );
+        if shared.set_loaded.take() {
+            estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
+        }
         let began = now();
         let estimate = estimator.step(&cycle.sample, &cycle.increments);
         let estimate_us = (now() - began).as_micros() as u32;

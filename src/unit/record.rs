@@ -40,6 +40,7 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand) {
     let mut recorder = Recorder {
         shared,
         log: FlightLog::new(K9f1208::new(bus, &shared.clock), header(shared)),
+        calibration: shared.set_name.borrow().clone(),
         retry: Some(Instant::MIN),
         erasing: false,
         dumped: None,
@@ -69,7 +70,7 @@ fn header(shared: &Shared) -> BootHeader {
         opened_us: 0,
         firmware: name(env!("CARGO_PKG_VERSION")),
         unit: name(shared.settings.unit),
-        calibration: name(shared.settings.calibration),
+        calibration: shared.set_name.borrow().clone(),
         period_us: shared.settings.period_ms as u32 * 1000,
     }
 }
@@ -77,6 +78,8 @@ fn header(shared: &Shared) -> BootHeader {
 struct Recorder<'a, N> {
     shared: &'a Shared,
     log: FlightLog<N>,
+    /// The set that the log's header names.
+    calibration: Name,
     /// When to mount; `None` while mounted.
     retry: Option<Instant>,
     erasing: bool,
@@ -128,6 +131,10 @@ impl<N: Nand> Recorder<'_, N> {
         }
         if !recording {
             return;
+        }
+        if self.calibration != *self.shared.set_name.borrow() {
+            self.calibration.clone_from(&self.shared.set_name.borrow());
+            self.log.describe(header(self.shared));
         }
         let sample = &cycle.sample;
         let errors = Health(sample.reading.errors.0.into());

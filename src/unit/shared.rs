@@ -16,7 +16,10 @@ use crate::{
     calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
     derived::{DERIVED_BYTES, Derived, Health},
-    flight_log::{self, LogError, record::RecordBytes},
+    flight_log::{
+        self, LogError,
+        record::{Name, RecordBytes},
+    },
     increments::{Increments, Integrator},
     mode::State,
     packet::PACKET_BYTES,
@@ -113,6 +116,10 @@ pub struct Shared {
     pub umbilical_noise: Cell<u32>,
     /// The calibration set in use.
     pub calibration: RefCell<Set>,
+    /// Its name in the log: what was compiled in, or number and checksum of what was loaded.
+    pub set_name: RefCell<Name>,
+    /// It was loaded and the estimation does not use it yet.
+    pub set_loaded: Cell<bool>,
     /// The one that is being sent.
     pub arriving: RefCell<Arriving>,
     cycles: Cycles,
@@ -142,6 +149,8 @@ impl Shared {
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
             calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
+            set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
+            set_loaded: Cell::default(),
             arriving: RefCell::default(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),

@@ -164,8 +164,13 @@ fn status(shared: &Shared) {
         shared.umbilical_noise.get()
     ));
     shared.say(format_args!(
-        "G_ST recorder {} of {} pages, {} bad blocks, {} bits corrected, {} halves lost",
-        recorder.used, recorder.capacity, recorder.bad_blocks, recorder.corrected, recorder.uncorrectable
+        "G_ST recorder {} of {} pages, {} bad blocks, {} bits corrected, {} halves lost, {} min left",
+        recorder.used,
+        recorder.capacity,
+        recorder.bad_blocks,
+        recorder.corrected,
+        recorder.uncorrectable,
+        recorder.minutes_left(shared.settings.period_ms)
     ));
     match (shared.recorder_error.get(), recorder.erasing) {
         (Some(error), _) => shared.say(format_args!("G_ST recorder: {error}")),

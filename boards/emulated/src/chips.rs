@@ -103,8 +103,7 @@ impl spi::Peer for Gyro {
     }
 }
 
-/// The NAND in the FSMC's bank 2: command latch on A16, address latch on A17. Its WP# is PC8, which [`crate::wires`]
-/// does not carry; the driver lifts protection before every change, so the part is left writable.
+/// The NAND in the FSMC's bank 2: command latch on A16, address latch on A17. Its WP# comes through [`crate::wires`].
 #[derive(Debug)]
 pub struct Nand(pub SharedPlant);
 

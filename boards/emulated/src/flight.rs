@@ -264,6 +264,7 @@ impl Pilot {
                 Fault::Reset => session.reset_by_pin(stop.at, stop.instruction_count, host),
                 Fault::PowerCut(_) => {
                     self.plant.lock().apply(scheduled.fault, stop.at.0);
+                    session.board_mut().mcu.cut_power();
                     // The emulator's memory survives; what a power cut loses is lost here (memory.x).
                     for at in (RETAINED..RETAINED + RETAINED_BYTES).step_by(4) {
                         let _ = host.write(at, Width::W32, 0xDEAD_BEEF);
@@ -271,6 +272,7 @@ impl Pilot {
                     session.reset_by_pin(stop.at, stop.instruction_count, host);
                 }
                 Fault::DmaHung => session.board_mut().mcu.hang_dma(),
+                Fault::SupplyFailing(failing) => session.board_mut().mcu.sag(failing),
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }
         }

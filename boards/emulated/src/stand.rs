@@ -19,14 +19,9 @@ use rigless::{
             Stm32f427,
             generated::{
                 dma2,
-                rcc::{Register, cr},
+                rcc::{Register, cr, csr},
             },
-            peripherals::{
-                gpio::{Gpio, Pin},
-                i2c::I2c,
-                rcc,
-                spi::Select,
-            },
+            peripherals::{gpio::Pin, i2c::I2c, rcc, spi::Select},
         },
     },
     time::VirtualNanos,
@@ -35,13 +30,16 @@ use rigless::{
 use crate::{
     chips::{Gyro, Line, Nand, SensorBus, SharedPlant},
     covers::{self, Covers},
-    wires::{BusPins, DiscretePins, SensorPort},
+    wires::{BusPins, PortC, SensorPort},
 };
 
 /// Virtual instructions a second: one a cycle at 168 MHz.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 /// The crystal of the reference design.
 const HSE_HZ: u64 = 8_000_000;
+/// [mV] the supply, and where it sags to: below the voltage detector's 2.9 V, above the reset's 1.8 V.
+const SUPPLY_MV: u32 = 3300;
+const SAGGING_MV: u32 = 2800;
 const NAME: &str = "emems";
 /// Index of USART2 in the part's serial ports: telemetry.
 const TELEMETRY: usize = 1;
@@ -70,18 +68,20 @@ pub struct Wired {
     part: mcu::Wired<Stm32f427, Nand>,
     sensor_port: SensorPort,
     bus_pins: BusPins,
-    discrete_pins: DiscretePins,
+    port_c: PortC,
     slots: Slots,
     covers: Covers,
     crystal: bool,
     dma_hung: bool,
+    /// The reset to come is one of switching on.
+    power_cut: bool,
 }
 
 impl Wired {
     fn new(plant: SharedPlant, covers: Covers) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
         part.rcc.attach_crystals(HSE_HZ, 0);
-        part.set_supply(3300);
+        part.set_supply(SUPPLY_MV);
         for plate in 0..4_u8 {
             let gyro = Gyro {
                 plant: plant.clone(),
@@ -98,8 +98,6 @@ impl Wired {
         }
         part.usart[TELEMETRY].attach(Line::default());
         part.usart[UMBILICAL].attach(Line::default());
-        // WP# is not wired here: the driver lifts it before every change anyway.
-        plant.lock().nand.protect(false, 0);
         let part = mcu::Wired::new(part, NAND_WINDOW, Nand(plant.clone()))?;
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);
         i2c.attach(SensorBus(plant.clone()));
@@ -116,14 +114,12 @@ impl Wired {
             part,
             sensor_port: SensorPort::new(i2c, plant.clone()),
             bus_pins: BusPins::new(plant.clone()),
-            discrete_pins: DiscretePins {
-                gpio: Gpio::default(),
-                plant,
-            },
+            port_c: PortC::new(plant),
             slots,
             covers,
             crystal: true,
             dma_hung: false,
+            power_cut: false,
         })
     }
 
@@ -154,6 +150,17 @@ impl Wired {
     /// DMA1 stands still in mid-transfer until the next reset.
     pub fn hang_dma(&mut self) {
         self.dma_hung = true;
+    }
+
+    /// The next reset is one of switching on, by its flags, with the supply as it should be.
+    pub fn cut_power(&mut self) {
+        self.sag(false);
+        self.power_cut = true;
+    }
+
+    /// The supply sags below what the voltage detector watches for, or is back.
+    pub fn sag(&mut self, sagging: bool) {
+        self.part.part.set_supply(if sagging { SAGGING_MV } else { SUPPLY_MV });
     }
 
     /// EN of a stream stays set until the item under way is through (RM0090 section 10.3.17), and here it never is.
@@ -189,7 +196,16 @@ impl Mcu for Wired {
         i2c.inherit(&mut self.sensor_port.i2c);
         self.sensor_port = SensorPort::new(i2c, self.sensor_port.plant.clone());
         self.bus_pins = BusPins::new(self.bus_pins.plant.clone());
-        self.discrete_pins.gpio = Gpio::default();
+        self.port_c = PortC::new(self.port_c.plant.clone());
+        // Its pull-down has the pin that the processor has let go.
+        self.port_c.plant.lock().nand.protect(true, at.0);
+        if std::mem::take(&mut self.power_cut) {
+            // RM0090 section 7.3.21: the flags that switching on leaves. The model knows no such reset.
+            let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
+            let flags = [csr::BORRSTF, csr::PADRSTF, csr::PORRSTF];
+            let value = (flags.into_iter()).fold(registers.get(Register::Csr), |value, flag| flag.set(value, 1));
+            registers.set(Register::Csr, value);
+        }
     }
 
     fn poll(&mut self, now: VirtualNanos) {
@@ -216,7 +232,7 @@ impl Mcu for Wired {
         } else if slot == self.slots.gpio_b {
             Some(&mut self.bus_pins as &mut dyn ErasedDevice)
         } else if slot == self.slots.gpio_c {
-            Some(&mut self.discrete_pins as &mut dyn ErasedDevice)
+            Some(&mut self.port_c as &mut dyn ErasedDevice)
         } else {
             model
         };

@@ -2,7 +2,7 @@
 //!
 //! Each is rigless' own model with what it leaves out (its i2c.rs: "A peer holding SDA or SCL low", and `LAST`) or
 //! with what the board has on the pins: pull-ups and the multiplexer's reset on port B, the vehicle's two discrete
-//! lines, active low, on port C. In: the firmware's accesses. Out: levels and register values at the access' instant.
+//! lines, active low, and the NAND's WP# on port C. In: the firmware's accesses. Out: levels and register values at the access' instant.
 
 use rigless::{
     device::{Device, DeviceContext, Level, RegisterFile},
@@ -38,6 +38,9 @@ const SDA: Pin = pin(7);
 const LIFT_OFF: Pin = pin(6);
 /// Micro-g#, PC7.
 const MICRO_G: Pin = pin(7);
+
+/// NAND WP#, PC8.
+const WRITE_PROTECT: Pin = pin(8);
 
 /// I2C1 with lines that can be held low, and with the NACK that `CR2.LAST` asks for.
 #[derive(Debug)]
@@ -224,14 +227,33 @@ impl Device for BusPins {
     }
 }
 
-/// Port C: the vehicle's lift-off# and micro-g# lines; the gyros' chip selects hear its pins through rigless.
+/// Port C: the vehicle's lift-off# and micro-g# lines, and WP# of the NAND with its pull-down; the gyros' chip selects
+/// hear its pins through rigless.
 #[derive(Debug)]
-pub struct DiscretePins {
+pub struct PortC {
     pub gpio: Gpio,
     pub plant: SharedPlant,
+    write_protect: Level,
 }
 
-impl Device for DiscretePins {
+impl PortC {
+    pub fn new(plant: SharedPlant) -> Self {
+        PortC {
+            gpio: Gpio::default(),
+            plant,
+            write_protect: Level::Low,
+        }
+    }
+
+    fn put_write_protect(&mut self, level: Level, context: &mut DeviceContext<'_>) {
+        if std::mem::replace(&mut self.write_protect, level) != level {
+            let protected = level == Level::Low;
+            self.plant.lock().nand.protect(protected, context.now().0);
+        }
+    }
+}
+
+impl Device for PortC {
     type Register = gpioa::Register;
 
     fn read(
@@ -257,7 +279,10 @@ impl Device for DiscretePins {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        self.gpio.drive(WRITE_PROTECT, Some(Level::Low), registers, context);
         self.gpio.write(register, value, registers, context);
+        let level = self.gpio.level(WRITE_PROTECT, registers);
+        self.put_write_protect(level, context);
     }
 
     fn reset(&mut self) {
@@ -266,6 +291,7 @@ impl Device for DiscretePins {
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.gpio.reset_line(registers, context);
+        self.put_write_protect(Level::Low, context);
     }
 }
 

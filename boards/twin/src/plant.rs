@@ -25,7 +25,7 @@ pub use self::{gyro::Gyro, sensor_bus::SensorBus};
 use crate::{
     geometry::{self, PLATES},
     part::{
-        I2cPart, Input, Nanos,
+        I2cPart, Input, Nanos, SpiPart,
         adis16265::{Adis16265, Measurand},
         hmc5883l::{self, Hmc5883l},
         lis331hh::{self, Lis331hh},
@@ -170,6 +170,8 @@ impl Plant {
             Fault::PowerCut(tear) => {
                 self.nand.power_cut(now, tear);
                 self.supply_good = true;
+                self.i2c.power_on(now);
+                self.gyro.iter_mut().for_each(|gyro| gyro.power_on(now));
             }
             Fault::Stretching(slot, duration) => self.stretch(slot, duration),
             Fault::DmaHung | Fault::Reset => {}

@@ -51,7 +51,8 @@ pub enum Fault {
     NandAbsent,
     /// The supply falls below what a program needs (`true`) or is back.
     SupplyFailing(bool),
-    /// The power goes and comes back: what the recorder's memory was doing tears, in the way of this number.
+    /// The power goes and comes back: what the recorder's memory was doing tears, in the way of this number, and every
+    /// part starts as after switching on.
     PowerCut(usize),
     /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
     /// never comes round. A reset frees it.

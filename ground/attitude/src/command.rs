@@ -1,48 +1,72 @@
-//! `ground attitude`: a log to attitude, or the table of real recordings.
+//! `ground attitude`: a log to attitude, the table of real recordings, or the theses' tables.
+//!
+//! In: a unit's log (packets, or their counts as CSV) for the estimation that flies, or a nine-axis recording for its
+//! filter. Out: a summary, the methods beside each other, errors against a reference, a page of plots. Packets and derived
+//! frames from the unit's start on are what the unit had: its estimate comes back bit for bit, and that is said.
 
 use std::{
     fs,
-    io::{self, Read},
+    io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::Command,
+    time::Instant,
 };
 
-use emems::kalman::Params;
+use emems::{kalman::Params, sample::Reading, unit::Settings};
 use indicatif::ProgressBar;
-use packets::stream::{Bytes5To8, Decoder};
+use packets::stream::{Bytes5To8, Decoder, Item};
 
 use crate::{
-    broad,
-    flight::Flight,
-    log::Steps,
-    peers, plots,
+    broad, chapter6, counts,
+    flight::{Comparison, Flight},
+    log::{Cycle, Cycles},
+    methods::{self, NoSet},
+    orbit, peers, plots,
     recording::{self, RecordingError},
+    reference,
 };
 
 /// Estimates attitude from a log, compares it with a reference, checks the filter
 ///
-/// LOG is a stream of packets (with derived frames or without), or nine-axis CSV (t_s, gyr_x.., acc_x.., mag_x..). The
-/// filter is the unit's own. With --recordings it runs on a folder of real recordings with optical truth instead.
+/// LOG is a stream of packets (with derived frames or without), their counts as CSV (of `ground decode --counts`), or
+/// nine-axis CSV (t_s, gyr_x.., acc_x.., mag_x..). The estimation is the unit's own. With --recordings it runs on a folder
+/// of real recordings with optical truth instead, with --theses it prints the theses' tables beside ours.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --out attitude.html\n  ground attitude log.csv --reference truth.csv\n  ground attitude --recordings ../shared/data/broad --peers"
+    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --out attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings ../shared/data/broad --peers\n  ground attitude --theses"
 )]
 pub struct Arguments {
-    /// Packets, or nine-axis CSV (.csv or .csv.gz)
-    #[arg(required_unless_present = "recordings", conflicts_with = "recordings")]
+    /// Packets, or CSV (.csv or .csv.gz)
+    #[arg(required_unless_present_any = ["recordings", "theses"], conflicts_with_all = ["recordings", "theses"])]
     pub log: Option<PathBuf>,
-    /// Nine-axis CSV with q_w, q_x, q_y, q_z to east-north-up; without, a CSV log's own columns are used
+    /// Calibration set to run beside the nominal one; may be given again
+    #[arg(long = "set", value_name = "FILE", requires = "log")]
+    pub sets: Vec<PathBuf>,
+    /// Attitude as CSV: t_s,qw,qx,qy,qz to north-east-down, or q_w, q_x, q_y, q_z to east-north-up; without, a nine-axis
+    /// log's own columns are used
     #[arg(long, value_name = "FILE", requires = "log")]
     pub reference: Option<PathBuf>,
+    /// Seconds to add to the reference's times to have the log's
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        requires = "reference",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    pub offset_s: f64,
     /// Write plots to this HTML page
     #[arg(long, value_name = "FILE", requires = "log")]
     pub out: Option<PathBuf>,
     /// A folder of recordings with optical truth: one table, one set of parameters
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "theses")]
     pub recordings: Option<PathBuf>,
     /// Add the filters of others, run by peers/broad.py
     #[arg(long, requires = "recordings")]
     pub peers: bool,
+    /// Fly both rotation tests and the orbit test of the theses, and print their tables beside ours
+    #[arg(long)]
+    pub theses: bool,
 }
 
 /// Why there is no attitude.
@@ -59,6 +83,12 @@ pub enum AttitudeError {
         /// Why.
         error: io::Error,
     },
+    /// A calibration set for a log that is not in counts.
+    #[error("{0}: a nine-axis log is in SI already; sets are for counts: packets, or CSV of `ground decode --counts`")]
+    NotCounts(String),
+    /// A calibration set cannot be used.
+    #[error(transparent)]
+    Set(#[from] NoSet),
     /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
@@ -68,30 +98,55 @@ pub enum AttitudeError {
     )]
     NoAttitude(String),
     /// The reference and the log never meet in time.
-    #[error("{0}: no sample of it is within half a step of the log's; are both in seconds from the same zero?")]
+    #[error(
+        "{0}: no sample of it is within half a step of the log's; are both in seconds from the same zero? --offset-s moves it"
+    )]
     NeverMeet(String),
 }
+
+/// Seed of the flights of [`Arguments::theses`].
+const SEED: u64 = 7;
 
 /// Runs the subcommand.
 pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
     if let Some(folder) = &arguments.recordings {
         return table(folder, arguments.peers);
     }
-    let log = arguments.log.clone().unwrap_or_default();
-    let (flight, own) = estimate(&log)?;
-    if flight.estimates.is_empty() {
-        return Err(AttitudeError::NoAttitude(log.display().to_string()));
+    if arguments.theses {
+        print!("{}{}", chapter6::tables(SEED), orbit::table(SEED));
+        return Ok(());
     }
+    let path = arguments.log.clone().unwrap_or_default();
     let reference = match &arguments.reference {
-        Some(path) => Some((path, recording::read(path)?)),
-        None => own.map(|rows| (&log, rows)),
+        Some(file) => Some(reference::read(file, arguments.offset_s)?),
+        None => None,
     };
+    let never = || AttitudeError::NeverMeet(arguments.reference.as_ref().unwrap_or(&path).display().to_string());
+    let (flight, met) = match read(&path)? {
+        Log::NineAxis(rows) => {
+            if let Some(set) = arguments.sets.first() {
+                return Err(AttitudeError::NotCounts(set.display().to_string()));
+            }
+            let own = rows.iter().any(|row| row.reference_nb.is_some());
+            let steps = broad::replay(broad::Mode::Full).steps(&rows).map(|(step, _)| step);
+            let flight = Flight::of(Params::ROOM, steps).shifted(-crate::replay::EPOCH_S);
+            let reference = reference.or_else(|| own.then(|| rows.clone()));
+            let met = reference
+                .map(|rows| flight.compare(&rows).ok_or_else(never))
+                .transpose()?;
+            (flight, met)
+        }
+        Log::Unit(cycles) => of_unit(arguments, &cycles, reference.as_deref())?,
+    };
+    if flight.estimates.is_empty() {
+        return Err(AttitudeError::NoAttitude(path.display().to_string()));
+    }
+    if reference_missed(arguments, &met) {
+        return Err(never());
+    }
     print!("{}", summary(&flight));
-    if let Some((path, rows)) = reference {
-        let met = flight
-            .compare(&rows)
-            .ok_or_else(|| AttitudeError::NeverMeet(path.display().to_string()))?;
-        print!("{}", compared(&met));
+    if let Some(met) = &met {
+        print!("{}", compared(met));
     }
     if let Some(out) = &arguments.out {
         let page = plots::page(&flight)?;
@@ -101,6 +156,41 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
     Ok(())
 }
 
+fn reference_missed(arguments: &Arguments, met: &Option<Comparison>) -> bool {
+    arguments.reference.is_some() && met.is_none()
+}
+
+/// The methods beside each other; the last set's flight is what is looked at closer.
+fn of_unit(
+    arguments: &Arguments,
+    cycles: &[Cycle],
+    reference: Option<&[recording::Row]>,
+) -> Result<(Flight, Option<Comparison>), AttitudeError> {
+    let settings = Settings::NOMINAL;
+    let mut sets = vec![methods::compiled_in(&settings)];
+    for file in &arguments.sets {
+        sets.push(methods::read(file, &settings)?);
+    }
+    let count = sets.len() * cycles.len();
+    let began = Instant::now();
+    let mut runs = methods::run(sets, &settings, cycles, reference);
+    let took_s = began.elapsed().as_secs_f64();
+    print!("{}", methods::format(&runs));
+    println!(
+        "estimated                   {count} cycles in {took_s:.2} s, {:.0} a second",
+        count as f64 / took_s
+    );
+    let Some(last) = runs.pop() else {
+        return Ok(Default::default());
+    };
+    println!("looked at closer            {}", last.name);
+    let [equal, other] = last.flight.replayed;
+    if equal + other > 0 {
+        println!("as the unit sent it         {equal} cycles bit for bit, {other} not");
+    }
+    Ok((last.flight, last.met))
+}
+
 fn io_error(path: &Path, error: io::Error) -> AttitudeError {
     AttitudeError::Io {
         file: path.display().to_string(),
@@ -108,31 +198,56 @@ fn io_error(path: &Path, error: io::Error) -> AttitudeError {
     }
 }
 
-/// The log's flight, and its own reference if it has one.
-fn estimate(path: &Path) -> Result<(Flight, Option<Vec<recording::Row>>), AttitudeError> {
+/// What a file is.
+enum Log {
+    /// Rates, forces and fields in SI.
+    NineAxis(Vec<recording::Row>),
+    /// A unit's counts.
+    Unit(Vec<Cycle>),
+}
+
+/// Reads a log, whichever it is.
+fn read(path: &Path) -> Result<Log, AttitudeError> {
     let name = path.to_string_lossy();
+    let mut cycles = Cycles::new(Settings::NOMINAL);
+    let mut taken = Vec::new();
+    if name.ends_with(".csv") {
+        let opened = || fs::File::open(path).map_err(|error| io_error(path, error));
+        let mut header = String::new();
+        BufReader::new(opened()?)
+            .read_line(&mut header)
+            .map_err(|error| io_error(path, error))?;
+        if counts::is_one(&header) {
+            let packet = |reading: Reading| Item::Packet { offset: 0, reading };
+            let readings = counts::parse(&name, BufReader::new(opened()?))?;
+            taken.extend(readings.into_iter().filter_map(|reading| cycles.take(&packet(reading))));
+            taken.extend(cycles.finish());
+            return Ok(Log::Unit(taken));
+        }
+    }
     if name.ends_with(".csv") || name.ends_with(".csv.gz") {
-        let rows = recording::read(path)?;
-        let steps = broad::replay(broad::Mode::Full).steps(&rows).map(|(step, _)| step);
-        let flight = Flight::of(Params::ROOM, steps).shifted(-crate::replay::EPOCH_S);
-        let referenced = rows.iter().any(|row| row.reference_nb.is_some());
-        return Ok((flight, referenced.then_some(rows)));
+        return Ok(Log::NineAxis(recording::read(path)?));
     }
     let mut file = fs::File::open(path).map_err(|error| io_error(path, error))?;
     let bar = ProgressBar::new(file.metadata().map(|metadata| metadata.len()).unwrap_or_default());
-    let (mut decoder, mut steps, mut taken) = (Decoder::new(Bytes5To8::Errors), Steps::default(), Vec::new());
+    let mut decoder = Decoder::new(Bytes5To8::Errors);
     let mut piece = [0; 65_536];
     loop {
         let count = file.read(&mut piece).map_err(|error| io_error(path, error))?;
         if count == 0 {
             break;
         }
-        taken.extend(decoder.push(&piece[..count]).iter().filter_map(|item| steps.take(item)));
+        taken.extend(
+            decoder
+                .push(&piece[..count])
+                .iter()
+                .filter_map(|item| cycles.take(item)),
+        );
         bar.inc(count as u64);
     }
-    taken.extend(steps.finish());
+    taken.extend(cycles.finish());
     bar.finish_and_clear();
-    Ok((Flight::of(Params::ROOM, taken), None))
+    Ok(Log::Unit(taken))
 }
 
 fn summary(flight: &Flight) -> String {
@@ -143,7 +258,7 @@ fn summary(flight: &Flight) -> String {
     text += &format!("found by TRIAD              {} times\n", flight.aligned_s.len());
     if let Some(last) = flight.estimates.last() {
         let [roll, pitch, yaw] = last.euler_deg();
-        let sd = last.sd_n.map(f64::to_degrees);
+        let sd = last.sd_n().map(f64::to_degrees);
         text += &format!("attitude at the end         roll {roll:.2}, pitch {pitch:.2}, yaw {yaw:.2} deg\n");
         text += &format!(
             "its standard deviation      north {:.2}, east {:.2}, down {:.2} deg\n",
@@ -156,7 +271,7 @@ fn summary(flight: &Flight) -> String {
     text
 }
 
-fn compared(met: &crate::flight::Comparison) -> String {
+fn compared(met: &Comparison) -> String {
     let (mean, sd) = (met.mean_deg, met.sd_deg);
     let rmse = |rmse: &crate::score::Rmse| {
         format!(

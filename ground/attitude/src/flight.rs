@@ -1,22 +1,27 @@
 //! A log through the filter: what it estimated, step by step, and how it fared.
 //!
-//! In: steps. Out: [`Flight`], with TRIAD alone beside the filter, every innovation, and against a reference the mean,
-//! standard deviation and root mean square of the error about each axis of b, as chapter 6 of the thesis has them.
+//! In: the cycles of a unit, for the estimation that flies, or steps of a nine-axis recording, for its filter alone. Out:
+//! [`Flight`], with TRIAD beside the filter, every innovation, and against a reference the mean, standard deviation and
+//! root mean square of the error about each axis of b, as chapter 6 of the thesis has them.
 //!
-//! A reference may have another rate or start later: it is compared where it has a sample within half a step, and what
-//! it does not cover is not scored.
+//! A reference may have another rate or start later: it is interpolated where it has samples on both sides within a step,
+//! and what it does not cover is not scored.
 
 use std::collections::BTreeMap;
 
 use emems::{
-    attitude::euler,
-    kalman::{Filter, Innovation, Params, Quantity, Step},
+    attitude::{euler, from_parts},
+    derived::{self, Derived},
+    estimate::Estimator,
+    kalman::{Filter, Innovation, Outcome, Params, Quantity, Step},
+    sample::NO_SLOT,
     triad::{Sighting, triad},
 };
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::{
-    recording::Row,
+    log::Cycle,
+    recording::{Row, attitude_at},
     score::{Rmse, Score},
     whiteness::Check,
 };
@@ -28,12 +33,16 @@ pub struct Estimate {
     pub t_s: f64,
     /// The filter's attitude.
     pub q_nb: UnitQuaternion<f64>,
-    /// TRIAD's, from this step's vectors alone.
-    pub triad_nb: Option<UnitQuaternion<f64>>,
-    /// [rad] standard deviation of the attitude about north, east and down.
-    pub sd_n: Vector3<f64>,
+    /// TRIAD's, from this step's vectors alone, and when they were sampled [s].
+    pub triad_nb: Option<(f64, UnitQuaternion<f64>)>,
+    /// [rad2] covariance of the attitude's error as a rotation vector in n.
+    pub covariance_n: Matrix3<f64>,
     /// [rad/s] gyro bias.
     pub bias_b: Vector3<f64>,
+    /// [m/s2] specific force, if it was sampled.
+    pub force_b: Option<Vector3<f64>>,
+    /// [uT] field, if it was sampled.
+    pub field_b_ut: Option<Vector3<f64>>,
     /// What was compared in it.
     pub innovations: Vec<Innovation>,
 }
@@ -47,6 +56,8 @@ pub struct Flight {
     pub refused: BTreeMap<String, usize>,
     /// [s] when the attitude was found afresh.
     pub aligned_s: Vec<f64>,
+    /// Cycles that are, bit for bit, what the unit sent, and those that are not.
+    pub replayed: [usize; 2],
 }
 
 /// Errors against a reference.
@@ -65,32 +76,72 @@ pub struct Comparison {
 }
 
 impl Flight {
-    /// Estimates a log.
+    /// Estimates a nine-axis recording.
     pub fn of(params: Params, steps: impl IntoIterator<Item = Step>) -> Self {
         let mut filter = Filter::new(params);
         let mut flight = Flight::default();
         for step in steps {
             let outcome = filter.step(&step);
             let t_s = step.at_us as f64 * 1e-6;
-            if let Some(refusal) = outcome.refusal {
-                *flight.refused.entry(format!("{refusal:?}")).or_default() += 1;
-            }
-            if outcome.aligned {
-                flight.aligned_s.push(t_s);
-            }
+            flight.note(t_s, &outcome);
             if filter.aligned {
-                let variances = filter.attitude_covariance_n().diagonal();
+                let [force_b, field_b_ut] =
+                    [step.acc, step.mag].map(|sampled| sampled.map(|sampled| sampled.value_b.cast()));
                 flight.estimates.push(Estimate {
                     t_s,
                     q_nb: filter.attitude().cast(),
-                    triad_nb: alone(&step),
-                    sd_n: variances.map(|variance| f64::from(variance).sqrt()),
+                    triad_nb: alone(&step).map(|q_nb| (t_s, q_nb)),
+                    covariance_n: filter.attitude_covariance_n().cast(),
                     bias_b: filter.bias_b.cast(),
+                    force_b,
+                    field_b_ut,
                     innovations: outcome.innovations.to_vec(),
                 });
             }
         }
         flight
+    }
+
+    /// Estimates a unit's log as the unit does.
+    pub fn of_unit<'a>(mut estimator: Estimator, cycles: impl IntoIterator<Item = &'a Cycle>) -> Self {
+        let mut flight = Flight::default();
+        for cycle in cycles {
+            let (estimate, outcome) = estimator.step_in_full(&cycle.sample, &cycle.increments);
+            if let Some(sent) = &cycle.sent {
+                let again = Derived { estimate, ..**sent };
+                flight.replayed[usize::from(derived::encode(sent) != derived::encode(&again))] += 1;
+            }
+            let t_s = cycle.increments.end_us as f64 * 1e-6;
+            flight.note(t_s, &outcome);
+            let Some(q_nb) = estimate.q_nb.and_then(from_parts) else {
+                continue;
+            };
+            let [nn, ne, nd, ee, ed, dd] = estimate.covariance_n.map(f64::from);
+            let vector = |parts: [f32; 3]| Some(Vector3::from(parts.map(f64::from)));
+            flight.estimates.push(Estimate {
+                t_s,
+                q_nb: q_nb.cast(),
+                triad_nb: estimate
+                    .triad_nb
+                    .and_then(from_parts)
+                    .map(|q_nb| (vectors_s(cycle), q_nb.cast())),
+                covariance_n: Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd),
+                bias_b: Vector3::from(estimate.bias_b.map(f64::from)),
+                force_b: vector(estimate.force_b),
+                field_b_ut: vector(estimate.field_b_ut),
+                innovations: outcome.innovations.to_vec(),
+            });
+        }
+        flight
+    }
+
+    fn note(&mut self, t_s: f64, outcome: &Outcome) {
+        if let Some(refusal) = outcome.refusal {
+            *self.refused.entry(format!("{refusal:?}")).or_default() += 1;
+        }
+        if outcome.aligned {
+            self.aligned_s.push(t_s);
+        }
     }
 
     /// With its times moved by `by_s` [s].
@@ -128,19 +179,16 @@ impl Flight {
         let (mut score, mut triad) = (Score::default(), Score::default());
         let mut errors: Vec<Vector3<f64>> = Vec::new();
         for pair in self.estimates.windows(2) {
-            let (estimate, near_s) = (&pair[1], (pair[1].t_s - pair[0].t_s) / 2.0);
-            let Some(row) = nearest(reference, estimate.t_s).filter(|row| (row.t_s - estimate.t_s).abs() <= near_s)
-            else {
-                continue;
-            };
-            let (Some(reference_nb), true) = (row.reference_nb, row.scored) else {
-                continue;
-            };
-            score.add(&estimate.q_nb, &reference_nb);
-            if let Some(triad_nb) = estimate.triad_nb {
+            let (estimate, step_s) = (&pair[1], pair[1].t_s - pair[0].t_s);
+            if let Some(reference_nb) = attitude_at(reference, estimate.t_s, step_s) {
+                score.add(&estimate.q_nb, &reference_nb);
+                errors.push((reference_nb.inverse() * estimate.q_nb).scaled_axis());
+            }
+            if let Some((t_s, triad_nb)) = estimate.triad_nb
+                && let Some(reference_nb) = attitude_at(reference, t_s, step_s)
+            {
                 triad.add(&triad_nb, &reference_nb);
             }
-            errors.push((reference_nb.inverse() * estimate.q_nb).scaled_axis());
         }
         let count = errors.len();
         let mean = errors.iter().sum::<Vector3<f64>>() / count as f64;
@@ -161,19 +209,40 @@ impl Flight {
 impl Estimate {
     /// [deg] roll, pitch, yaw.
     pub fn euler_deg(&self) -> [f64; 3] {
-        let euler = euler(&self.q_nb.cast());
-        [euler.roll, euler.pitch, euler.yaw].map(|angle| f64::from(angle).to_degrees())
+        euler_deg(&self.q_nb)
+    }
+
+    /// [rad] standard deviation of the attitude about north, east and down.
+    pub fn sd_n(&self) -> Vector3<f64> {
+        self.covariance_n.diagonal().map(|variance| variance.max(0.0).sqrt())
+    }
+
+    /// [deg] standard deviation of roll, pitch and yaw. A small rotation `a` in n turns them by
+    /// `roll = (a_N cos yaw + a_E sin yaw)/cos pitch`, `pitch = a_E cos yaw - a_N sin yaw` and
+    /// `yaw = a_D + roll sin pitch`; near the vertical roll and yaw grow beyond all bounds, and are cut at half a turn.
+    pub fn euler_sd_deg(&self) -> [f64; 3] {
+        let [_, pitch, yaw] = self.euler_deg().map(f64::to_radians);
+        let (sin, cos) = yaw.sin_cos();
+        let roll_row = Vector3::new(cos, sin, 0.0) / pitch.cos().max(f64::MIN_POSITIVE);
+        let yaw_row = Vector3::z() + roll_row * pitch.sin();
+        [roll_row, Vector3::new(-sin, cos, 0.0), yaw_row].map(|row| {
+            let variance = row.dot(&(self.covariance_n * row));
+            variance.max(0.0).sqrt().to_degrees().min(180.0)
+        })
     }
 }
 
-/// The row nearest to a time; rows are in order.
-fn nearest(rows: &[Row], t_s: f64) -> Option<&Row> {
-    let after = rows.partition_point(|row| row.t_s < t_s);
-    let around = [after.checked_sub(1), Some(after)]
-        .into_iter()
-        .flatten()
-        .filter_map(|at| rows.get(at));
-    around.min_by(|a, b| (a.t_s - t_s).abs().total_cmp(&(b.t_s - t_s).abs()))
+/// [deg] roll, pitch, yaw.
+pub fn euler_deg(q_nb: &UnitQuaternion<f64>) -> [f64; 3] {
+    let euler = euler(&q_nb.cast());
+    [euler.roll, euler.pitch, euler.yaw].map(|angle| f64::from(angle).to_degrees())
+}
+
+/// [s] when a cycle's vectors were sampled: between its accelerometers and its magnetometers.
+fn vectors_s(cycle: &Cycle) -> f64 {
+    let slots = cycle.sample.slots_us[..8].iter().filter(|slot| **slot != NO_SLOT);
+    let (count, sum) = slots.fold((0, 0), |(count, sum), slot| (count + 1, sum + u64::from(*slot)));
+    (cycle.sample.start_us + u64::checked_div(sum, count).unwrap_or_default()) as f64 * 1e-6
 }
 
 /// TRIAD on one step's vectors, north being magnetic.

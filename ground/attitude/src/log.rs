@@ -1,249 +1,248 @@
-//! A packet stream to the filter's steps, by nominal matrices (MT).
+//! What a log holds of each cycle: what the unit's estimation was given, and what it made of it.
 //!
-//! In: packets as `ground/packets` reads them, with derived frames or without. Out: one [`Step`] a packet. Specific
-//! force and field are the means over the plates that were read; the rate is the least-squares rate of the gyros
-//! that were. With a derived frame the step has the integrated increment, what it covers, and each group's slot time;
-//! without, the packet's time is its number times the cycle and the increment is the mean of two rates times it.
-//!
-//! Slot times of a group are averaged: four sensors lie within a millisecond.
+//! In: packets as `ground/packets` reads them, with derived frames or without. Out: one [`Cycle`] a packet, for
+//! `emems::estimate`, which flies. With a derived frame a cycle is bit for bit what the unit had. Without, its time is the
+//! packet's number times the period, slot times are those of a unit whose sensors all answer, and each gyro's integral is
+//! the mean of two samples times the time between them, a period at most: the rest is a gap.
 
 use emems::{
-    derived::{Derived, Health},
-    geometry::{dcm_bp, rate_from_gyros},
-    kalman::{Sampled, Step},
-    sample::{NO_SLOT, NOT_READ, Reading},
+    derived::Derived,
+    geometry::rate_from_gyros,
+    increments::{Channel, Increments},
+    sample::{NOT_READ, Reading, SENSOR_COUNT, Sample},
+    unit::Settings,
 };
 use nalgebra::{Vector3, Vector4};
-use packets::{
-    channel::{ACC_LSB, GYRO_LSB, MAG_LSB_UT},
-    stream::{
-        Item,
-        sequence::{CYCLE_S, Sequence},
-    },
-};
+use packets::stream::{Item, sequence::Sequence};
 
-use crate::replay::Noise;
+/// [us] from one slot to the next where every sensor answers: sixteen within 4.2 ms.
+const SLOT_US: u32 = 260;
+/// [us] from the start of a cycle to the middle of its gyros' slots.
+const GYROS_US: u64 = 2_500;
 
-/// Slots of each group in reading order: accelerometers, magnetometers.
-const ACC_SLOTS: std::ops::Range<usize> = 0..4;
-const MAG_SLOTS: std::ops::Range<usize> = 4..8;
+/// One cycle.
+#[derive(Clone, Debug)]
+pub struct Cycle {
+    /// What was measured, and when.
+    pub sample: Sample,
+    /// The gyros since the cycle before.
+    pub increments: Increments,
+    /// The unit's own frame of it, if it came.
+    pub sent: Option<Box<Derived>>,
+}
 
-/// Noise of the unit's parts, per component of the mean over four plates: 4.6 mg and 2.7 gyro counts a sample (thesis
-/// Tables 4.7 and 4.2), and half a magnetometer count of 0.092 uT with as much noise again.
-pub const UNIT_NOISE: Noise = Noise {
-    angle: 2.3e-6,
-    acc: 5.1e-4,
-    mag: 1e-3,
-};
-
-/// Steps in the order the packets came. A derived frame comes before its packet or after it, so a packet's step is
+/// Cycles in the order the packets came. A derived frame comes before its packet or after it, so a packet's cycle is
 /// complete when the next packet is there.
-#[derive(Debug, Default)]
-pub struct Steps {
+#[derive(Debug)]
+pub struct Cycles {
+    settings: Settings,
     sequence: Sequence,
     packet: Option<Reading>,
     /// The frame of `packet`.
-    derived: Option<Derived>,
+    derived: Option<Box<Derived>>,
     /// A frame whose packet has not come yet.
-    ahead: Option<Derived>,
-    last: Option<(f64, Vector3<f64>)>,
+    ahead: Option<Box<Derived>>,
+    /// [us] the unit's clock at packet number zero.
+    epoch_us: i64,
+    /// When the gyros were last read [us], and their counts.
+    last: Option<(u64, [i16; 4])>,
 }
 
-impl Steps {
-    /// The step that an item completes, if it does.
-    pub fn take(&mut self, item: &Item) -> Option<Step> {
+impl Cycles {
+    /// Of a unit with these settings.
+    pub fn new(settings: Settings) -> Self {
+        Cycles {
+            settings,
+            sequence: Sequence::default(),
+            packet: None,
+            derived: None,
+            ahead: None,
+            // The unit's clock begins before its first cycle, so that no slot is before zero.
+            epoch_us: settings.period_ms as i64 * 1000,
+            last: None,
+        }
+    }
+
+    /// The cycle that an item completes, if it does.
+    pub fn take(&mut self, item: &Item) -> Option<Cycle> {
         match item {
             Item::Derived { derived, .. } => {
                 let of_this = self.packet.is_some_and(|packet| packet.counter == derived.counter);
-                *(if of_this { &mut self.derived } else { &mut self.ahead }) = Some(**derived);
+                *(if of_this { &mut self.derived } else { &mut self.ahead }) = Some(derived.clone());
                 None
             }
             Item::Packet { reading, .. } => {
-                let step = self.finish();
+                let cycle = self.finish();
                 self.derived = self.ahead.take().filter(|derived| derived.counter == reading.counter);
                 self.packet = Some(*reading);
-                step
+                cycle
             }
             Item::Reject(_) => None,
         }
     }
 
-    /// The step of the last packet.
-    pub fn finish(&mut self) -> Option<Step> {
+    /// The cycle of the last packet.
+    pub fn finish(&mut self) -> Option<Cycle> {
         let reading = self.packet.take()?;
-        let derived = self.derived.take();
-        let (number, _) = self.sequence.number(reading.counter);
-        self.step(&reading, number as f64 * CYCLE_S, derived)
-    }
-
-    fn step(&mut self, reading: &Reading, time_s: f64, derived: Option<Derived>) -> Option<Step> {
-        let start_s = derived.map_or(time_s, |derived| derived.start_us as f64 * 1e-6);
-        let rate_b = rate(reading)?;
-        let (before_s, rate_before_b) = self
-            .last
-            .replace((start_s, rate_b))
-            .unwrap_or((start_s - CYCLE_S, rate_b));
-        let dt_s = (start_s - before_s).min(CYCLE_S);
-        let (angle_b, covered_s) = match derived {
-            Some(derived) if derived.increments.covered_us > 0 => {
-                let covered_s = derived.increments.covered_us as f32 * 1e-6;
-                (Vector3::from(derived.increments.angle_b), covered_s)
-            }
-            _ => (((rate_b + rate_before_b) * 0.5 * dt_s).cast(), dt_s as f32),
-        };
-        // The clock begins one cycle late, so that no slot is before it.
-        let at_us = ((start_s + CYCLE_S) * 1e6) as u64;
-        let slot_us = |slots: std::ops::Range<usize>| {
-            let read = derived
-                .iter()
-                .flat_map(|derived| &derived.slots_us[slots.clone()])
-                .filter(|slot| **slot != NO_SLOT);
-            let (count, sum) = read.fold((0, 0), |(count, sum), slot| (count + 1, sum + u64::from(*slot)));
-            at_us + u64::checked_div(sum, count).unwrap_or_default()
-        };
-        let sampled = |mean: Option<(Vector3<f64>, f64)>, variance: f32, slots| {
-            mean.map(|(value, plates)| Sampled {
-                value_b: value.cast(),
-                variance: variance * (4.0 / plates) as f32,
-                at_us: slot_us(slots),
-            })
-        };
-        Some(Step {
-            at_us,
-            covered_s,
-            angle_b,
-            angle_variance: UNIT_NOISE.angle * covered_s,
-            rate_b: rate_b.cast(),
-            saturated: derived.is_some_and(|derived| derived.health.contains(Health::GYRO_SATURATED)),
-            acc: sampled(mean_b(&reading.acc_p, ACC_LSB), UNIT_NOISE.acc, ACC_SLOTS),
-            mag: sampled(mean_b(&reading.mag_p, MAG_LSB_UT), UNIT_NOISE.mag, MAG_SLOTS),
-            lift_off: reading.lift_off,
+        let sent = self.derived.take();
+        let period_us = self.settings.period_ms * 1000;
+        let number_us = (self.sequence.number(reading.counter).0 * period_us) as i64;
+        if let Some(frame) = &sent {
+            self.epoch_us = frame.start_us as i64 - number_us;
+        }
+        let start_us = number_us.saturating_add(self.epoch_us).max(0) as u64;
+        let between = self.between(&reading, start_us);
+        Some(Cycle {
+            sample: Sample {
+                reading,
+                start_us,
+                slots_us: match &sent {
+                    Some(frame) => frame.slots_us,
+                    None => core::array::from_fn::<u32, SENSOR_COUNT, _>(|slot| SLOT_US * slot as u32),
+                },
+            },
+            increments: sent.as_ref().map_or(between, |frame| frame.increments),
+            sent,
         })
     }
+
+    /// The gyros since the packet before, by their two samples.
+    fn between(&mut self, reading: &Reading, start_us: u64) -> Increments {
+        let end_us = start_us + GYROS_US;
+        let last = self.last.replace((end_us, reading.gyro));
+        let since_us = last.map_or(0, |(last_us, _)| end_us.saturating_sub(last_us));
+        let covered_us = since_us.min(self.settings.period_ms * 1000) as u32;
+        let before = last.map_or([NOT_READ; 4], |(_, counts)| counts);
+        let gyro = core::array::from_fn(|k| channel(before[k], reading.gyro[k], covered_us));
+        let present = (0..4).filter(|k| gyro[*k].count > 0).fold(0, |bits, k| bits | 1 << k);
+        let matrix = rate_from_gyros(present);
+        let integrals = Vector4::from(gyro.map(|channel| channel.integral_counts_s));
+        let angle_b: Vector3<f32> = matrix.unwrap_or_default() * integrals;
+        Increments {
+            angle_b: (angle_b * self.settings.rate.deg_s_per_count().to_radians()).into(),
+            covered_us: if matrix.is_some() { covered_us } else { 0 },
+            end_us,
+            gyro,
+        }
+    }
 }
 
-/// [rad/s] in b by the gyros that were read; `None` for fewer than three.
-fn rate(reading: &Reading) -> Option<Vector3<f64>> {
-    let present = (0..4)
-        .filter(|plate| reading.gyro[*plate] != NOT_READ)
-        .fold(0, |bits, plate| bits | 1 << plate);
-    let counts = Vector4::from_fn(|plate, _| match reading.gyro[plate] {
-        NOT_READ => 0.0,
-        counts => f64::from(counts),
-    });
-    Some(rate_from_gyros(present)?.cast::<f64>() * counts * GYRO_LSB)
-}
-
-/// Mean in b over the plates whose three axes were read, and how many they were.
-fn mean_b(counts_p: &[[i16; 3]; 4], lsb: f64) -> Option<(Vector3<f64>, f64)> {
-    let read = counts_p
-        .iter()
-        .enumerate()
-        .filter(|(_, axes)| !axes.contains(&NOT_READ));
-    let (sum, plates) = read.fold((Vector3::zeros(), 0.0), |(sum, plates), (plate, axes)| {
-        (
-            sum + dcm_bp(plate).cast::<f64>() * Vector3::from(axes.map(f64::from)),
-            plates + 1.0,
-        )
-    });
-    (plates > 0.0).then(|| (sum * (lsb / plates), plates))
+/// A gyro between two samples; nothing where one was not read.
+fn channel(before: i16, now: i16, covered_us: u32) -> Channel {
+    if before == NOT_READ || now == NOT_READ {
+        return Channel {
+            integral_counts_s: 0.0,
+            least: NOT_READ,
+            most: NOT_READ,
+            count: 0,
+        };
+    }
+    Channel {
+        integral_counts_s: (f32::from(before) + f32::from(now)) * 0.5e-6 * covered_us as f32,
+        least: before.min(now),
+        most: before.max(now),
+        count: 2,
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use emems::increments::{Increments, Integrator};
+    use emems::{
+        derived::Health,
+        increments::Integrator,
+        sample::{Errors, NO_SLOT},
+    };
 
     use super::*;
 
-    /// Table 4.7's mean and Table 4.2's, rounded to counts, as one reading.
-    fn golden() -> Reading {
-        let mut reading = Reading::unread(1);
-        reading.acc_p = [[-317, 4, -97], [-333, -4, -128], [-321, 11, -125], [2, 0, 348]];
-        reading.mag_p = [[10, 20, 30]; 4];
-        reading.gyro = [-4, 2204, -2275, 5];
-        reading
+    /// Table 4.2's mean of the gyros, rounded to counts: -200 deg/s about y.
+    fn turning(counter: u16) -> Reading {
+        Reading {
+            errors: Errors(0),
+            gyro: [-4, 2204, -2275, 5],
+            ..Reading::unread(counter)
+        }
     }
 
-    #[test]
-    fn the_printed_samples_give_the_golden_vectors() {
-        // Specific force and rate in b by nominal matrices; half a count of each sensor.
-        let (acc_b, plates) = mean_b(&golden().acc_p, ACC_LSB).expect("read");
-        assert_eq!(plates, 4.0);
-        assert!(
-            (acc_b - Vector3::new(0.0747, 0.0052, -10.147)).norm() < 0.015,
-            "{acc_b}"
-        );
-        let rate_deg = rate(&golden()).expect("read").map(f64::to_degrees);
-        assert!(
-            (rate_deg - Vector3::new(-1.614, -199.672, 1.596)).norm() < 0.05,
-            "{rate_deg}"
-        );
-    }
-
-    fn steps(readings: impl IntoIterator<Item = Reading>) -> Vec<Step> {
-        let mut steps = Steps::default();
-        let packets = readings.into_iter().map(|reading| Item::Packet { offset: 0, reading });
-        let mut all: Vec<Step> = packets.filter_map(|item| steps.take(&item)).collect();
-        all.extend(steps.finish());
+    fn cycles(items: &[Item]) -> Vec<Cycle> {
+        let mut cycles = Cycles::new(Settings::NOMINAL);
+        let mut all: Vec<Cycle> = items.iter().filter_map(|item| cycles.take(item)).collect();
+        all.extend(cycles.finish());
         all
     }
 
-    #[test]
-    fn a_plate_that_was_not_read_is_left_out_and_its_share_of_noise_grows() {
-        let mut lacking = golden();
-        lacking.acc_p[1][2] = NOT_READ;
-        let both = steps([lacking, Reading { counter: 2, ..golden() }]);
-        let variance = |step: &Step| step.acc.expect("read").variance;
-        assert!((variance(&both[0]) / variance(&both[1]) - 4.0 / 3.0).abs() < 1e-6);
-        assert_eq!(both[1].at_us - both[0].at_us, 200_000);
+    fn packet(reading: Reading) -> Item {
+        Item::Packet { offset: 0, reading }
     }
 
     #[test]
-    fn a_derived_frame_is_used_before_its_packet_and_after_it() {
-        let mut slots_us = [NO_SLOT; 16];
-        slots_us[..8].copy_from_slice(&[100, 200, 300, 400, 1100, 1200, 1300, 1400]);
-        let derived = |counter| Derived {
+    fn two_packets_are_a_rotation_of_the_time_between_them() {
+        let all = cycles(&[packet(turning(1)), packet(turning(2))]);
+        assert_eq!(all[0].increments.covered_us, 0);
+        let second = &all[1];
+        assert_eq!(
+            (second.sample.start_us, second.increments.covered_us),
+            (600_000, 200_000)
+        );
+        // MT on Table 4.2: (-1.614, -199.672, 1.596) deg/s; half a count of each gyro.
+        let expected = Vector3::new(-1.614_f32, -199.672, 1.596).map(f32::to_radians) * 0.2;
+        assert!((Vector3::from(second.increments.angle_b) - expected).norm() < 2e-4);
+    }
+
+    #[test]
+    fn lost_packets_are_a_gap_and_a_gyro_not_read_has_no_part() {
+        let mut lacking = turning(9);
+        lacking.gyro[0] = NOT_READ;
+        let all = cycles(&[packet(turning(1)), packet(lacking)]);
+        assert_eq!(all[1].sample.start_us - all[0].sample.start_us, 1_600_000);
+        assert_eq!(all[1].increments.covered_us, 200_000);
+        assert_eq!(all[1].increments.gyro.map(|gyro| gyro.count), [0, 2, 2, 2]);
+        let mut two = turning(2);
+        two.gyro[..2].fill(NOT_READ);
+        assert_eq!(cycles(&[packet(turning(1)), packet(two)])[1].increments.covered_us, 0);
+    }
+
+    fn frame(counter: u16) -> Item {
+        let derived = Derived {
             counter,
-            start_us: 200_000 * u64::from(counter),
+            start_us: 1_000_000 + 200_000 * u64::from(counter),
             mode: emems::mode::Mode::Wait,
-            health: Health::GYRO_SATURATED,
+            health: Health::default(),
             cycle_us: 5_000,
-            slots_us,
+            slots_us: [NO_SLOT; SENSOR_COUNT],
             increments: Increments {
-                angle_b: [0.1, 0.2, 0.3],
                 covered_us: 190_000,
                 ..Integrator::new(1.0).take()
             },
             estimate: emems::estimate::Estimate::NOTHING,
             estimate_us: 0,
         };
-        let packet = |counter| Item::Packet {
+        Item::Derived {
             offset: 0,
-            reading: Reading { counter, ..golden() },
-        };
-        let frame = |counter| Item::Derived {
-            offset: 0,
-            derived: Box::new(derived(counter)),
-        };
-        let check = |items: [Item; 4]| {
-            let mut steps = Steps::default();
-            let mut all: Vec<Step> = items.iter().filter_map(|item| steps.take(item)).collect();
-            all.extend(steps.finish());
-            assert_eq!(all.len(), 2);
-            for step in all {
-                assert_eq!((step.angle_b.y, step.covered_s, step.saturated), (0.2, 0.19, true));
-                assert_eq!(step.acc.expect("read").at_us - step.at_us, 250);
-                assert_eq!(step.mag.expect("read").at_us - step.at_us, 1_250);
-            }
-        };
-        check([packet(1), frame(1), packet(2), frame(2)]);
-        check([frame(1), packet(1), frame(2), packet(2)]);
+            derived: Box::new(derived),
+        }
     }
 
     #[test]
-    fn two_gyros_are_no_rate_and_the_packet_is_no_step() {
-        let mut reading = golden();
-        reading.gyro[..2].fill(NOT_READ);
-        assert_eq!(steps([reading]), []);
+    fn a_derived_frame_is_used_before_its_packet_and_after_it() {
+        let check = |items: [Item; 4]| {
+            let all = cycles(&items);
+            assert_eq!(all.len(), 2);
+            for cycle in all {
+                assert_eq!(cycle.increments.covered_us, 190_000);
+                let at_us = 1_000_000 + 200_000 * u64::from(cycle.sample.reading.counter);
+                assert_eq!((cycle.sample.start_us, cycle.sample.slots_us[0]), (at_us, NO_SLOT));
+                assert!(cycle.sent.is_some());
+            }
+        };
+        let (one, two) = (packet(turning(1)), packet(turning(2)));
+        check([one.clone(), frame(1), two.clone(), frame(2)]);
+        check([frame(1), one, frame(2), two]);
+    }
+
+    #[test]
+    fn cycles_without_a_frame_lie_on_the_clock_of_those_with_one() {
+        let all = cycles(&[packet(turning(1)), frame(1), packet(turning(2)), packet(turning(3))]);
+        assert_eq!(all[2].sample.start_us, 1_600_000);
     }
 }

@@ -1,17 +1,18 @@
 //! A flight's plots: angles with three standard deviations, innovations with their gates, biases.
+//!
+//! In: a [`Flight`]. Out: one page of HTML that opens without a network.
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel, html};
 use emems::kalman::Quantity;
 
-use crate::flight::Flight;
+use crate::flight::{Flight, euler_deg};
 
 /// Most points in a line: more cannot be seen, and an hour at 285 Hz has a million.
 const MOST_POINTS: usize = 4_000;
 
 /// The page.
 pub fn page(flight: &Flight) -> Result<String, ChartError> {
-    let about =
-        "The unit's filter on a log: attitude with three standard deviations, innovations over their own, biases.";
+    let about = "The unit's filter on a log: attitude with three standard deviations and TRIAD beside it, innovations within their gates, biases.";
     let blocks = [angles(flight)?, innovations(flight)?, biases(flight)?].map(Block::Figure);
     Ok(html("Attitude", about, &blocks))
 }
@@ -33,47 +34,101 @@ fn thinned(flight: &Flight) -> impl Iterator<Item = &crate::flight::Estimate> {
 }
 
 fn angles(flight: &Flight) -> Result<Figure, ChartError> {
-    let panels = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {
-        let line = thinned(flight)
-            .map(|estimate| (estimate.t_s, estimate.euler_deg()[axis]))
-            .collect();
-        panel(name, "deg", vec![Layer::new("filter", 0, Marks::Line(line))])
-    });
-    // Standard deviations are about axes of n; Euler angles turn about others.
-    let bands = ["north", "east", "down"].into_iter().enumerate().map(|(axis, name)| {
+    let angles = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {
+        let of = |estimate: &crate::flight::Estimate| (estimate.t_s, estimate.euler_deg()[axis]);
         let band = thinned(flight).map(|estimate| {
-            let three = 3.0 * estimate.sd_n[axis].to_degrees();
-            (estimate.t_s, -three, three)
+            let (t_s, angle) = of(estimate);
+            let three = 3.0 * estimate.euler_sd_deg()[axis];
+            (t_s, angle - three, angle + three)
         });
-        let title = format!("3 sd about {name}");
-        panel(
-            &title,
-            "deg",
-            vec![Layer::new("3 standard deviations", 5, Marks::Band(band.collect()))],
-        )
+        let triad = thinned(flight).filter_map(|estimate| {
+            let (t_s, triad_nb) = estimate.triad_nb?;
+            Some((t_s, euler_deg(&triad_nb)[axis]))
+        });
+        let layers = vec![
+            Layer::new("3 standard deviations", 5, Marks::Band(unwrapped_band(band))),
+            Layer::new("TRIAD", 4, Marks::Dots(triad.collect())),
+            Layer::new("filter", 0, Marks::Line(broken(thinned(flight).map(of)))),
+        ];
+        panel(name, "deg", layers)
     });
-    Figure::of("Attitude", 3, &panels.chain(bands).collect::<Vec<_>>())
+    let widths = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {
+        let line = thinned(flight).map(|estimate| (estimate.t_s, 3.0 * estimate.euler_sd_deg()[axis]));
+        let layers = vec![Layer::new("3 standard deviations", 5, Marks::Line(line.collect()))];
+        panel(&format!("3 sd of {name}"), "deg", layers)
+    });
+    Figure::of("Attitude", 3, &angles.chain(widths).collect::<Vec<_>>())
+}
+
+/// [deg] a jump between two points that is the angle's end and not a turn.
+const WRAP_DEG: f64 = 180.0;
+
+/// A line that breaks where an angle goes from one end of its range to the other.
+fn broken(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> = Vec::new();
+    for (t_s, angle) in points {
+        if let Some((before_s, before)) = line.last().copied()
+            && (angle - before).abs() > WRAP_DEG
+        {
+            line.push(((t_s + before_s) / 2.0, f64::NAN));
+        }
+        line.push((t_s, angle));
+    }
+    line
+}
+
+fn unwrapped_band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<(f64, f64, f64)> {
+    let mut band: Vec<(f64, f64, f64)> = Vec::new();
+    for (t_s, low, high) in points {
+        if let Some((before_s, before, _)) = band.last().copied()
+            && (low - before).abs() > WRAP_DEG
+        {
+            band.push(((t_s + before_s) / 2.0, f64::NAN, f64::NAN));
+        }
+        band.push((t_s, low, high));
+    }
+    band
 }
 
 fn innovations(flight: &Flight) -> Result<Figure, ChartError> {
     use Quantity::*;
-    let panels = [Bias, Velocity, FieldEast, FieldMeridian].map(|quantity| {
+    let panels = [
+        (Bias, "gyro bias at rest", "deg/s", 1.0_f64.to_degrees()),
+        (Velocity, "velocity", "m/s", 1.0),
+        (FieldEast, "field east", "1", 1.0),
+        (FieldMeridian, "field in the meridian", "1", 1.0),
+    ]
+    .map(|(quantity, title, unit, scale)| {
+        let all = || {
+            let each = flight.estimates.iter();
+            let records =
+                each.flat_map(|estimate| estimate.innovations.iter().map(move |record| (estimate.t_s, record)));
+            records.filter(move |(_, record)| record.quantity == quantity)
+        };
         let of = |accepted: bool| {
-            let all = flight
-                .estimates
-                .iter()
-                .flat_map(|estimate| estimate.innovations.iter().map(move |record| (estimate.t_s, record)));
-            all.filter(|(_, record)| record.quantity == quantity && record.accepted == accepted)
-                .map(|(t_s, record)| (t_s, f64::from(record.residual) / f64::from(record.variance).sqrt()))
+            let chosen = all().filter(|(_, record)| record.accepted == accepted);
+            chosen
+                .map(|(t_s, record)| (t_s, scale * f64::from(record.residual)))
                 .collect()
         };
+        // Several scalars of a quantity fall in one instant; the gate drawn is the widest of them.
+        let mut gates: Vec<(f64, f64, f64)> = Vec::new();
+        for (t_s, record) in all() {
+            // A test ratio of one is the gate.
+            let gate = scale * (f64::from(record.residual).powi(2) / f64::from(record.test_ratio)).sqrt();
+            match gates.last_mut().filter(|last| last.0 == t_s) {
+                Some(last) => (last.1, last.2) = (last.1.min(-gate), last.2.max(gate)),
+                None => gates.push((t_s, -gate, gate)),
+            }
+        }
         let layers = vec![
+            Layer::new("gate", 5, Marks::Band(gates)),
             Layer::new("accepted", 0, Marks::Dots(of(true))),
             Layer::new("rejected", 1, Marks::Dots(of(false))),
         ];
-        panel(&format!("{quantity:?}"), "standard deviations", layers)
+        panel(title, unit, layers)
     });
-    Figure::of("Innovations", 2, &panels)
+    Figure::of("Innovations and their gates", 2, &panels)
 }
 
 fn biases(flight: &Flight) -> Result<Figure, ChartError> {

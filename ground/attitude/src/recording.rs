@@ -203,6 +203,28 @@ pub fn parse(file: &str, lines: impl BufRead) -> Result<Vec<Row>, RecordingError
     Ok(rows)
 }
 
+/// The attitude that rows have at `t_s`: between two of them that are at most `most_s` [s] from it, or at the one that is
+/// within half of that. `None` where they have none or do not count.
+pub fn attitude_at(rows: &[Row], t_s: f64, most_s: f64) -> Option<UnitQuaternion<f64>> {
+    let near = |row: &&Row| row.scored && (row.t_s - t_s).abs() <= most_s;
+    let after_at = rows.partition_point(|row| row.t_s < t_s);
+    let after = rows.get(after_at).filter(near);
+    let before = after_at.checked_sub(1).map(|at| &rows[at]).filter(near);
+    let single = |row: &Row| row.reference_nb.filter(|_| (row.t_s - t_s).abs() <= most_s / 2.0);
+    match (before, after) {
+        (Some(before), Some(after)) => match (before.reference_nb, after.reference_nb) {
+            (Some(q_before), Some(q_after)) => {
+                let part = (t_s - before.t_s) / (after.t_s - before.t_s);
+                // Opposite attitudes have no shortest way between them.
+                q_before.try_slerp(&q_after, part, 1e-9)
+            }
+            _ => single(before).or_else(|| single(after)),
+        },
+        (Some(row), None) | (None, Some(row)) => single(row),
+        (None, None) => None,
+    }
+}
+
 /// A reference to east-north-up as one to north-east-down; `None` for one that is no rotation.
 fn from_east_north_up(q_ub: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
     // Half a turn about the bisector of north and east swaps them and turns up down.
@@ -239,6 +261,28 @@ mod tests {
         );
         assert_eq!((rows[1].mag_b, rows[0].reference_nb), (None, None));
         assert_eq!((rows[0].scored, rows[1].scored), (false, true));
+    }
+
+    #[test]
+    fn a_reference_of_another_rate_is_read_between_its_rows_and_nowhere_else() {
+        let row = |t_s: f64, yaw: f64| Row {
+            t_s,
+            rate_b: Vector3::zeros(),
+            acc_b: None,
+            mag_b: None,
+            reference_nb: Some(UnitQuaternion::from_euler_angles(0.0, 0.0, yaw)),
+            scored: t_s < 2.5,
+        };
+        let rows = [row(1.0, 0.0), row(2.0, 0.4), row(3.0, 0.8)];
+        let yaw = |t_s: f64, most_s: f64| attitude_at(&rows, t_s, most_s).map(|q| q.euler_angles().2);
+        assert!((yaw(1.25, 1.0).expect("between") - 0.1).abs() < 1e-12);
+        assert_eq!(yaw(1.5, 0.2), None);
+        assert!((yaw(0.95, 0.2).expect("near the first")).abs() < 1e-12);
+        assert_eq!(
+            (yaw(0.5, 0.6), yaw(2.9, 0.5)),
+            (None, None),
+            "before it begins, and where it does not count"
+        );
     }
 
     #[test]

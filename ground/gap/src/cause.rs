@@ -3,7 +3,7 @@
 //! In: an [`Attribution`] or a [`Scatter`]. Out: [`Cause`]s with the channels that hold their energy, when they show, their
 //! parameters with sigmas, and their probability against everything that could stand in their place.
 
-use twin::effect::Parameter;
+use twin::effect::{Page, Parameter};
 
 use crate::{
     attribute::{Attribution, Chosen},
@@ -19,8 +19,8 @@ use crate::{
 /// `TRIALS.md` says how far it holds.
 pub const TEMPERATURE: f64 = 2.0;
 
-/// Prior sigmas beyond which a parameter more likely stands for something else (gap method, pitfall 19).
-const SUSPICIOUS: f64 = 5.0;
+/// Of its largest size, from where an engineer should look twice.
+const SUSPICIOUS: f64 = 0.25;
 
 /// Share of an effect's energy below which a channel is not named.
 const NAMED_SHARE: f64 = 0.02;
@@ -70,6 +70,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
     let model = found.model(library);
     let cause = |(index, chosen): (usize, &Chosen)| {
         let hypothesis = &library.hypotheses[chosen.hypothesis];
+        let page = hypothesis.cause.effect.page();
         let mut others = model.clone();
         others.remove(index);
         let mut energy = vec![0.0; feels.len()];
@@ -102,15 +103,15 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
                 .collect(),
             probability: probability(library, chosen),
             gain: chosen.gain,
-            is_suspicious: oversize(&chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
+            is_suspicious: oversize(page, &chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
             parameters,
             share: total,
             when: match hypothesis.span {
                 Some(span) => format!("from {:.1} to {:.1} s", span.from, span.to),
                 None => regime::when(&feels, &energy),
             },
-            confirm_by: hypothesis.cause.effect.page().confirm_by,
-            physics: hypothesis.cause.effect.page().physics,
+            confirm_by: page.confirm_by,
+            physics: page.physics,
         }
     };
     found.chosen.iter().enumerate().map(cause).collect()
@@ -154,16 +155,16 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
     }
 }
 
-/// Largest parameter in prior sigmas.
-fn oversize(theta: &nalgebra::DVector<f64>, parameters: &[Parameter]) -> f64 {
+/// Largest parameter over the size beyond which it more likely stands for something else (gap method, pitfall 19).
+fn oversize(page: &Page, theta: &nalgebra::DVector<f64>, parameters: &[Parameter]) -> f64 {
     let sizes = theta
         .iter()
         .zip(parameters)
         .map(|(value, parameter)| value.abs() / parameter.prior_sigma);
-    sizes.fold(0.0, f64::max)
+    sizes.fold(0.0, f64::max) / page.largest
 }
 
-/// Probability of a chosen effect at any place, against all others and nothing. Beyond [`SUSPICIOUS`] prior sigmas it is a
+/// Probability of a chosen effect at any place, against all others and nothing. Beyond its largest size it is a
 /// proxy for something else at odds that rise with the square of its size: evidence cannot tell, for the effect that is
 /// meant is in no list.
 pub fn probability(library: &Library, chosen: &Chosen) -> f64 {
@@ -173,24 +174,27 @@ pub fn probability(library: &Library, chosen: &Chosen) -> f64 {
         .filter(|(name, _)| *name == hypothesis.effect())
         .map(|(_, p)| p)
         .sum();
-    own * itself(oversize(&chosen.theta, &hypothesis.parameters))
+    own * itself(oversize(
+        hypothesis.cause.effect.page(),
+        &chosen.theta,
+        &hypothesis.parameters,
+    ))
 }
 
 /// Probability that a chosen effect or one of those it cannot be told from is there, whichever it is.
 pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
     let hypothesis = &library.hypotheses[chosen.hypothesis];
     let any: f64 = by_effect(library, &chosen.rivals).into_iter().map(|(_, p)| p).sum();
-    any * itself(oversize(&chosen.theta, &hypothesis.parameters))
+    any * itself(oversize(
+        hypothesis.cause.effect.page(),
+        &chosen.theta,
+        &hypothesis.parameters,
+    ))
 }
 
-/// Probability that an effect of so many prior sigmas is itself and no proxy.
-fn itself(size: f64) -> f64 {
-    let excess = size / SUSPICIOUS;
-    if excess > 1.0 {
-        1.0 / (1.0 + excess * excess)
-    } else {
-        1.0
-    }
+/// Probability that an effect of so many times its largest size is itself and no proxy: the tail of a Cauchy law.
+fn itself(excess: f64) -> f64 {
+    1.0 / (1.0 + excess * excess)
 }
 
 /// Energies to shares, most first.
@@ -266,9 +270,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_beyond_five_prior_sigmas_is_never_named() {
-        assert_eq!(itself(4.9), 1.0);
-        assert!(itself(5.1) < 0.5);
-        assert!(itself(50.0) < 0.01);
+    fn what_is_beyond_its_largest_size_is_never_named() {
+        assert!(itself(0.1) > 0.98);
+        assert!(itself(1.02) < 0.5);
+        assert!(itself(10.0) < 0.01);
     }
 }

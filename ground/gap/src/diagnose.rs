@@ -3,8 +3,6 @@
 //! In: a [`Subject`] and what to leave out of the library. Out: [`Diagnosis`]. The held-out samples are asked once, at the end,
 //! about a model that no longer changes; if its effects do not shrink their gap, they are withdrawn.
 
-use nalgebra::DVector;
-
 use crate::{
     attribute::{Chosen, attribute},
     case::Subject,
@@ -30,6 +28,16 @@ const MOST_CAUSES: usize = 3;
 
 /// Prior probability that a unit has something the library does not.
 const UNKNOWN_PRIOR: f64 = 0.05;
+
+/// The effect on the scatter that changes nothing but its size.
+const LOUDER: &str = "noise-level";
+
+/// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
+const WANDERING: &str = "gyro-bias-walk";
+
+/// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
+/// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
+const UNLIKE: f64 = 0.02;
 
 /// Channels whose residuals are shown.
 const TRACES: usize = 6;
@@ -91,8 +99,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
-    let first = Model::around(&problem, &library, found.model(&library));
+    let mut first = Model::around(&problem, &library, found.model(&library));
     let mut scatter = best_scatter(&problem, &first, withheld);
+    // What wanders at random looks like a little of everything: if that alone says more than all that was chosen, it is that.
+    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
+    let at_random = best_scatter(&problem, &quiet, withheld).filter(|one| {
+        !found.chosen.is_empty()
+            && one.effect.page().name == WANDERING
+            && one.gain > gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain)
+    });
+    let is_random = at_random.is_some();
+    if is_random {
+        found.chosen.clear();
+        scatter = at_random;
+        first = Model::around(&problem, &library, Vec::new());
+    }
     let mut sigmas_after = problem.sigmas.clone();
     let loud = scatter.as_ref().map_or_else(
         || vec![1.0; problem.frames.len()],
@@ -116,28 +137,34 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     if both.iter().any(|factor| *factor != 1.0) {
         // The noise as found, then everything else anew with it.
         reweigh(&mut problem, &mut library, &both);
-        found = attribute(&problem, &mut library, &|share| progress("search", share));
+        if !is_random {
+            found = attribute(&problem, &mut library, &|share| progress("search", share));
+        }
     }
     let sought = distinct(&library, &found.chosen);
     let (kept, mut refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
         .into_iter()
         .partition(|chosen| probability_of_any(&library, chosen) >= SAID);
-    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
     let is_refused = gains(&refused) > gains(&kept);
     found.chosen = kept;
     // What is left is judged with the noise as described, or a misfit would excuse itself.
     let back: Vec<f64> = tempered.iter().map(|factor| 1.0 / factor).collect();
     reweigh(&mut problem, &mut library, &back);
     let model = Model::around(&problem, &library, found.model(&library));
-    if scatter.is_some() {
+    if scatter.is_some() && !is_random {
         scatter = best_scatter(&problem, &model, withheld);
     }
     progress("leftover", 0.0);
-    let scattered: Vec<usize> = scatter.iter().flat_map(|scatter| scatter.channels.clone()).collect();
+    // Louder white noise is in the weights by now, so that its channels are judged like any other.
+    let scattered: Vec<usize> = scatter
+        .iter()
+        .filter(|scatter| scatter.effect.page().name != LOUDER)
+        .flat_map(|scatter| scatter.channels.clone())
+        .collect();
     let mut left = if found.chosen.is_empty() && scatter.is_none() {
         gate.clone()
     } else {
-        leftover::judge(&views, &model.joint, &model.fitted, &scattered)
+        leftover::judge(&sight::views(&problem), &model.joint, &model.fitted, &scattered)
     };
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
@@ -158,6 +185,36 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
     let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
     if has_effect && (!is_smaller || is_patchwork || is_refused) {
+        eprintln!(
+            "DEBUG smaller {is_smaller} patch {is_patchwork} refused {is_refused} {:?} {:?} {:?} {:?} kept {:?} refused {:?} scatter {:?} left {} {:?}",
+            shrink.before,
+            shrink.recalibrated,
+            shrink.after,
+            shrink.beyond_recalibration,
+            found
+                .chosen
+                .iter()
+                .map(|c| (
+                    library.hypotheses[c.hypothesis].effect(),
+                    library.hypotheses[c.hypothesis].cause.locality.to_string(),
+                    c.gain,
+                    &c.theta
+                ))
+                .collect::<Vec<_>>(),
+            refused
+                .iter()
+                .map(|c| (library.hypotheses[c.hypothesis].effect(), c.gain, &c.theta))
+                .collect::<Vec<_>>(),
+            scatter
+                .as_ref()
+                .map(|s| (s.effect.page().name, s.gain, s.channels.clone())),
+            left.log_tail,
+            left.aspects
+                .iter()
+                .take(3)
+                .map(|a| (&a.what, a.size))
+                .collect::<Vec<_>>()
+        );
         withdrawn.extend(
             found
                 .chosen
@@ -175,10 +232,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
-    let explained = explained_share(&quiet, &model, &problem);
+    let explained =
+        explained_energy(&quiet, &model, &scattered) + scatter.as_ref().map_or(0.0, |scatter| 2.0 * scatter.gain);
     let mut causes = causes_of(&problem, &library, &found);
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
-    let trust = 1.0 - unknown * (1.0 - explained);
+    let unlike = left.energy() / explained.max(f64::MIN_POSITIVE);
+    let trust = 1.0 - unknown * unlike / (unlike + UNLIKE);
     causes.iter_mut().for_each(|cause| cause.probability *= trust);
     // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
@@ -265,23 +324,16 @@ fn factors(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
     (0..problem.frames.len()).map(factor).collect()
 }
 
-/// Share of the excess over calibration and noise that the model explains.
-fn explained_share(quiet: &Model, model: &Model, problem: &Problem) -> f64 {
-    let (before, after): (Vec<f64>, Vec<f64>) = (quiet.energies(), model.energies());
-    let excess = |energies: &[f64], nuisance: &[DVector<f64>]| -> f64 {
-        let open: f64 = nuisance.iter().map(|values| values.norm_squared()).sum();
-        let samples: usize = problem.frames.iter().map(|frame| frame.series.rows.len()).sum();
-        (energies.iter().sum::<f64>() + open - samples as f64).max(0.0)
+/// Energy that a model takes off what calibration and noise leave, in squares of noise; of channels not in `scattered`.
+fn explained_energy(quiet: &Model, model: &Model, scattered: &[usize]) -> f64 {
+    let energy = |model: &Model| -> f64 {
+        let channels = model.energies().into_iter().zip(&model.fitted.nuisance).enumerate();
+        channels
+            .filter(|(channel, _)| !scattered.contains(channel))
+            .map(|(_, (energy, open))| energy + open.norm_squared())
+            .sum()
     };
-    let (before, after) = (
-        excess(&before, &quiet.fitted.nuisance),
-        excess(&after, &model.fitted.nuisance),
-    );
-    if before > 0.0 {
-        (1.0 - after / before).clamp(0.0, 1.0)
-    } else {
-        1.0
-    }
+    (energy(quiet) - energy(model)).max(0.0)
 }
 
 /// Residuals of the channels whose gap is largest.

@@ -1,32 +1,23 @@
 //! What a model leaves: is it what the twin's own noise and calibration would leave?
 //!
 //! In: the finished model's columns ([`Joint`]) and the residual. Out: [`Leftover`], a p-value for "this model is enough",
-//! and the aspects of the residual that say otherwise, largest first. Aspects: energy of a channel; energy of a stretch of
-//! time in a kind of sensor; slow shapes in time and shapes in the motion (24 cosines, 24 random features, Rahimi and Recht
-//! 2007); neighbouring samples alike (Ljung and Box 1978); heavy tails; the same vector in all sensors of a kind; and the
-//! size of the fitted calibration itself, without which an unknown effect hides in the calibration.
+//! and the aspects of the residual that say otherwise, largest first. What is looked at is in [`aspects`].
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
 //! spread over logs simulated from the model: same motion, same holes, calibration drawn from its sigmas, white noise with
 //! the tails of a Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian. The p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use crate::joint::{Fitted, Joint};
 
-/// Shapes in time, and as many in the motion.
-const SHAPES: usize = 24;
+mod aspects;
+use aspects::Sights;
 
 /// Stretches of time.
 pub const STRETCHES: usize = 20;
-
-/// Bins for shapes, which are slow: two a shape's shortest period would do, twenty leave no loss.
-const BINS: usize = 500;
-
-/// Lags of the whiteness test.
-const LAGS: usize = 10;
 
 /// Simulated logs: fewest (p then has a floor of 1/101) and most.
 const SIMULATIONS: [usize; 2] = [100, 200];
@@ -53,7 +44,18 @@ pub struct View {
     pub phase: Vec<f64>,
     /// What the unit does at each sample (rates, force, field, temperature), each about zero with unit spread.
     pub motion: DMatrix<f64>,
+    /// What a small rotation of the unit against its reference adds to each sample, in units of noise for 1 rad about the
+    /// axes of b.
+    pub turned: DMatrix<f64>,
+    /// For each quantity of [`LEVELLED`], in which of [`LEVELS`] equally filled levels each sample stands.
+    pub levels: Vec<Vec<u8>>,
 }
+
+/// Quantities whose levels a residual is sorted by.
+pub const LEVELLED: [&str; 4] = ["its own reading", "the rate", "the specific force", "the temperature"];
+
+/// Levels of each: the curve of a wrong law shows in eight, and a sum of eight squares is still sharp.
+pub const LEVELS: usize = 8;
 
 /// One aspect of a residual.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +94,11 @@ impl Leftover {
         };
         prior / (prior + (1.0 - prior) * bound)
     }
+
+    /// Energy of what is left, in squares of noise: what a Gaussian of that energy is as rare as.
+    pub fn energy(&self) -> f64 {
+        -2.0 * self.log_tail.min(self.p.ln())
+    }
 }
 
 /// `ln P(largest >= size)` for a Gumbel law of this mean and spread.
@@ -112,13 +119,13 @@ fn log_tail(size: f64, [mean, spread]: [f64; 2]) -> f64 {
 
 /// Judges the residuals of a model. Channels in `explained` are not looked at: another effect says how they scatter.
 pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]) -> Leftover {
-    let dictionary: Vec<Shapes> = views.iter().map(Shapes::new).collect();
-    let observed = sums(views, &dictionary, fitted, explained);
+    let sights = Sights::new(views, explained);
+    let observed = sights.sums(fitted);
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sums(views, &dictionary, &joint.fit(&simulate(joint, &mut random)), explained))
+        .map(|_| sights.sums(&joint.fit(&simulate(joint, &mut random))))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
@@ -136,7 +143,8 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]
     let seen = largest(&observed);
     let scale = moments(simulated.iter().map(|run| largest(run)));
     let beyond = simulated.iter().filter(|run| largest(run) >= seen).count();
-    let mut aspects: Vec<Aspect> = labels(views)
+    let mut aspects: Vec<Aspect> = sights
+        .labels()
         .into_iter()
         .zip(sizes(&observed))
         .map(|((what, channel), size)| Aspect { what, channel, size })
@@ -176,146 +184,6 @@ fn simulate(joint: &Joint, random: &mut Xoshiro256PlusPlus) -> Vec<DVector<f64>>
             residual
         })
         .collect()
-}
-
-/// Bins of one channel and orthonormal shapes over them.
-struct Shapes {
-    bin_of: Vec<usize>,
-    weight: Vec<f64>,
-    basis: DMatrix<f64>,
-}
-
-impl Shapes {
-    fn new(view: &View) -> Self {
-        let bin_of: Vec<usize> = view
-            .phase
-            .iter()
-            .map(|phase| ((phase * BINS as f64) as usize).min(BINS - 1))
-            .collect();
-        let mut counts = vec![0.0; BINS];
-        let mut motion = DMatrix::zeros(BINS, view.motion.ncols());
-        for (row, bin) in bin_of.iter().enumerate() {
-            counts[*bin] += 1.0;
-            for column in 0..view.motion.ncols() {
-                motion[(*bin, column)] += view.motion[(row, column)];
-            }
-        }
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let directions = DMatrix::from_fn(view.motion.ncols(), SHAPES, |_, _| 0.7 * normal());
-        let angle = Uniform::new(0.0, std::f64::consts::TAU);
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED + 1);
-        let offsets: Vec<f64> = (0..SHAPES)
-            .map(|_| angle.map_or(0.0, |angle| angle.sample(&mut random)))
-            .collect();
-        let weight: Vec<f64> = counts
-            .iter()
-            .map(|count: &f64| if *count > 0.0 { 1.0 / count.sqrt() } else { 0.0 })
-            .collect();
-        let shapes = DMatrix::from_fn(BINS, 2 * SHAPES, |bin, shape| {
-            let value = if shape < SHAPES {
-                (std::f64::consts::PI * (shape + 1) as f64 * (bin as f64 + 0.5) / BINS as f64).cos()
-            } else {
-                let mean = motion.row(bin) / counts[bin].max(1.0);
-                ((mean * directions.column(shape - SHAPES))[0] + offsets[shape - SHAPES]).cos()
-            };
-            value * counts[bin].sqrt()
-        });
-        Shapes {
-            bin_of,
-            weight,
-            basis: shapes.qr().q(),
-        }
-    }
-
-    /// Sums over bins, in units of their noise.
-    fn binned(&self, rest: &DVector<f64>) -> DVector<f64> {
-        let mut sums = DVector::<f64>::zeros(BINS);
-        for (bin, value) in self.bin_of.iter().zip(rest.iter()) {
-            sums[*bin] += value;
-        }
-        DVector::from_fn(BINS, |bin, _| sums[bin] * self.weight[bin])
-    }
-}
-
-/// Number of kinds in the views.
-fn kinds(views: &[View]) -> usize {
-    views.iter().map(|view| view.kind + 1).max().unwrap_or(0)
-}
-
-const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
-
-/// What is looked at in each channel, in the order of [`sums`].
-const ASPECTS_OF_CHANNEL: [&str; 5] = [
-    "more energy than noise",
-    "a shape in time or motion",
-    "neighbouring samples alike",
-    "outliers",
-    "a calibration beyond its sigmas",
-];
-
-/// What each entry of [`sums`] is.
-fn labels(views: &[View]) -> Vec<(String, Option<usize>)> {
-    let mut labels = Vec::new();
-    for (index, view) in views.iter().enumerate() {
-        let name = &view.name;
-        for what in ASPECTS_OF_CHANNEL {
-            labels.push((format!("{name}: {what}"), Some(index)));
-        }
-    }
-    for kind in 0..kinds(views) {
-        let name = KIND_NAMES.get(kind).copied().unwrap_or("sensors");
-        labels.push((format!("{name}: calibrations beyond their sigmas together"), None));
-        for axis in ["x", "y", "z"] {
-            labels.push((format!("{name}: a common vector along {axis}"), None));
-        }
-        for stretch in 0..STRETCHES {
-            labels.push((format!("{name}: stretch {} of {STRETCHES}", stretch + 1), None));
-        }
-    }
-    labels
-}
-
-/// The sums of squares, in the order of [`labels`].
-fn sums(views: &[View], shapes: &[Shapes], fitted: &Fitted, explained: &[usize]) -> Vec<f64> {
-    let mut sums = Vec::new();
-    let mut nuisance = vec![0.0; kinds(views)];
-    let mut common = vec![DMatrix::zeros(BINS, 3); kinds(views)];
-    let mut stretches = vec![[0.0; STRETCHES]; kinds(views)];
-    for (index, (view, shapes)) in views.iter().zip(shapes).enumerate() {
-        if explained.contains(&index) {
-            sums.extend([0.0; ASPECTS_OF_CHANNEL.len()]);
-            continue;
-        }
-        let (rest, open) = (&fitted.rest[index], &fitted.nuisance[index]);
-        let binned = shapes.binned(rest);
-        let energy = rest.norm_squared();
-        sums.push(energy);
-        sums.push(shapes.basis.tr_mul(&binned).norm_squared());
-        let values = rest.as_slice();
-        let alike = (1..=LAGS).map(|lag| {
-            values
-                .iter()
-                .zip(values.iter().skip(lag))
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                .powi(2)
-        });
-        sums.push(alike.sum::<f64>() / energy.max(1.0));
-        sums.push(values.iter().map(|value| value.powi(4)).sum());
-        sums.push(open.norm_squared());
-        nuisance[view.kind] += open.norm_squared();
-        common[view.kind] += &binned * view.axis_b.transpose();
-        for (phase, value) in view.phase.iter().zip(values) {
-            stretches[view.kind][((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)] += value * value;
-        }
-    }
-    for kind in 0..kinds(views) {
-        sums.push(nuisance[kind]);
-        sums.extend(common[kind].column_iter().map(|column| column.norm_squared()));
-        sums.extend(stretches[kind]);
-    }
-    sums
 }
 
 #[cfg(test)]

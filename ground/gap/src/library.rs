@@ -6,7 +6,10 @@
 //! by its places and variants (half to the widest places); so looking in more places costs what it should.
 
 use nalgebra::DVector;
-use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter};
+use twin::{
+    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter},
+    predict::Kind,
+};
 
 use crate::{
     evidence::Screen,
@@ -83,7 +86,13 @@ impl Library {
         for column in problem.reference_columns() {
             library.products.push(problem, column);
         }
-        let is_offered = |name: &str| withheld.iter().all(|withheld| withheld != name);
+        // A gyro that sends codes of its own is a vibrating one, whose answer has no Sagnac phase to be the sine of.
+        let of_light = unit
+            .channels
+            .iter()
+            .any(|channel| channel.sensor == Kind::Gyro && channel.bits.is_none());
+        let is_offered =
+            |name: &str| withheld.iter().all(|withheld| withheld != name) && (of_light || name != "gyro-sine-response");
         let offered: Vec<_> = LIBRARY
             .iter()
             .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))

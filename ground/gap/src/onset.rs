@@ -3,7 +3,8 @@
 //! In: an effect found over the whole fit, its slopes, and the residual without it. Out: the stretch of time in which it
 //! explains most, if that is much better than always. All stretches between [`EDGES`] instants are compared by their evidence
 //! (a generalised likelihood ratio, Willsky and Jones 1976, with the prior's price); having compared them costs the logarithm
-//! of their number. A stretch that reaches an end of the fit is open there. Only effects whose cause passes have stretches.
+//! of their number. A stretch that reaches an end of the fit is open there. Only effects whose cause
+//! [passes](twin::effect::Page::passes) have stretches.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,26 +20,6 @@ const EDGES: usize = 41;
 
 /// [nats] a stretch must gain over always, beyond the price of having looked.
 const MARGIN: f64 = 10.0;
-
-/// Effects whose cause is brought, taken away or switched. A lag or a warm-up is a property of its sensor and always there:
-/// a stretch of it is the shape of something else.
-const PASSING: [&str; 10] = [
-    "hard-iron",
-    "soft-iron",
-    "field-gradient",
-    "field-model",
-    "current-field",
-    "mains-alias",
-    "mag-set-reset",
-    "plate-rotation",
-    "table-tilt",
-    "accel-vibration-rectification",
-];
-
-/// Whether an effect may be on for a part of the log only.
-pub fn may_pass(effect: &str) -> bool {
-    PASSING.contains(&effect)
-}
 
 /// Sums of one stretch: products of the columns, with the residual, and what the calibration can imitate.
 struct Piece {
@@ -151,14 +132,4 @@ fn piece(problem: &Problem, touched: &[usize], residuals: &[DVector<f64>], slope
         piece.open.push(open);
     }
     piece
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_passing_effect_is_one_of_the_library() {
-        assert!(PASSING.iter().all(|name| twin::effect::by_name(name).is_some()));
-    }
 }

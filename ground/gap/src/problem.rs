@@ -27,18 +27,28 @@ pub const REFERENCE_CORRELATION_S: f64 = 1.0;
 /// a reading is up to half a period older or younger than described, and that evenly: a period over the root of 12.
 pub const GYRO_INSTANT_SIGMA_S: f64 = 1.0 / 256.0 / 3.464;
 
-/// What the calibration leaves open in one channel: its own, and the instant of a gyro's conversion.
+/// [s] how old a thermometer's reading is: it converts four times a second by its own clock (SBOS397), so up to a period, and
+/// that evenly: of root mean square a period over the root of 3.
+pub const THERMOMETER_AGE_S: f64 = 0.25 / 1.732;
+
+/// What the calibration leaves open in one channel: its own, and the instant of a gyro's or a thermometer's conversion.
 pub fn calibration(twin: &Twin, index: usize) -> Vec<Column> {
     let mut columns = twin.calibration(index);
     let channel = &twin.unit().channels[index];
-    if channel.sensor == Kind::Gyro {
-        let slope = |feel: &Feel| feel.rate_dot_b.dot(&channel.axis_b);
-        columns.push(Column {
-            name: format!("instant_{}", channel.name),
-            sigma: GYRO_INSTANT_SIGMA_S,
-            entries: vec![(index, twin.feels(index).iter().map(slope).collect())],
-        });
-    }
+    let slope = |feel: &Feel| match channel.sensor {
+        Kind::Gyro => feel.rate_dot_b.dot(&channel.axis_b),
+        _ => feel.temperature_rate,
+    };
+    let sigma = match channel.sensor {
+        Kind::Gyro => GYRO_INSTANT_SIGMA_S,
+        Kind::Thermometer => THERMOMETER_AGE_S,
+        Kind::Accelerometer | Kind::Magnetometer => return columns,
+    };
+    columns.push(Column {
+        name: format!("instant_{}", channel.name),
+        sigma,
+        entries: vec![(index, twin.feels(index).iter().map(slope).collect())],
+    });
     columns
 }
 

@@ -4,12 +4,18 @@
 //! the channels it is in. They are judged after the deterministic effects, whose misfit would look like noise, and those are
 //! then searched anew with the noise as found ([`crate::problem::Problem::reweigh`]).
 //!
+//! A gyro that converts by its own clock scatters with the angular acceleration in any case
+//! ([`crate::problem::GYRO_INSTANT_SIGMA_S`]); an effect counts only by what it says beyond that.
+//!
 //! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
 //! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
 
-use twin::effect::{Effect, LIBRARY, Nature, Scope, View, most_likely};
+use twin::{
+    effect::{Effect, LIBRARY, Nature, Scope, View, most_likely},
+    predict::Kind,
+};
 
-use crate::problem::Problem;
+use crate::problem::{GYRO_INSTANT_SIGMA_S, Problem};
 
 /// An effect on the scatter, where it is and how large.
 #[derive(Clone)]
@@ -48,7 +54,7 @@ fn is_odd(view: &View) -> bool {
 const COLOURED: f64 = 0.2;
 
 /// Effects that stand for white noise, and for its outliers.
-const WHITE: [&str; 2] = ["noise-level", "shock"];
+const WHITE: [&str; 3] = ["noise-level", "packet-corruption", "shock"];
 
 /// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
 /// and these must not make the rest of the log look alike.
@@ -56,6 +62,15 @@ const CUT: f64 = 2.0;
 
 /// Median of the absolute value of a standard normal variable.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
+
+/// [nats] what a gyro's own clock explains of a log.
+fn own_clock(view: &View) -> f64 {
+    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| view.channel.sensor == Kind::Gyro);
+    let jitter = jitter.filter(|_| view.channel.bits.is_some());
+    jitter.map_or(0.0, |jitter| {
+        (jitter.log_likelihood(&[GYRO_INSTANT_SIGMA_S], 0.0, &[*view]) - view.nominal()).max(0.0)
+    })
+}
 
 /// Whether neighbouring residuals are alike.
 fn is_coloured(view: &View) -> bool {
@@ -99,6 +114,7 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
         measured: &measured[*index],
     };
     let odd: Vec<bool> = (0..unit.channels.len()).map(|index| is_odd(&view(&index))).collect();
+    let own_clock: Vec<f64> = (0..unit.channels.len()).map(|index| own_clock(&view(&index))).collect();
     let mut found = Vec::new();
     for effect in LIBRARY {
         let page = effect.page();
@@ -139,6 +155,7 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
                     continue;
                 }
                 let (theta, gain) = most_likely(*effect, *variant, &views);
+                let gain = gain - block.iter().map(|index| own_clock[*index]).sum::<f64>();
                 let price = 0.5 * (samples.max(1) as f64).ln() * theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
                 if gain > price {
                     scatter.gain += gain - price;

@@ -1,9 +1,13 @@
-//! What the leftover test looks at of each channel: its place in time, and what the unit does at each sample.
+//! What the leftover test looks at of each channel: its place in time, what the unit does at each sample, and what a small
+//! rotation would add to it: `d(n.v) = (v x n).delta` for the vector `v` (force, rate or field) a sensor along `n` feels.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use twin::predict::{Feel, Kind};
 
-use crate::{leftover::View, problem::Problem};
+use crate::{
+    leftover::{LEVELS, View},
+    problem::{Frame, Problem},
+};
 
 /// Quantities of the motion: rate, force and field in b, temperature.
 const QUANTITIES: usize = 10;
@@ -11,7 +15,8 @@ const QUANTITIES: usize = 10;
 /// The views of every channel.
 pub fn views(problem: &Problem) -> Vec<View> {
     let twin = problem.twin;
-    let states = standardised(&twin.feels(0));
+    let feels = twin.feels(0);
+    let states = standardised(&feels);
     let starts_s = twin.starts_s();
     let fitted = problem
         .frames
@@ -21,26 +26,50 @@ pub fn views(problem: &Problem) -> Vec<View> {
     let (from_s, to_s) = fitted.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t| {
         (from.min(t), to.max(t))
     });
-    let view = |(channel, frame): (&twin::predict::Channel, &crate::problem::Frame)| View {
-        name: channel.name.clone(),
-        kind: match channel.sensor {
-            Kind::Accelerometer => 0,
-            Kind::Gyro => 1,
-            Kind::Magnetometer => 2,
-            Kind::Thermometer => 3,
-        },
-        axis_b: channel.axis_b,
-        phase: frame
-            .series
-            .rows
-            .iter()
-            .map(|row| (starts_s[*row as usize] - from_s) / (to_s - from_s).max(f64::EPSILON))
-            .collect(),
-        motion: DMatrix::from_fn(frame.series.rows.len(), QUANTITIES, |row, column| {
-            states[(frame.series.rows[row] as usize, column)]
-        }),
+    let view = |(index, frame): (usize, &Frame)| {
+        let channel = &twin.unit().channels[index];
+        let own = problem.predict(index, &[]);
+        let at = |quantity: &dyn Fn(usize) -> f64| {
+            let values: Vec<f64> = frame.series.rows.iter().map(|row| quantity(*row as usize)).collect();
+            levels(&values)
+        };
+        View {
+            name: channel.name.clone(),
+            kind: match channel.sensor {
+                Kind::Accelerometer => 0,
+                Kind::Gyro => 1,
+                Kind::Magnetometer => 2,
+                Kind::Thermometer => 3,
+            },
+            axis_b: channel.axis_b,
+            phase: frame
+                .series
+                .rows
+                .iter()
+                .map(|row| (starts_s[*row as usize] - from_s) / (to_s - from_s).max(f64::EPSILON))
+                .collect(),
+            motion: DMatrix::from_fn(frame.series.rows.len(), QUANTITIES, |row, column| {
+                states[(frame.series.rows[row] as usize, column)]
+            }),
+            turned: DMatrix::from_fn(frame.series.rows.len(), 3, |row, axis| {
+                let feel = &feels[frame.series.rows[row] as usize];
+                let felt_b = match channel.sensor {
+                    Kind::Accelerometer => feel.force_b,
+                    Kind::Gyro => feel.rate_b,
+                    Kind::Magnetometer => feel.field_b_ut,
+                    Kind::Thermometer => Vector3::zeros(),
+                };
+                felt_b.cross(&channel.axis_b)[axis] / frame.weight_sigma
+            }),
+            levels: vec![
+                at(&|row| own[row]),
+                at(&|row| feels[row].rate_b.norm()),
+                at(&|row| feels[row].force_b.norm()),
+                at(&|row| feels[row].temperature_c),
+            ],
+        }
     };
-    twin.unit().channels.iter().zip(&problem.frames).map(view).collect()
+    problem.frames.iter().enumerate().map(view).collect()
 }
 
 /// The motion, each quantity about zero with unit spread; one that does not change is zero.
@@ -62,4 +91,34 @@ fn standardised(feels: &[Feel]) -> DMatrix<f64> {
             .for_each(|value| *value = if spread > 1e-9 { (*value - mean) / spread } else { 0.0 });
     }
     states
+}
+
+/// In which of [`LEVELS`] equally filled levels each value stands.
+fn levels(values: &[f64]) -> Vec<u8> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let edges: Vec<f64> = (1..LEVELS)
+        .filter_map(|level| sorted.get(level * sorted.len() / LEVELS).copied())
+        .collect();
+    let level = |value: &f64| edges.partition_point(|edge| edge <= value) as u8;
+    values.iter().map(level).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_equally_filled() {
+        let values: Vec<f64> = (0..80).map(|k| f64::from(k * 37 % 80)).collect();
+        let levels = levels(&values);
+        assert!((0..LEVELS as u8).all(|level| levels.iter().filter(|own| **own == level).count() == 10));
+        assert_eq!((levels[0], levels[values.len() - 1]), (0, (values[79] / 10.0) as u8));
+    }
+
+    #[test]
+    fn a_quantity_that_never_changes_has_one_level() {
+        assert!(super::levels(&[2.5; 9]).iter().all(|level| *level == 7));
+        assert!(super::levels(&[]).is_empty());
+    }
 }

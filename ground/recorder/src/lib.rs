@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! unit --umbilical--> dump --> file of packets and frames --+
-//! chip read out on a bench --> raw image ------------------+--> log --> table (CSV)
+//! chip read out on a bench --> raw image ------------------+--> log --> table (CSV, Parquet)
 //! ```
 //!
 //! `ground dump` pulls, `ground recover` turns either file into tables and says what is missing, of this epoch and of
@@ -10,5 +10,6 @@
 
 pub mod dump;
 pub mod log;
+pub mod parquet;
 pub mod recover;
 pub mod table;

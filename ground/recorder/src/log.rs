@@ -184,6 +184,13 @@ impl Log {
             .or_else(|| self.packets.last_key_value().map(|(key, _)| key.epoch))
     }
 
+    /// Its packet records in order: of the epoch that counts, or of all.
+    pub fn packets_of(&self, all_epochs: bool) -> impl Iterator<Item = (&Key, &Entry)> {
+        let newest = self.newest_epoch();
+        let counts = move |key: &Key| all_epochs || Some(key.epoch) == newest;
+        self.packets.iter().filter(move |(key, _)| counts(key))
+    }
+
     /// Stretches of records that are missing within a boot: first and last that is, and when the record before began
     /// [us]. Records are numbered from 1 without a gap, but for copies and headers.
     pub fn gaps(&self) -> Vec<Gap> {

@@ -1,7 +1,7 @@
 //! `ground recover`: a raw image or a dump, as tables, with all that is missing.
 //!
-//! In: the file. Out: CSV on standard output or in a file; boots, gaps and damage on standard error. Refuses a file
-//! larger than a chip and a newer format; otherwise whatever is readable is recovered.
+//! In: the file. Out: CSV on standard output or in a file, or Parquet in a file; boots, gaps and damage on standard error.
+//! Refuses a file larger than a chip and a newer format; otherwise whatever is readable is recovered.
 
 use std::{
     fs::{self, File},
@@ -11,7 +11,7 @@ use std::{
 
 use crate::{
     log::{self, LIMIT, Log, LogError},
-    table,
+    parquet, table,
 };
 
 /// Gaps that are listed one by one.
@@ -23,7 +23,7 @@ const GAPS_LISTED: usize = 100;
 /// corrects what can be corrected, and writes a row for each record. Boots, gaps and damage go to standard error.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv"
+    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv\n  ground recover nand.bin --out flight.parquet"
 )]
 pub struct Arguments {
     /// Raw image of the chip, or a dump
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Records of older epochs too: erased by command, but not overwritten yet
     #[arg(long)]
     pub all_epochs: bool,
-    /// Write the table to FILE instead of standard output
+    /// Write the table to FILE instead of standard output; Parquet if it ends in .parquet
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -73,11 +73,14 @@ pub fn run(arguments: &Arguments) -> Result<(), RecoverError> {
         path: path.clone(),
         source,
     })?;
-    let mut remarks = BufWriter::new(io::stderr().lock());
     match &arguments.out {
-        Some(out) => write(&log, arguments, &mut BufWriter::new(File::create(out)?), &mut remarks)?,
-        None => write(&log, arguments, &mut BufWriter::new(io::stdout().lock()), &mut remarks)?,
+        Some(out) if out.extension().is_some_and(|extension| extension == "parquet") => {
+            parquet::create(out, log.packets_of(arguments.all_epochs), !arguments.counts)?;
+        }
+        Some(out) => write_rows(&log, arguments, &mut BufWriter::new(File::create(out)?))?,
+        None => write_rows(&log, arguments, &mut BufWriter::new(io::stdout().lock()))?,
     }
+    write_remarks(&log, arguments.all_epochs, &mut BufWriter::new(io::stderr().lock()))?;
     Ok(())
 }
 
@@ -97,19 +100,19 @@ fn content(path: &Path) -> Result<Vec<u8>, RecoverError> {
     fs::read(path).map_err(fail)
 }
 
-fn write(log: &Log, arguments: &Arguments, rows: &mut dyn Write, remarks: &mut dyn Write) -> io::Result<()> {
-    let newest = log.newest_epoch();
+fn write_rows(log: &Log, arguments: &Arguments, rows: &mut dyn Write) -> io::Result<()> {
     writeln!(rows, "{}", table::header())?;
-    let (mut written, mut older) = (0_u64, 0_u64);
-    for (key, entry) in &log.packets {
-        if arguments.all_epochs || Some(key.epoch) == newest {
-            writeln!(rows, "{}", table::row(*key, entry, !arguments.counts))?;
-            written += 1;
-        } else {
-            older += 1;
-        }
+    for (key, entry) in log.packets_of(arguments.all_epochs) {
+        writeln!(rows, "{}", table::row(*key, entry, !arguments.counts))?;
     }
-    rows.flush()?;
+    rows.flush()
+}
+
+/// Boots, gaps and damage, a line each.
+///
+/// # Errors
+/// When they cannot be written.
+pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io::Result<()> {
     for (key, header) in &log.headers {
         writeln!(
             remarks,
@@ -151,6 +154,8 @@ fn write(log: &Log, arguments: &Arguments, rows: &mut dyn Write, remarks: &mut d
             "records of newer format {version} were left out: update this program"
         )?;
     }
+    let written = log.packets_of(all_epochs).count();
+    let older = log.packets.len() - written;
     let damage = &log.damage;
     writeln!(remarks, "records    {written}, {older} of older epochs left out")?;
     writeln!(remarks, "gaps       {}", gaps.len())?;
@@ -214,7 +219,8 @@ mod tests {
             all_epochs: false,
             out: None,
         };
-        write(&Log::default(), &arguments, &mut rows, &mut remarks).expect("written");
+        write_rows(&Log::default(), &arguments, &mut rows).expect("written");
+        write_remarks(&Log::default(), false, &mut remarks).expect("written");
         let remarks = String::from_utf8(remarks).expect("text");
         assert!(
             remarks.contains("records    0, 0 of older epochs left out"),

@@ -1,10 +1,11 @@
-//! Records as CSV, in counts or nominal SI.
+//! Records as a table, in counts or nominal SI: its columns, a record's values, and both as CSV.
 //!
-//! In: a key and its entry. Out: header and rows. Columns: the key (`epoch`, `boot`, `seq`), `t_s` within the boot, the
-//! mode, health (hexadecimal), the packet's counter, errors, lift-off and micro-g, its thirty-six channels, when each of
-//! the sixteen sensors was sampled after `t_s` [us], and the estimator's state. What was not measured is an empty cell.
+//! In: a key and its entry. Out: names, values, and lines without their ends. Columns: the key (`epoch`, `boot`, `seq`),
+//! `t_s` within the boot, the mode, health, the packet's counter, errors, lift-off and micro-g, its thirty-six channels,
+//! when each of the sixteen sensors was sampled after `t_s` [us], and the estimator's state: attitude, gyro bias [rad/s],
+//! deviations of attitude [rad] and bias [rad/s], sensors not used. What was not measured is an empty cell.
 
-use std::fmt::Write;
+use std::fmt;
 
 use emems::{
     flight_log::record::{Entry, Key},
@@ -13,76 +14,134 @@ use emems::{
 };
 use packets::channel::{self, CHANNELS};
 
-/// Names of the estimator's columns: attitude, gyro bias [rad/s], deviations of attitude [rad] and bias [rad/s],
-/// sensors not used (hexadecimal).
-const ESTIMATE: &str =
-    "q0,q1,q2,q3,bias_x,bias_y,bias_z,sigma_x,sigma_y,sigma_z,sigma_bias_x,sigma_bias_y,sigma_bias_z,sensors";
-/// Commas of as many empty cells.
-const NO_ESTIMATE: &str = ",,,,,,,,,,,,,";
-
-/// The header.
-pub fn header() -> String {
-    let mut header = String::from("epoch,boot,seq,t_s,mode,health,counter,errors,lift_off,micro_g");
-    for channel in &CHANNELS {
-        push(&mut header, format_args!(",{}", channel.name));
-    }
-    for slot in 0..SENSOR_COUNT {
-        push(&mut header, format_args!(",slot_{slot}_us"));
-    }
-    header + "," + ESTIMATE
+/// One cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A number that is whole.
+    Whole(u64),
+    /// Bits, and how many hexadecimal digits show them all.
+    Bits(u32, usize),
+    /// Counts of a sensor.
+    Counts(i16),
+    /// A number that is not whole, and the decimals that lose nothing of it.
+    Fixed(f64, usize),
+    /// A number of the estimator's.
+    Real(f32),
+    /// A word.
+    Word(&'static str),
 }
 
-/// A record's row.
-pub fn row(key: Key, entry: &Entry, si: bool) -> String {
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Whole(value) => value.fmt(f),
+            Value::Bits(bits, digits) => write!(f, "{bits:0digits$X}"),
+            Value::Counts(counts) => counts.fmt(f),
+            Value::Fixed(value, decimals) => write!(f, "{value:.decimals$}"),
+            Value::Real(value) => write!(f, "{value:e}"),
+            Value::Word(word) => f.write_str(word),
+        }
+    }
+}
+
+/// What a column holds, whatever its record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Value::Whole`], [`Value::Bits`] or [`Value::Counts`].
+    Integer,
+    /// [`Value::Fixed`] or [`Value::Real`].
+    Number,
+    /// [`Value::Word`].
+    Word,
+}
+
+/// Names of the estimator's columns that are numbers; one of bits follows.
+const ESTIMATE: [&str; 13] = [
+    "q0",
+    "q1",
+    "q2",
+    "q3",
+    "bias_x",
+    "bias_y",
+    "bias_z",
+    "sigma_x",
+    "sigma_y",
+    "sigma_z",
+    "sigma_bias_x",
+    "sigma_bias_y",
+    "sigma_bias_z",
+];
+
+/// Every column, in order.
+pub fn columns(si: bool) -> Vec<(String, Kind)> {
+    let integers = |names: &[&str]| {
+        names
+            .iter()
+            .map(|name| (name.to_string(), Kind::Integer))
+            .collect::<Vec<_>>()
+    };
+    let of_channels = if si { Kind::Number } else { Kind::Integer };
+    let mut columns = integers(&["epoch", "boot", "seq"]);
+    columns.extend([("t_s".into(), Kind::Number), ("mode".into(), Kind::Word)]);
+    columns.extend(integers(&["health", "counter", "errors", "lift_off", "micro_g"]));
+    columns.extend(CHANNELS.iter().map(|channel| (channel.name.to_string(), of_channels)));
+    columns.extend((0..SENSOR_COUNT).map(|slot| (format!("slot_{slot}_us"), Kind::Integer)));
+    columns.extend(ESTIMATE.map(|name| (name.into(), Kind::Number)));
+    columns.extend(integers(&["sensors"]));
+    columns
+}
+
+/// A record's values, one a column.
+pub fn values(key: Key, entry: &Entry, si: bool) -> Vec<Option<Value>> {
     // A record whose packet is none was not written by a unit; its row says so by its empty cells.
     let decoded = packet::decode(&entry.packet).ok();
     let reading = decoded.unwrap_or(Reading::unread(0));
-    let mut row = format!(
-        "{},{},{},{:.6},{},{:08X},{},{:04X},{},{}",
-        key.epoch,
-        key.boot,
-        key.seq,
-        entry.start_us as f64 * 1e-6,
-        if entry.flight { "FLIGHT" } else { "WAIT" },
-        entry.health.0,
-        decoded.map_or(String::new(), |reading| reading.counter.to_string()),
-        reading.errors.0,
-        u8::from(reading.lift_off),
-        u8::from(reading.micro_g)
-    );
-    for (channel, value) in CHANNELS.iter().zip(channel::counts(&reading)) {
-        row.push(',');
-        match value {
-            Some(value) if si => {
-                let (value, decimals) = (channel.quantity.si(value), channel.quantity.decimals());
-                push(&mut row, format_args!("{value:.decimals$}"));
+    let mut values = vec![
+        Some(Value::Whole(key.epoch.into())),
+        Some(Value::Whole(key.boot.into())),
+        Some(Value::Whole(key.seq.into())),
+        Some(Value::Fixed(entry.start_us as f64 / 1e6, 6)),
+        Some(Value::Word(if entry.flight { "FLIGHT" } else { "WAIT" })),
+        Some(Value::Bits(entry.health.0, 8)),
+        decoded.map(|reading| Value::Whole(reading.counter.into())),
+        Some(Value::Bits(reading.errors.0.into(), 4)),
+        Some(Value::Whole(reading.lift_off.into())),
+        Some(Value::Whole(reading.micro_g.into())),
+    ];
+    values.extend(CHANNELS.iter().zip(channel::counts(&reading)).map(|(channel, counts)| {
+        let quantity = channel.quantity;
+        counts.map(|counts| {
+            if si {
+                Value::Fixed(quantity.si(counts), quantity.decimals())
+            } else {
+                Value::Counts(counts)
             }
-            Some(value) => push(&mut row, format_args!("{value}")),
-            None => {}
-        }
-    }
-    for slot_us in entry.slots_us {
-        row.push(',');
-        if slot_us != NO_SLOT {
-            push(&mut row, format_args!("{slot_us}"));
-        }
-    }
-    row.push(',');
+        })
+    }));
+    let slot = |slot_us: u32| (slot_us != NO_SLOT).then_some(Value::Whole(slot_us.into()));
+    values.extend(entry.slots_us.map(slot));
     match &entry.estimate {
         Some(estimate) => {
-            let values = estimate.q_nb.iter().chain(&estimate.bias_b).chain(&estimate.sigma);
-            let values: Vec<String> = values.map(|value| format!("{value:e}")).collect();
-            row += &values.join(",");
-            push(&mut row, format_args!(",{:08X}", estimate.sensors.0));
+            let numbers = estimate.q_nb.iter().chain(&estimate.bias_b).chain(&estimate.sigma);
+            values.extend(numbers.map(|value| Some(Value::Real(*value))));
+            values.push(Some(Value::Bits(estimate.sensors.0, 8)));
         }
-        None => row += NO_ESTIMATE,
+        None => values.extend([None; ESTIMATE.len() + 1]),
     }
-    row
+    values
 }
 
-/// Writing to a string does not fail.
-fn push(row: &mut String, text: std::fmt::Arguments<'_>) {
-    let _ = row.write_fmt(text);
+/// The header of the CSV.
+pub fn header() -> String {
+    let names: Vec<String> = columns(true).into_iter().map(|(name, _)| name).collect();
+    names.join(",")
+}
+
+/// A record's row of the CSV.
+pub fn row(key: Key, entry: &Entry, si: bool) -> String {
+    let cell = |value: Option<Value>| value.map_or(String::new(), |value| value.to_string());
+    let cells: Vec<String> = values(key, entry, si).into_iter().map(cell).collect();
+    cells.join(",")
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use std::{
     time::SystemTime,
 };
 
+mod attitude;
 pub mod display;
 mod help;
 pub mod history;

@@ -9,6 +9,7 @@ use std::{collections::VecDeque, time::Duration};
 
 use emems::{
     command::{COMMANDS, Command},
+    estimate::Estimate,
     mode::Mode,
     sample::Reading,
 };
@@ -93,6 +94,8 @@ pub struct Model {
     pub mode: Option<Mode>,
     /// Newest reading.
     pub reading: Option<Reading>,
+    /// What the newest derived frame says of the attitude.
+    pub estimate: Option<Estimate>,
     /// Readings for plots.
     pub history: History,
     /// Counted packets.
@@ -117,6 +120,7 @@ impl Model {
             link: Link::Unknown,
             mode: None,
             reading: None,
+            estimate: None,
             history: History::default(),
             tally: Tally::default(),
             log: VecDeque::new(),
@@ -138,6 +142,7 @@ impl Model {
             Item::Derived(derived) => {
                 self.tally.derived += 1;
                 self.mode = Some(derived.mode);
+                self.estimate = Some(derived.estimate);
             }
             Item::Unread { bytes, why } => {
                 self.tally.unread += 1;

@@ -1,4 +1,5 @@
-//! Three lines of state: the unit, its packets, and the recording or what is wrong with it or the line.
+//! Three lines of state: the unit, its packets, and the recording or what is wrong with it or the line. Two more once the
+//! unit has said something of its attitude (G_DL).
 //!
 //! In: a [`Model`]. Out: styled lines, also printed without style where there is no screen. Colour only repeats what
 //! the words say: green is well, yellow wants attention, red is wrong.
@@ -10,13 +11,18 @@ use ratatui::{
 };
 
 use super::{
+    attitude,
     display::{failed_names, size},
     model::{Link, Model},
 };
 
 /// All of it.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
-    vec![unit_line(model), packet_line(model), alarm_line(model)]
+    let estimate = model.estimate.iter().flat_map(attitude::lines).map(Line::from);
+    [unit_line(model), packet_line(model), alarm_line(model)]
+        .into_iter()
+        .chain(estimate)
+        .collect()
 }
 
 /// The unit's state in one line.

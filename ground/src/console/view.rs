@@ -1,7 +1,7 @@
 //! The screen, given what is known and how the user looks at it.
 //!
 //! In: a [`Model`] and a [`View`]. Out: one drawn frame, for any size of terminal; laid out for 100 x 30, usable at
-//! 80 x 24. Top to bottom: three lines of state, the sensors (table and plot, or four plots), the log, the input line,
+//! 80 x 24. Top to bottom: three lines of state and two of attitude, the sensors (table and plot, or four plots), the log, the input line,
 //! and a line of help that shows what the typed letters may become.
 
 use std::time::Duration;
@@ -80,9 +80,14 @@ pub fn draw(frame: &mut Frame, model: &Model, view: &View) {
         Page::Plots => Constraint::Min(8),
     };
     let one = Constraint::Length(1);
+    let mut lines = state::lines(model);
+    if view.page == Page::Table {
+        // On a small terminal the table and two lines of log come before the attitude.
+        lines.truncate(frame.area().height.saturating_sub(table::HEIGHT + 4).max(3).into());
+    }
     let [state, body, log, input, hint] =
-        Layout::vertical([Constraint::Length(3), body, log, one, one]).areas(frame.area());
-    frame.render_widget(Paragraph::new(state::lines(model)), state);
+        Layout::vertical([Constraint::Length(lines.len() as u16), body, log, one, one]).areas(frame.area());
+    frame.render_widget(Paragraph::new(lines), state);
     draw_body(frame, body, model, view);
     draw_log(frame, log, model, view.scroll);
     frame.render_widget(Paragraph::new(format!("> {}_", view.input.text())).bold(), input);

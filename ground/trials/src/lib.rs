@@ -12,7 +12,7 @@ pub mod deal;
 pub mod disturbance;
 mod draw;
 mod flight;
-mod interval;
+pub mod interval;
 pub mod motion;
 pub mod scene;
 pub mod score;

@@ -32,6 +32,7 @@ const PAGE: Page = Page {
         Symbol::signed("ky", "uT", 1.0),
         Symbol::signed("kz", "uT", 1.0),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -27,6 +27,7 @@ const PAGE: Page = Page {
         Symbol::signed("gxz", "uT/m", 5.0),
         Symbol::signed("gyz", "uT/m", 5.0),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -29,6 +29,7 @@ const PAGE: Page = Page {
         Symbol::signed("de", "uT", 0.5),
         Symbol::signed("dd", "uT", 0.5),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -30,6 +30,9 @@ const PAGE: Page = Page {
         Symbol::signed("by", "uT", 2.0),
         Symbol::signed("bz", "uT", 2.0),
     ],
+    passes: true,
+    // A magnet at a centimetre makes more than the Earth; the sigma is of screws, batteries and connectors.
+    largest: 100.0,
     ..Page::SMOOTH
 };
 

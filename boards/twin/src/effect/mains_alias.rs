@@ -34,6 +34,7 @@ const PAGE: Page = Page {
         Symbol::signed("cy", "uT", 0.5),
         Symbol::signed("cz", "uT", 0.5),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -165,7 +165,7 @@ pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
 const ONSETS: usize = 15;
 
 /// [s] the onsets to try.
-fn onsets(starts_s: &[f64]) -> impl Iterator<Item = f64> {
+pub fn onsets(starts_s: &[f64]) -> impl Iterator<Item = f64> {
     let (from_s, to_s) = (*starts_s.first().unwrap_or(&0.0), *starts_s.last().unwrap_or(&0.0));
     (1..=ONSETS).map(move |k| from_s + (to_s - from_s) * k as f64 / (ONSETS + 1) as f64)
 }

@@ -84,6 +84,12 @@ pub struct Page {
     pub sensors: &'static [Kind],
     /// The parameters of one block.
     pub parameters: &'static [Symbol],
+    /// Whether its cause is brought, taken away or switched, so that it may be there for a part of a log. A lag or a
+    /// warm-up is a property of its sensor and always there: a stretch of it is the shape of something else.
+    pub passes: bool,
+    /// [prior sigmas] size beyond which it more likely stands for something else; a unit that was badly calibrated is off by
+    /// ten times the usual, a thing that is not this effect at all by any number.
+    pub largest: f64,
 }
 
 impl Page {
@@ -101,5 +107,7 @@ impl Page {
         common: false,
         sensors: &[],
         parameters: &[],
+        passes: false,
+        largest: 20.0,
     };
 }

@@ -25,6 +25,7 @@ const PAGE: Page = Page {
         Symbol::signed("ry", "rad", 0.02),
         Symbol::signed("rz", "rad", 0.02),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -16,6 +16,7 @@ const PAGE: Page = Page {
     confirm_by: "Give a set pulse: it comes back at once.",
     sensors: &[Kind::Magnetometer],
     parameters: &[Symbol::signed("g", "1", 0.2), Symbol::signed("b", "uT", 1.0)],
+    passes: true,
     ..Page::SMOOTH
 };
 

@@ -27,6 +27,7 @@ const PAGE: Page = Page {
         Symbol::signed("sxz", "1", 0.02),
         Symbol::signed("syz", "1", 0.02),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

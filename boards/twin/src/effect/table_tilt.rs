@@ -22,6 +22,7 @@ const PAGE: Page = Page {
         Symbol::signed("north", "rad", 5e-3),
         Symbol::signed("east", "rad", 5e-3),
     ],
+    passes: true,
     ..Page::SMOOTH
 };
 

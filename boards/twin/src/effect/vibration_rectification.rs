@@ -22,6 +22,7 @@ const PAGE: Page = Page {
     confirm_by: "Motor on and off in one attitude.",
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("k", "m/s^2", 0.03)],
+    passes: true,
     ..Page::SMOOTH
 };
 

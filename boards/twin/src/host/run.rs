@@ -96,6 +96,7 @@ pub fn fly_around(
             }
         };
         if let Some(reset) = reset {
+            plant.borrow_mut().nand.protect(true, now);
             report.resets.push((now, reset));
             cause = reset;
         }

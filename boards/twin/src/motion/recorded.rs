@@ -131,9 +131,10 @@ impl Motion for Recorded {
 }
 
 /// The quaternions at unit norm, each with the sign that is nearer to the one before: q and -q are one attitude, but not
-/// to a spline.
+/// to a spline. Over lines without an attitude any turn is allowed: what lies between is not known anyway.
 fn continuous(recorded: Located<4>) -> Result<Series<4>, Fault> {
     let mut previous: Option<Vector4<f64>> = None;
+    let mut previous_line = 0;
     recorded.try_map(|line, q| {
         let norm = q.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
@@ -142,7 +143,7 @@ fn continuous(recorded: Located<4>) -> Result<Series<4>, Fault> {
         let mut q = q / norm;
         if let Some(previous) = previous {
             let cos_half = previous.dot(&q);
-            if cos_half.abs() < COARSEST {
+            if cos_half.abs() < COARSEST && line == previous_line + 1 {
                 return Err(Fault::TooCoarse {
                     line,
                     degrees: 2.0 * cos_half.abs().acos().to_degrees(),
@@ -150,7 +151,7 @@ fn continuous(recorded: Located<4>) -> Result<Series<4>, Fault> {
             }
             q *= cos_half.signum();
         }
-        previous = Some(q);
+        (previous, previous_line) = (Some(q), line);
         Ok(q)
     })
 }
@@ -256,6 +257,12 @@ mod tests {
     }
 
     #[test]
+    fn out_of_sight_it_may_turn_any_way() {
+        let recorded = read("t_s,qw,qx,qy,qz\n0,1,0,0,0\n1,,,,\n2,0,1,0,0\n").unwrap();
+        assert_eq!(recorded.lost_s(), [(0.0, 2.0)]);
+    }
+
+    #[test]
     fn it_ends_with_the_file_and_stays_there() {
         let recorded = read("t_s,qw,qx,qy,qz\n1,1,0,0,0\n2,0.8,0.6,0,0\n").unwrap();
         assert_eq!(recorded.duration_s(), Some(2.0));
@@ -275,8 +282,8 @@ mod tests {
                 "hand.csv: line 3: the norm of qw,qx,qy,qz is 5; an attitude has norm 1",
             ),
             (
-                "0,1,0,0,0\n1,,,,\n2,0,1,0,0\n",
-                "hand.csv: line 4: turned by 180 deg since the attitude before; record at least every 120 deg",
+                "0,1,0,0,0\n1,0,1,0,0\n",
+                "hand.csv: line 3: turned by 180 deg since the attitude before; record at least every 120 deg",
             ),
             (
                 "0,1,0,0,0\n1,1,0,,0\n",

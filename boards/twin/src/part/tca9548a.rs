@@ -157,6 +157,15 @@ impl Tca9548a {
             }
         }
     }
+
+    /// Power returns: no channel is selected, and the parts' registers take their defaults.
+    pub fn power_on(&mut self, now: Nanos) {
+        self.reset();
+        for socket in self.channels.iter_mut().flatten() {
+            socket.addressed = false;
+            socket.part.power_on(now);
+        }
+    }
 }
 
 #[cfg(test)]

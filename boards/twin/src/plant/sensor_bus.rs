@@ -52,6 +52,11 @@ impl SensorBus {
         self.switch.stop(now);
     }
 
+    /// Power returns, to the parts as to the switch.
+    pub(super) fn power_on(&mut self, now: Nanos) {
+        self.switch.power_on(now);
+    }
+
     /// The switch's reset line is pulled: no channel is selected.
     pub fn reset_pin(&mut self) {
         self.switch.reset();

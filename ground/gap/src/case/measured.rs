@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use packets::{
-    channel::{self, CHANNELS},
+    channel::{self, CHANNELS, Quantity},
     stream::{
         Bytes5To8, Decoder, Item,
         sequence::{Sequence, Step},
@@ -67,6 +67,7 @@ fn from_packets(file: &Path, bytes: &[u8], columns: &[Column], cycle_s: f64) -> 
         for (index, (column, place)) in columns.iter().zip(&places).enumerate() {
             let value = counts.get(*place).copied().flatten();
             let value = value.filter(|counts| Some(*counts) != column.overflow_counts);
+            let value = value.filter(|counts| !is_before_conversion(number, *place, *counts));
             log.put(index, column, value.map(|counts| f64::from(counts) * column.lsb));
         }
     }
@@ -74,6 +75,12 @@ fn from_packets(file: &Path, bytes: &[u8], columns: &[Column], cycle_s: f64) -> 
         return Err(CaseError::key(file, "packets", "holds no intact packet"));
     }
     Ok(log)
+}
+
+/// Whether a thermometer has not converted yet: the temperature register of the TMP102 reads zero from power-on until its
+/// first conversion is complete (SBOS397, "temperature register"), and the first packet may come before that.
+fn is_before_conversion(number: u64, place: usize, counts: i16) -> bool {
+    number == 0 && counts == 0 && CHANNELS[place].quantity == Quantity::Temperature
 }
 
 fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseError> {
@@ -132,4 +139,17 @@ fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseEr
         return Err(CaseError::key(file, "rows", "has none"));
     }
     Ok(log)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_before_the_first_conversion_is_no_temperature() {
+        let place = |name: &str| CHANNELS.iter().position(|channel| channel.name == name).expect(name);
+        assert!(is_before_conversion(0, place("t3"), 0));
+        assert!(!is_before_conversion(0, place("t3"), 1) && !is_before_conversion(1, place("t3"), 0));
+        assert!(!is_before_conversion(0, place("tg3"), 0) && !is_before_conversion(0, place("a1x"), 0));
+    }
 }

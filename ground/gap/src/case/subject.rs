@@ -31,6 +31,13 @@ const LEAST_SEEN: f64 = 0.9;
 /// Rows that are kept at most: 40 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
 const MOST_ROWS: usize = 12_000;
 
+/// [Hz] corners to which a reference that is not exact is smoothed, of attitude and position: a hand moves below them, and
+/// above them an optical system's noise, differentiated once or twice, is more than the unit's own.
+const REFERENCE_HZ: [f64; 2] = [25.0, 12.0];
+
+/// [s] beside a gap of such a reference where it still bends towards what is not known.
+const BESIDE_GAP_S: f64 = 0.5;
+
 /// A case ready to be diagnosed.
 pub struct Subject {
     /// Its file.
@@ -71,7 +78,7 @@ impl Subject {
         let mut log = opened.log(&columns, unit.cycle_s)?;
         let name = opened.text.motion.clone().unwrap_or_default();
         let file = opened.path(&name);
-        let motion = Recorded::open(&file)?;
+        let mut motion = Recorded::open(&file)?;
         let (from_s, to_s) = motion.span_s();
         log = within_windows(log, &opened);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
@@ -87,6 +94,12 @@ impl Subject {
         let mut lost_s = vec![(f64::NEG_INFINITY, from_s)];
         lost_s.extend(motion.lost_s());
         lost_s.push((to_s, f64::INFINITY));
+        if opened.text.reference.attitude_sigma_rad > 0.0 {
+            lost_s
+                .iter_mut()
+                .for_each(|(from_s, to_s)| (*from_s, *to_s) = (*from_s - BESIDE_GAP_S, *to_s + BESIDE_GAP_S));
+            motion = motion.smoothed(REFERENCE_HZ[0], REFERENCE_HZ[1]);
+        }
         let unseen = drop_unseen(&mut log, &lost_s, &unit);
         let (fit, held) = opened.windows.part(&log);
         check_windows(&opened, &fit, &held)?;

@@ -17,6 +17,11 @@ fn scene() -> (Vec<View>, Joint) {
         motion: DMatrix::from_fn(SAMPLES, 2, |row, column| {
             (row as f64 * 0.01 * (column + 1) as f64).sin()
         }),
+        turned: DMatrix::from_fn(SAMPLES, 3, |row, axis| {
+            let felt_b = Vector3::new(1.0, (row as f64 * 0.03).sin(), (row as f64 * 0.02).cos());
+            felt_b.cross(&Vector3::ith(channel, 1.0))[axis]
+        }),
+        levels: vec![(0..SAMPLES).map(|row| (row % LEVELS) as u8).collect(); LEVELLED.len()],
     };
     let columns = Columns {
         nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
@@ -86,4 +91,38 @@ fn what_another_effect_explains_no_longer_counts() {
     };
     assert!(judged(&[], louder).p < 0.01);
     assert!(judged(&[0], louder).p > 0.05);
+}
+
+#[test]
+fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
+    let slips = |row: usize| if row * 7 / SAMPLES % 2 == 1 { 0.5 } else { 0.0 };
+    let left = judged(&[], |channel, residual| {
+        let turned = scene().0[channel].turned.clone();
+        let about_z = |row: usize| slips(row) * turned[(row, 2)];
+        residual
+            .iter_mut()
+            .enumerate()
+            .for_each(|(row, value)| *value += about_z(row));
+    });
+    assert!(left.p < 0.01, "{left:?}");
+    assert!(
+        left.aspects
+            .iter()
+            .any(|aspect| aspect.what.contains("common rotation"))
+    );
+}
+
+#[test]
+fn a_wrong_law_is_found_by_the_steps_between_levels() {
+    let left = judged(&[], |channel, residual| {
+        if channel == 0 {
+            let of_level = |row: usize| 0.3 * ((row % LEVELS) as f64 - 3.5) / 2.3;
+            residual
+                .iter_mut()
+                .enumerate()
+                .for_each(|(row, value)| *value += of_level(row));
+        }
+    });
+    assert!(left.p < 0.01, "{left:?}");
+    assert!(left.aspects[0].what.contains("steps with"), "{:?}", left.aspects);
 }

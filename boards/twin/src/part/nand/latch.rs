@@ -71,10 +71,20 @@ impl K9f1208 {
         }
     }
 
-    /// WP#.
+    /// WP#. It also switches the part's high voltage off (K9F1208U0M data sheet, "Data Protection"), so what is under way
+    /// then is torn, as when the processor that holds the pin high is reset.
     pub fn protect(&mut self, on: bool, now: Nanos) {
         self.settle(now);
+        if on && self.busy(now) {
+            self.tear(now, Tear::Half);
+            self.busy_until = now;
+        }
         self.protected = on;
+    }
+
+    /// Whether WP# keeps its cells from being changed.
+    pub fn is_protected(&self) -> bool {
+        self.protected
     }
 
     /// A byte with CLE high.
@@ -181,9 +191,7 @@ impl K9f1208 {
     pub fn power_cut(&mut self, now: Nanos, draw: usize) {
         self.settle(now);
         self.tear(now, TEARS[draw % TEARS.len()]);
-        let protected = self.protected;
         *self = K9f1208::new(self.cells.clone());
-        self.protected = protected;
     }
 
     fn busy(&self, now: Nanos) -> bool {

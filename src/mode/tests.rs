@@ -1,0 +1,192 @@
+extern crate std;
+
+use std::vec::Vec;
+
+use super::*;
+use crate::command::{COMMANDS, Heard, Parser};
+
+const WAITING: State = State {
+    mode: Mode::Wait,
+    task: Task::Idle,
+    recording: false,
+    derived: false,
+    pending: None,
+    lift_off: false,
+};
+const FLYING: State = State {
+    mode: Mode::Flight,
+    ..WAITING
+};
+
+/// The state after the bytes, and whether anything was erased.
+fn after(mut state: State, bytes: &[u8]) -> (State, bool) {
+    let mut parser = Parser::default();
+    let mut erased = false;
+    for (at, byte) in bytes.iter().enumerate() {
+        if let Some(Heard::Command(command)) = parser.hear(*byte, 1000 * at as u64) {
+            erased |= state.command(command, 1000 * at as u64) == Verdict::Done(Action::Erase);
+        }
+    }
+    (state, erased)
+}
+
+/// Every way the seven commands of App. A.3 and ours are given: the words that carry one out.
+fn deeds() -> Vec<Vec<u8>> {
+    let once = COMMANDS.iter().map(|entry| match entry.command {
+        Command::DumpRange { .. } => b"G_LR000000000010".to_vec(),
+        Command::SetWord { .. } => b"G_CW00040000A040".to_vec(),
+        _ => entry.word.to_vec(),
+    });
+    once.chain([b"G_MVG_MV".to_vec(), b"G_MEG_ME".to_vec(), b"G_MAG_CA".to_vec()])
+        .collect()
+}
+
+/// Checks the `garbled` forms of every deed, and of every two deeds in a row: none erases unless G_CA was sent, none
+/// leads to a mode whose word was not sent.
+fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
+    let says = |sent: &[u8], word: &[u8]| sent.windows(word.len()).any(|letters| letters == word);
+    for state in [WAITING, FLYING] {
+        for first in deeds() {
+            for second in [Vec::new()].into_iter().chain(deeds()) {
+                let sent = [first.as_slice(), &second].concat();
+                for bytes in garble(&sent) {
+                    let (got, erased) = after(state, &bytes);
+                    let text = std::string::String::from_utf8_lossy(&bytes).into_owned();
+                    assert!(!erased || says(&sent, b"G_CA"), "{state:?}: {text} erases");
+                    let word = if got.mode == Mode::Flight { b"G_MV" } else { b"G_ME" };
+                    assert!(
+                        got.mode == state.mode || says(&sent, word),
+                        "{state:?}: {text} leads to {:?}",
+                        got.mode
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_one_bit_error_erases_or_changes_to_a_mode_that_was_not_sent() {
+    check(|sent| {
+        let flip = |bit: usize| {
+            let mut bytes = sent.to_vec();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            bytes
+        };
+        (0..8 * sent.len()).map(flip).collect()
+    });
+}
+
+#[test]
+fn no_lost_doubled_or_swapped_byte_erases_or_changes_to_a_mode_that_was_not_sent() {
+    check(|sent| {
+        let mut garbled = Vec::new();
+        for at in 0..sent.len() {
+            let mut lost = sent.to_vec();
+            lost.remove(at);
+            let mut doubled = sent.to_vec();
+            doubled.insert(at, sent[at]);
+            garbled.extend([lost, doubled]);
+            if at + 1 < sent.len() {
+                let mut swapped = sent.to_vec();
+                swapped.swap(at, at + 1);
+                garbled.push(swapped);
+            }
+        }
+        garbled
+    });
+}
+
+#[test]
+fn no_two_bit_error_in_one_deed_erases() {
+    for sent in deeds() {
+        for first in 0..8 * sent.len() {
+            for second in 0..first {
+                let mut bytes = sent.clone();
+                bytes[first / 8] ^= 1 << (first % 8);
+                bytes[second / 8] ^= 1 << (second % 8);
+                assert!(!after(WAITING, &bytes).1, "{bytes:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mode_change_takes_the_word_twice_within_ten_seconds() {
+    let mut state = WAITING;
+    assert_eq!(state.command(Command::Flight, 0), Verdict::Confirm(Command::Flight));
+    assert_eq!(
+        state.command(Command::Status, 1),
+        Verdict::Done(Action::Report(Command::Status))
+    );
+    assert_eq!(state.command(Command::Flight, 2), Verdict::Confirm(Command::Flight));
+    assert_eq!(
+        state.command(Command::Flight, CONFIRM_WITHIN_US + 3),
+        Verdict::Confirm(Command::Flight)
+    );
+    assert_eq!(
+        state.command(Command::Flight, CONFIRM_WITHIN_US + 4),
+        Verdict::Done(Action::None)
+    );
+    assert_eq!(state.mode, Mode::Flight);
+}
+
+#[test]
+fn an_erase_takes_a_second_different_word_and_no_lift_off() {
+    let mut state = WAITING;
+    assert_eq!(
+        state.command(Command::ConfirmErase, 0),
+        Verdict::Refused(Refusal::NothingToConfirm)
+    );
+    assert_eq!(
+        state.command(Command::Erase, 0),
+        Verdict::Confirm(Command::ConfirmErase)
+    );
+    assert_eq!(
+        state.command(Command::Erase, 1),
+        Verdict::Confirm(Command::ConfirmErase)
+    );
+    assert_eq!(state.command(Command::ConfirmErase, 2), Verdict::Done(Action::Erase));
+    let mut flying = FLYING;
+    assert_eq!(
+        flying.command(Command::Erase, 0),
+        Verdict::Refused(Refusal::Mode(Mode::Wait))
+    );
+    state.lift_off = true;
+    assert_eq!(state.command(Command::Erase, 3), Verdict::Refused(Refusal::LiftOff));
+}
+
+#[test]
+fn a_task_of_the_other_mode_is_refused() {
+    let mut state = WAITING;
+    assert_eq!(
+        state.command(Command::Record, 0),
+        Verdict::Refused(Refusal::Mode(Mode::Flight))
+    );
+    let mut flying = FLYING;
+    let place = 0;
+    for command in [
+        Command::SendPackets,
+        Command::Dump,
+        Command::Stop,
+        Command::SelfTest,
+        Command::SetWord { place, bytes: [0; 4] },
+        Command::LoadSet,
+        Command::ReadSet,
+    ] {
+        assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
+    }
+    assert_eq!(flying.command(Command::Record, 0), Verdict::Done(Action::None));
+    assert!(flying.recording);
+}
+
+#[test]
+fn lift_off_starts_flight_and_recording_once() {
+    let mut state = WAITING;
+    assert!(state.lift_off(true));
+    assert_eq!((state.mode, state.recording), (Mode::Flight, true));
+    state.command(Command::Wait, 0);
+    state.command(Command::Wait, 1);
+    assert!(!state.lift_off(true), "a line stuck asserted does not undo G_ME");
+    assert_eq!((state.mode, state.recording), (Mode::Wait, false));
+}
