@@ -149,7 +149,7 @@ fn cut_again_and_again(run: u64) {
     let mut faults = Vec::new();
     for number in 0..CUTS_A_RUN {
         let draw = (run * CUTS_A_RUN + number + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
-        at += if draw % 3 == 0 {
+        at += if draw.is_multiple_of(3) {
             BACK
         } else {
             BACK + draw % (LONGEST - BACK)

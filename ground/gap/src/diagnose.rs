@@ -40,6 +40,12 @@ const LOUDER: &str = "noise-level";
 /// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
 const WANDERING: &str = "gyro-bias-walk";
 
+/// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
+/// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
+/// effect of marginal signal-to-noise ratio 8 has 32 before its prior odds.
+const DOUBTED: f64 = 20.0;
+const DOUBT_STEP: f64 = 4.0;
+
 /// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
 /// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.02;
@@ -187,36 +193,6 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let has_effect = !found.chosen.is_empty() || scatter.is_some();
     let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
     if has_effect && (!is_smaller || is_patchwork || is_refused) {
-        eprintln!(
-            "DEBUG smaller {is_smaller} patch {is_patchwork} refused {is_refused} {:?} {:?} {:?} {:?} kept {:?} refused {:?} scatter {:?} left {} {:?}",
-            shrink.before,
-            shrink.recalibrated,
-            shrink.after,
-            shrink.beyond_recalibration,
-            found
-                .chosen
-                .iter()
-                .map(|c| (
-                    library.hypotheses[c.hypothesis].effect(),
-                    library.hypotheses[c.hypothesis].cause.locality.to_string(),
-                    c.gain,
-                    &c.theta
-                ))
-                .collect::<Vec<_>>(),
-            refused
-                .iter()
-                .map(|c| (library.hypotheses[c.hypothesis].effect(), c.gain, &c.theta))
-                .collect::<Vec<_>>(),
-            scatter
-                .as_ref()
-                .map(|s| (s.effect.page().name, s.gain, s.channels.clone())),
-            left.log_tail,
-            left.aspects
-                .iter()
-                .take(3)
-                .map(|a| (&a.what, a.size))
-                .collect::<Vec<_>>()
-        );
         withdrawn.extend(
             found
                 .chosen
@@ -242,7 +218,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
     let unlike = left.energy() / explained.max(f64::MIN_POSITIVE);
     let trust = 1.0 - unknown * unlike / (unlike + UNLIKE);
-    causes.iter_mut().for_each(|cause| cause.probability *= trust);
+    let is_no_chance = |gain: f64| 1.0 / (1.0 + ((DOUBTED - gain) / DOUBT_STEP).exp());
+    causes
+        .iter_mut()
+        .for_each(|cause| cause.probability *= trust * is_no_chance(cause.gain));
     // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
         causes.into_iter().partition(|cause| cause.probability >= SAID);

@@ -77,7 +77,7 @@ pub fn find(problem: &Problem, rests: &[DVector<f64>], excess: &[f64]) -> Option
         })
         .collect();
     let (from, to) = passage(&energies, &counts)?;
-    let instant = |(best, low, high): (usize, usize, usize)| Instant {
+    let instant = |(best, low, high): Edge| Instant {
         t_s: edges_s[best],
         interval_s: [edges_s[low.saturating_sub(1)], edges_s[(high + 1).min(STRETCHES)]],
     };
@@ -87,8 +87,11 @@ pub fn find(problem: &Problem, rests: &[DVector<f64>], excess: &[f64]) -> Option
     })
 }
 
-/// Edges (best, lowest, highest) at which the energy rises and falls.
-fn passage(energies: &[f64], counts: &[f64]) -> Option<((usize, usize, usize), (usize, usize, usize))> {
+/// Where an edge is best, at the lowest and at the highest.
+type Edge = (usize, usize, usize);
+
+/// Edges at which the energy rises and falls.
+fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
     let length = energies.len();
     let spread = dispersion(energies, counts);
     // Twice the log-likelihood of a stretch of n samples with mean energy m, up to what all have: -n ln m.
@@ -135,7 +138,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<((usize, usize, usize), (
 /// How much more the energies of neighbouring stretches differ than white residuals would have them; at least one.
 fn dispersion(energies: &[f64], counts: &[f64]) -> f64 {
     let pairs = energies.windows(2).zip(counts.windows(2));
-    let differences: Vec<f64> = pairs
+    let mut differences: Vec<f64> = pairs
         .filter(|(_, counts)| counts[0] > 0.0 && counts[1] > 0.0)
         .map(|(energies, counts)| {
             let (one, other) = (energies[0] / counts[0], energies[1] / counts[1]);
@@ -143,11 +146,10 @@ fn dispersion(energies: &[f64], counts: &[f64]) -> f64 {
             (one - other).powi(2) / (2.0 * mean * mean * (1.0 / counts[0] + 1.0 / counts[1])).max(1e-12)
         })
         .collect();
-    let mut sorted = differences;
-    sorted.sort_by(f64::total_cmp);
+    differences.sort_by(f64::total_cmp);
     // The median of chi-square with one degree is 0.455: onset and end themselves do not count.
-    sorted
-        .get(sorted.len() / 2)
+    differences
+        .get(differences.len() / 2)
         .map_or(1.0, |median| (median / 0.455).max(1.0))
 }
 
