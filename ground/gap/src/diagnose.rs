@@ -50,6 +50,9 @@ const DOUBT_STEP: f64 = 4.0;
 /// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.02;
 
+/// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
+const REMAINDER: f64 = 0.005;
+
 /// What a case says.
 pub struct Diagnosis {
     /// Root mean square residual on the fit windows, in sigma.
@@ -210,18 +213,31 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
     progress("confusion", 0.0);
     let unknown = left.unknown(UNKNOWN_PRIOR);
-    let explained =
-        explained_energy(&quiet, &model, &scattered) + scatter.as_ref().map_or(0.0, |scatter| 2.0 * scatter.gain);
+    // Louder noise takes in whatever is there: that it does is no sign of its law.
+    let louder = scatter.iter().filter(|scatter| scatter.effect.page().name == LOUDER);
+    let by_scatter: f64 = scatter.iter().map(|scatter| 2.0 * scatter.gain).sum();
+    let explained = match louder.flat_map(|scatter| scatter.channels.clone()).collect::<Vec<_>>() {
+        louder if louder.is_empty() => explained_energy(&quiet, &model, &scattered) + by_scatter,
+        louder => explained_energy(&quiet, &model, &louder),
+    };
     let mut causes = causes_of(&problem, &library, &found);
     contribution::settle(&problem, &library, &found, &mut causes);
     let keys = second_keys(&problem, &library, &model, &mut causes);
     causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
-    let unlike = left.energy() / explained.max(f64::MIN_POSITIVE);
-    let trust = 1.0 - unknown * unlike / (unlike + UNLIKE);
+    let unlike = left.energy() / (left.energy() + UNLIKE * explained).max(f64::MIN_POSITIVE);
+    let trust = 1.0 - unknown * unlike;
     let is_no_chance = |gain: f64| 1.0 / (1.0 + ((DOUBTED - gain) / DOUBT_STEP).exp());
-    causes
-        .iter_mut()
-        .for_each(|cause| cause.probability *= trust * is_no_chance(cause.gain));
+    let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
+    let is_no_remainder = |gain: f64| {
+        if gain < strongest {
+            gain / (gain + REMAINDER * strongest)
+        } else {
+            1.0
+        }
+    };
+    for cause in &mut causes {
+        cause.probability *= trust * is_no_chance(cause.gain) * is_no_remainder(cause.gain);
+    }
     // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
         causes.into_iter().partition(|cause| cause.probability >= SAID);
