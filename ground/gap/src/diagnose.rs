@@ -40,6 +40,9 @@ const LOUDER: &str = "noise-level";
 /// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
 const WANDERING: &str = "gyro-bias-walk";
 
+/// Steps from which a walk is told from anything else: the rows of a table are fewer, and no walk.
+const STEPS: usize = 100;
+
 /// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
 /// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
 /// effect of marginal signal-to-noise ratio 8 has 32 before its prior odds.
@@ -117,7 +120,9 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     // What wanders at random looks like a little of everything: if that alone says more than all that was chosen, it is that.
     let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
     let at_random = best_scatter(&problem, &quiet, withheld).filter(|one| {
+        let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
         !found.chosen.is_empty()
+            && one.channels.iter().map(steps).all(|steps| steps >= STEPS)
             && one.effect.page().name == WANDERING
             && one.gain > gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain)
     });
