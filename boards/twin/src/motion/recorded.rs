@@ -258,8 +258,8 @@ mod tests {
 
     #[test]
     fn out_of_sight_it_may_turn_any_way() {
-        let recorded = read("t_s,qw,qx,qy,qz\n0,1,0,0,0\n1,,,,\n2,0,1,0,0\n").unwrap();
-        assert_eq!(recorded.lost_s(), [(0.0, 2.0)]);
+        let recorded = read("t_s,qw,qx,qy,qz\n0,1,0,0,0\n1,1,0,0,0\n2,,,,\n3,0,1,0,0\n4,0,1,0,0\n").unwrap();
+        assert_eq!(recorded.lost_s(), [(1.0, 3.0)]);
     }
 
     #[test]
