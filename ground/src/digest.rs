@@ -60,8 +60,14 @@ impl Digest {
     /// Ends the stream.
     pub fn finish(mut self) -> (Vec<Entry>, Summary, Envelope) {
         let last = std::mem::take(&mut self.decoder).finish();
-        let entries = last.map(|reject| self.enter(None, Item::Reject(reject)));
-        (entries.into_iter().collect(), self.summary, self.envelope)
+        if let Some(reject) = &last {
+            self.summary.end(reject);
+        }
+        (
+            last.map(Entry::Reject).into_iter().collect(),
+            self.summary,
+            self.envelope,
+        )
     }
 
     fn enter(&mut self, at_s: Option<f64>, item: Item) -> Entry {
@@ -149,7 +155,10 @@ mod tests {
                 "offset 316, 3 bytes: frame cut off after 3 of 156 bytes",
             ]
         );
-        assert_eq!((summary.stretches, summary.rejected_bytes), (2, 7));
+        assert_eq!(
+            (summary.stretches, summary.rejected_bytes, summary.cut_off_bytes),
+            (1, 4, 3)
+        );
         assert_eq!(summary.failed, [2; 16]);
     }
 }

@@ -11,7 +11,7 @@ use emems::{
 
 use packets::{
     channel,
-    stream::{Reject, sequence::Step},
+    stream::{Reason, Reject, sequence::Step},
 };
 
 /// Least, most, mean and standard deviation of something.
@@ -82,6 +82,8 @@ pub struct Summary {
     pub stretches: u64,
     /// Bytes in them.
     pub rejected_bytes: u64,
+    /// Bytes of the frame that was on the line when the stream ended.
+    pub cut_off_bytes: u64,
     /// Packets in which each sensor failed, reading order.
     pub failed: [u64; SENSOR_COUNT],
     /// [s] period between packets that follow each other.
@@ -129,6 +131,14 @@ impl Summary {
         }
     }
 
+    /// Counts the last stretch of a stream: one that is the beginning of a frame is no damage.
+    pub fn end(&mut self, reject: &Reject) {
+        match reject.reason {
+            Reason::CutOff { .. } => self.cut_off_bytes = reject.length,
+            _ => self.reject(reject),
+        }
+    }
+
     /// Counts a stretch of bytes.
     pub fn reject(&mut self, reject: &Reject) {
         self.stretches += 1;
@@ -162,6 +172,9 @@ impl Summary {
                 "not decoded",
                 format!("{} bytes in {} stretches", self.rejected_bytes, self.stretches),
             ));
+        }
+        if self.cut_off_bytes > 0 {
+            rows.push(("cut off at the end", format!("{} bytes of a frame", self.cut_off_bytes)));
         }
         rows
     }
