@@ -8,12 +8,13 @@
 //! the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against all rivals in its
 //! place, and dropped if the rest can do without it.
 
-use nalgebra::{DMatrix, DVector};
-use twin::effect::onsets;
+mod timed;
 
+use nalgebra::{DMatrix, DVector};
+
+use self::timed::{bounded, sharpened};
 use crate::{
     library::Library,
-    onset,
     problem::{Component, Problem},
     refine::{Refined, model_of, refine},
 };
@@ -29,12 +30,6 @@ const FAR: f64 = 50.0;
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
-
-/// Times the distance between onsets tried is halved: of a log of ten minutes, to a cycle.
-const HALVINGS: usize = 8;
-
-/// [nats] that make another onset a better one.
-const SHARPER: f64 = 0.5;
 
 /// Effects at once: beyond five no answer was ever right, and shares of the excess cost two to their number.
 const MOST_EFFECTS: usize = 5;
@@ -259,77 +254,6 @@ fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refin
         }
     }
     library.products.scores(problem, &residuals)
-}
-
-/// Gives the member added last the stretch of time in which it is on, if it is not always.
-fn bounded(problem: &Problem, library: &mut Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
-    let Some(last) = set
-        .last()
-        .copied()
-        .filter(|last| !library.hypotheses[*last].places.is_empty())
-        .filter(|last| library.hypotheses[*last].cause.effect.page().passes)
-    else {
-        return (set, best);
-    };
-    let others = model_of(library, &set[..set.len() - 1], &best.thetas[..set.len() - 1]);
-    let own = &library.hypotheses[last];
-    let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
-    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
-    let Some(span) = onset::stretch(problem, &others, slopes, &sigmas) else {
-        return (set, best);
-    };
-    let model = model_of(library, &set, &best.thetas);
-    library.hypotheses[last].span = Some(span);
-    let mut model = model;
-    model[set.len() - 1].span = Some(span);
-    let renewed = problem.slopes(&model, set.len() - 1);
-    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
-        library.products.renew(problem, place, column);
-    }
-    let refined = refine(problem, library, &set, &best.thetas);
-    if refined.log_evidence > best.log_evidence {
-        return (set, refined);
-    }
-    library.hypotheses[last].span = None;
-    (set, best)
-}
-
-/// Moves the onset of the member added last to where it explains most: it is free, and a step that is seconds off leaves
-/// more than most effects make.
-fn sharpened(problem: &Problem, library: &mut Library, set: &[usize], best: Refined) -> Refined {
-    let Some(last) = set.last().copied() else {
-        return best;
-    };
-    let all: Vec<f64> = onsets(problem.twin.starts_s()).collect();
-    let mut onset_s = library.hypotheses[last].cause.variant;
-    if library.hypotheses[last].places.is_empty() || !all.contains(&onset_s) {
-        return best;
-    }
-    let mut best = best;
-    let mut step_s = 0.5 * (all[1] - all[0]);
-    for _ in 0..HALVINGS {
-        for tried_s in [onset_s - step_s, onset_s + step_s] {
-            let refined = from_onset(problem, library, set, &best, tried_s);
-            if refined.log_evidence > best.log_evidence + SHARPER {
-                (onset_s, best) = (tried_s, refined);
-                break;
-            }
-        }
-        step_s *= 0.5;
-    }
-    from_onset(problem, library, set, &best, onset_s)
-}
-
-/// A set refitted with another onset of its last member, whose columns are made anew.
-fn from_onset(problem: &Problem, library: &mut Library, set: &[usize], best: &Refined, onset_s: f64) -> Refined {
-    let last = set[set.len() - 1];
-    library.hypotheses[last].cause.variant = onset_s;
-    let model = model_of(library, set, &best.thetas);
-    let renewed = problem.slopes(&model, set.len() - 1);
-    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
-        library.products.renew(problem, place, column);
-    }
-    refine(problem, library, set, &best.thetas)
 }
 
 /// Drops members the others can do without.

@@ -4,12 +4,14 @@
 //! about a model that no longer changes; if its effects do not shrink their gap, they are withdrawn.
 
 use crate::{
-    attribute::{Chosen, attribute},
+    attribute::attribute,
+    belief::{Belief, second_keys},
     case::Subject,
-    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, probability_of_any, share_out},
+    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, share_out},
     confusion, contribution,
     correction::Correction,
-    crossval::{self, Key},
+    crossval::Key,
+    explain::{Explanation, SAID},
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
     leftover::{self, Leftover},
@@ -17,44 +19,9 @@ use crate::{
     model::Model,
     place::{self, Place},
     problem::Problem,
-    scatter::{Scatter, scatters},
-    sight, temper,
+    sight,
     trace::{Trace, cells, traces},
 };
-
-/// [nats] an effect on the scatter must gain.
-const SCATTER_MARGIN: f64 = 3.0;
-
-/// Probability from which an effect is named.
-const SAID: f64 = 0.5;
-
-/// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
-const MOST_CAUSES: usize = 3;
-
-/// Prior probability that a unit has something the library does not.
-const UNKNOWN_PRIOR: f64 = 0.05;
-
-/// The effect on the scatter that changes nothing but its size.
-const LOUDER: &str = "noise-level";
-
-/// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
-const WANDERING: &str = "gyro-bias-walk";
-
-/// Steps from which a walk is told from anything else: the rows of a table are fewer, and no walk.
-const STEPS: usize = 100;
-
-/// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
-/// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
-/// effect of marginal signal-to-noise ratio 8 has 32 before its prior odds.
-const DOUBTED: f64 = 20.0;
-const DOUBT_STEP: f64 = 4.0;
-
-/// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
-/// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
-const UNLIKE: f64 = 0.02;
-
-/// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
-const REMAINDER: f64 = 0.005;
 
 /// What a case says.
 pub struct Diagnosis {
@@ -109,172 +76,100 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
     let gap = root_mean_square(&problem);
     let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
-    let mut found = attribute(&problem, &mut library, &|share| progress("search", share));
+    let search = |share| progress("search", share);
+    let found = attribute(&problem, &mut library, &search);
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
     progress("where", 0.0);
     let place = place::locate(&problem, &quiet);
-    let mut first = Model::around(&problem, &library, found.model(&library));
-    let mut scatter = best_scatter(&problem, &first, withheld);
-    // What wanders at random looks like a little of everything: if that alone says more than all that was chosen, it is that.
-    let gains = |chosen: &[Chosen]| chosen.iter().map(|chosen| chosen.gain).sum::<f64>();
-    let at_random = best_scatter(&problem, &quiet, withheld).filter(|one| {
-        let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-        !found.chosen.is_empty()
-            && one.channels.iter().map(steps).all(|steps| steps >= STEPS)
-            && one.effect.page().name == WANDERING
-            && one.gain > gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain)
-    });
-    let is_random = at_random.is_some();
-    if is_random {
-        found.chosen.clear();
-        scatter = at_random;
-        first = Model::around(&problem, &library, Vec::new());
-    }
-    let mut sigmas_after = problem.sigmas.clone();
-    let loud = scatter.as_ref().map_or_else(
-        || vec![1.0; problem.frames.len()],
-        |scatter| factors(&problem, &first, scatter),
-    );
-    sigmas_after
-        .iter_mut()
-        .zip(&loud)
-        .for_each(|(sigma, factor)| *sigma *= factor);
-    let mut tempered = temper::factors(&first.fitted.rest);
-    tempered
-        .iter_mut()
-        .zip(&loud)
-        .filter(|(_, loud)| **loud != 1.0)
-        .for_each(|(tempered, _)| *tempered = 1.0);
-    let both: Vec<f64> = loud
-        .iter()
-        .zip(&tempered)
-        .map(|(loud, tempered)| loud * tempered)
-        .collect();
-    if both.iter().any(|factor| *factor != 1.0) {
-        // The noise as found, then everything else anew with it.
-        reweigh(&mut problem, &mut library, &both);
-        if !is_random {
-            found = attribute(&problem, &mut library, &|share| progress("search", share));
-        }
-    }
-    let sought = distinct(&library, &found.chosen);
-    let (kept, mut refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
-        .into_iter()
-        .partition(|chosen| probability_of_any(&library, chosen) >= SAID);
-    let is_refused = gains(&refused) > gains(&kept);
-    found.chosen = kept;
-    // What is left is judged with the noise as described, or a misfit would excuse itself.
-    let back: Vec<f64> = tempered.iter().map(|factor| 1.0 / factor).collect();
-    reweigh(&mut problem, &mut library, &back);
-    let model = Model::around(&problem, &library, found.model(&library));
-    if scatter.is_some() && !is_random {
-        scatter = best_scatter(&problem, &model, withheld);
-    }
+
+    let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
-    // Louder white noise is in the weights by now, so that its channels are judged like any other.
-    let scattered: Vec<usize> = scatter
-        .iter()
-        .filter(|scatter| scatter.effect.page().name != LOUDER)
-        .flat_map(|scatter| scatter.channels.clone())
-        .collect();
-    let mut left = if found.chosen.is_empty() && scatter.is_none() {
+    let mut left = if explanation.is_empty() {
         gate.clone()
     } else {
-        leftover::judge(&sight::views(&problem), &model.joint, &model.fitted, &scattered)
+        let model = &explanation.model;
+        leftover::judge(
+            &sight::views(&problem),
+            &model.joint,
+            &model.fitted,
+            &explanation.scattered(),
+        )
     };
+
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
         .collect();
-    let finished = |after, sigmas_after| Finished {
+    let without = Finished {
         start_s: subject.twin.starts_s(),
         sigmas: &problem.sigmas,
         before: &before,
         recalibrated: &quiet.predicted,
-        after,
-        sigmas_after,
+        after: &quiet.predicted,
+        sigmas_after: &problem.sigmas,
     };
-    let mut shrink = subject.held.judge(finished(&model.predicted, &sigmas_after));
-    let mut withdrawn = Vec::new();
-    let is_smaller = shrink.supports_the_effect();
-    let has_effect = !found.chosen.is_empty() || scatter.is_some();
-    let is_patchwork = sought + usize::from(scatter.is_some()) > MOST_CAUSES;
-    if has_effect && (!is_smaller || is_patchwork || is_refused) {
-        withdrawn.extend(
-            found
-                .chosen
-                .iter()
-                .map(|chosen| library.hypotheses[chosen.hypothesis].effect()),
-        );
-        withdrawn.extend(scatter.iter().map(|scatter| scatter.effect.page().name));
-        refused.append(&mut found.chosen);
-        scatter = None;
-    }
-    if found.chosen.is_empty() && scatter.is_none() {
+    let mut shrink = subject.held.judge(Finished {
+        after: &explanation.model.predicted,
+        sigmas_after: &explanation.sigmas,
+        ..without
+    });
+    let withdrawn = if !shrink.supports_the_effect() || explanation.is_patchwork() {
+        explanation.withdraw(&library)
+    } else {
+        Vec::new()
+    };
+    if explanation.is_empty() {
         // Without the effects what is left is all there was.
         left = gate.clone();
-        shrink = subject.held.judge(finished(&quiet.predicted, &problem.sigmas));
+        shrink = subject.held.judge(without);
     }
+
     progress("confusion", 0.0);
-    let unknown = left.unknown(UNKNOWN_PRIOR);
-    // Louder noise takes in whatever is there: that it does is no sign of its law.
-    let louder = scatter.iter().filter(|scatter| scatter.effect.page().name == LOUDER);
-    let by_scatter: f64 = scatter.iter().map(|scatter| 2.0 * scatter.gain).sum();
-    let explained = match louder.flat_map(|scatter| scatter.channels.clone()).collect::<Vec<_>>() {
-        louder if louder.is_empty() => explained_energy(&quiet, &model, &scattered) + by_scatter,
-        louder => explained_energy(&quiet, &model, &louder),
-    };
-    let mut causes = causes_of(&problem, &library, &found);
-    contribution::settle(&problem, &library, &found, &mut causes);
-    let keys = second_keys(&problem, &library, &model, &mut causes);
-    causes.extend(scatter.as_ref().map(|scatter| cause_of_scatter(subject, scatter)));
-    let unlike = left.energy() / (left.energy() + UNLIKE * explained).max(f64::MIN_POSITIVE);
-    let trust = 1.0 - unknown * unlike;
-    let is_no_chance = |gain: f64| 1.0 / (1.0 + ((DOUBTED - gain) / DOUBT_STEP).exp());
-    let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
-    let is_no_remainder = |gain: f64| {
-        if gain < strongest {
-            gain / (gain + REMAINDER * strongest)
-        } else {
-            1.0
-        }
-    };
-    for cause in &mut causes {
-        cause.probability *= trust * is_no_chance(cause.gain) * is_no_remainder(cause.gain);
-    }
+    let (found, model) = (&explanation.found, &explanation.model);
+    let belief = Belief::of(&left, explanation.energy(&quiet));
+    let mut causes = causes_of(&problem, &library, found);
+    contribution::settle(&problem, &library, found, &mut causes);
+    let keys = second_keys(&problem, &library, model, &mut causes);
+    let scatter = explanation.scatter.as_ref();
+    causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
+    belief.weigh(&mut causes);
     // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
         causes.into_iter().partition(|cause| cause.probability >= SAID);
     share_out(&mut causes);
-    let mut alternatives = alternatives(&library, &found, &refused);
-    let trust_in_others = if found.chosen.is_empty() { 1.0 - unknown } else { trust };
+    let mut alternatives = alternatives(&library, found, &explanation.refused);
+    let trust_in_others = if found.chosen.is_empty() {
+        1.0 - belief.unknown
+    } else {
+        belief.trust
+    };
     alternatives
         .iter_mut()
         .for_each(|(_, probability)| *probability *= trust_in_others);
     alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
     alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
     alternatives.dedup_by_key(|(name, _)| *name);
+
     let is_named = !causes.is_empty();
     let correction = is_named
         .then(|| Correction::of(&subject.twin, &model.components))
         .flatten();
-    let (after, sigmas_after) = if is_named {
-        (&model.predicted, &sigmas_after)
+    let finished = if is_named {
+        Finished {
+            after: &model.predicted,
+            sigmas_after: &explanation.sigmas,
+            ..without
+        }
     } else {
-        (&quiet.predicted, &problem.sigmas)
+        without
     };
     let responses = correction.as_ref().map(|correction| correction.responses.as_slice());
     progress("attitude", 0.0);
-    let stages = subject
-        .held
-        .stages(&subject.twin, finished(after, sigmas_after), responses);
+    let stages = subject.held.stages(&subject.twin, finished, responses);
     let ceiling = is_named.then(|| {
         let parameters = causes.iter().map(|cause| cause.parameters.len()).sum();
-        let snr = (contribution::left(&quiet) - contribution::left(&model))
-            .max(0.0)
-            .sqrt();
-        ceiling_percent(shrink.before, parameters, snr)
+        ceiling_percent(shrink.before, parameters, explanation.signal_to_noise(&quiet))
     });
     Diagnosis {
         place,
@@ -282,7 +177,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         stages,
         correction,
         keys,
-        louder: sigmas_after
+        louder: finished
+            .sigmas_after
             .iter()
             .zip(&problem.sigmas)
             .map(|(after, before)| after / before)
@@ -290,12 +186,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         gap,
         gate,
         alternatives,
-        indistinguishable: confusion::sets(&library, &found),
-        none_of_these: unknown,
+        indistinguishable: confusion::sets(&library, found),
+        none_of_these: belief.unknown,
         leftover: left,
         shrink,
-        alone: alone(&library, &found),
-        imitation: imitation(&library, &found),
+        alone: alone(&library, found),
+        imitation: imitation(&library, found),
         limits: confusion::limits(&library),
         known: model
             .components
@@ -304,8 +200,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             .filter(|component| is_named && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
-        rivals: confusion::pair(&library, &found),
-        traces: traces(&problem, &model),
+        rivals: confusion::pair(&library, found),
+        traces: traces(&problem, model),
         cells: cells(&problem, &views),
         causes,
         withdrawn,
@@ -320,70 +216,4 @@ fn root_mean_square(problem: &Problem) -> f64 {
         samples += frame.series.rows.len();
     }
     (energy / samples.max(1) as f64).sqrt()
-}
-
-/// What cross-validation says of the model's effects; the causes, which are those in their order, are believed no more.
-fn second_keys(problem: &Problem, library: &Library, model: &Model, causes: &mut [Cause]) -> Vec<(&'static str, Key)> {
-    if causes.len() != model.components.len() {
-        // They were withdrawn.
-        return Vec::new();
-    }
-    let keys = crossval::keys(problem, library, model).into_iter();
-    let said = keys.zip(causes).filter_map(|(key, cause)| {
-        let key = key?;
-        cause.probability = cause.probability.min(key.confidence());
-        Some((cause.effect, key))
-    });
-    said.collect()
-}
-
-/// How many effects are chosen: packets lost at three instants are one.
-fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
-    let names: std::collections::BTreeSet<&str> = chosen
-        .iter()
-        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
-        .collect();
-    names.len()
-}
-
-/// Takes the noise of each channel for so many times what it was.
-fn reweigh(problem: &mut Problem, library: &mut Library, factors: &[f64]) {
-    if factors.iter().all(|factor| *factor == 1.0) {
-        return;
-    }
-    problem.reweigh(factors);
-    let inverse: Vec<f64> = factors.iter().map(|factor| 1.0 / factor).collect();
-    library.products.reweigh(problem, &inverse);
-}
-
-fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
-    let all = scatters(problem, &model.predicted, withheld);
-    all.into_iter().next().filter(|scatter| scatter.gain > SCATTER_MARGIN)
-}
-
-/// How much more each channel scatters than the twin has it; 1 where the effect is not.
-fn factors(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
-    let energies = model.energies();
-    let factor = |channel: usize| {
-        let samples = problem.frames[channel].series.rows.len().max(1) as f64;
-        let is_in = scatter.channels.contains(&channel);
-        if is_in {
-            (energies[channel] / samples).sqrt().clamp(0.1, 1000.0)
-        } else {
-            1.0
-        }
-    };
-    (0..problem.frames.len()).map(factor).collect()
-}
-
-/// Energy that a model takes off what calibration and noise leave, in squares of noise; of channels not in `scattered`.
-fn explained_energy(quiet: &Model, model: &Model, scattered: &[usize]) -> f64 {
-    let energy = |model: &Model| -> f64 {
-        let channels = model.energies().into_iter().zip(&model.fitted.nuisance).enumerate();
-        channels
-            .filter(|(channel, _)| !scattered.contains(channel))
-            .map(|(_, (energy, open))| energy + open.norm_squared())
-            .sum()
-    };
-    (energy(quiet) - energy(model)).max(0.0)
 }

@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! case -> windows (what is fitted | what only judges) -> problem (residual in units of noise)
-//!      -> library (every effect at every place) -> attribute (which, by evidence) -> leftover (is it enough)
-//!      -> held (how far it shrinks) -> verdict
+//!      -> library (every effect at every place) -> attribute (which, by evidence) -> explain (and how it scatters)
+//!      -> leftover (is it enough) -> held (how far it shrinks) -> belief (how likely a name is) -> verdict
 //! ```
 //!
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
@@ -15,6 +15,7 @@
 pub mod attitude;
 pub mod attribute;
 pub mod baseline;
+pub mod belief;
 pub mod case;
 pub mod cause;
 pub mod command;
@@ -24,6 +25,7 @@ pub mod correction;
 pub mod crossval;
 pub mod diagnose;
 pub mod evidence;
+pub mod explain;
 pub mod gram;
 pub mod gross;
 pub mod held;

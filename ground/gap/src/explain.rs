@@ -1,0 +1,232 @@
+//! What explains a log best: effects on readings, and at most one on how they scatter.
+//!
+//! In: the [`Problem`], its [`Library`], and what a first search chose. Out: an [`Explanation`], for which nothing held out
+//! was asked.
+//!
+//! An effect on the scatter is judged on what the others leave. With the noise as found, everything else is searched anew;
+//! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged.
+
+use crate::{
+    attribute::{Attribution, Chosen, attribute},
+    cause::probability_of_any,
+    contribution,
+    library::Library,
+    model::Model,
+    problem::Problem,
+    scatter::{Scatter, scatters},
+    temper,
+};
+
+/// [nats] an effect on the scatter must gain.
+const SCATTER_MARGIN: f64 = 3.0;
+
+/// Probability from which an effect is named.
+pub const SAID: f64 = 0.5;
+
+/// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
+const MOST_CAUSES: usize = 3;
+
+/// The effect on the scatter that changes nothing but its size.
+const LOUDER: &str = "noise-level";
+
+/// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
+const WANDERING: &str = "gyro-bias-walk";
+
+/// Steps from which a walk is told from anything else: the rows of a table are fewer, and no walk.
+const STEPS: usize = 100;
+
+/// The effects that a log speaks for.
+pub struct Explanation {
+    /// Effects on readings, of which those are chosen that are likelier than not.
+    pub found: Attribution,
+    /// Those that were chosen too, and are not likelier than not.
+    pub refused: Vec<Chosen>,
+    /// The effect on the scatter.
+    pub scatter: Option<Scatter>,
+    /// The chosen effects on readings with everything else fitted.
+    pub model: Model,
+    /// Standard deviation of a sample with the effect on the scatter, in the unit's channel order.
+    pub sigmas: Vec<f64>,
+    /// Different effects on readings that the search chose, refused ones included.
+    sought: usize,
+    /// Whether those that were refused explain more than those that were kept.
+    is_refused: bool,
+}
+
+impl Explanation {
+    /// Explains a log. `found` is what a first search chose, `quiet` the model without effects. The problem is left with the
+    /// noise of the effect on the scatter if that is louder noise, and as described if it is not.
+    pub fn of(
+        problem: &mut Problem,
+        library: &mut Library,
+        quiet: &Model,
+        mut found: Attribution,
+        withheld: &[String],
+        progress: &dyn Fn(f64),
+    ) -> Self {
+        let first = Model::around(problem, library, found.model(library));
+        let mut scatter = best_scatter(problem, &first, withheld);
+        let explained = gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
+        let wandering = wandering(problem, quiet, withheld)
+            .filter(|wandering| !found.chosen.is_empty() && wandering.gain > explained);
+        let wanders = wandering.is_some();
+        if wanders {
+            found.chosen.clear();
+            scatter = wandering;
+        }
+        let first = if wanders { quiet } else { &first };
+        let louder = scatter.as_ref().map_or_else(
+            || vec![1.0; problem.frames.len()],
+            |scatter| louder(problem, first, scatter),
+        );
+        let of_misfit: Vec<f64> = temper::factors(&first.fitted.rest)
+            .into_iter()
+            .zip(&louder)
+            .map(|(factor, louder)| if *louder == 1.0 { factor } else { 1.0 })
+            .collect();
+        let both: Vec<f64> = louder.iter().zip(&of_misfit).map(|(one, other)| one * other).collect();
+        if both.iter().any(|factor| *factor != 1.0) {
+            reweigh(problem, library, &both);
+            if !wanders {
+                found = attribute(problem, library, progress);
+            }
+        }
+        let sought = distinct(library, &found.chosen);
+        let (kept, refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
+            .into_iter()
+            .partition(|chosen| probability_of_any(library, chosen) >= SAID);
+        let is_refused = gains(&refused) > gains(&kept);
+        found.chosen = kept;
+        // What is left is judged with the noise as described, or a misfit would excuse itself.
+        let back: Vec<f64> = of_misfit.iter().map(|factor| 1.0 / factor).collect();
+        reweigh(problem, library, &back);
+        let model = Model::around(problem, library, found.model(library));
+        if scatter.is_some() && !wanders {
+            scatter = best_scatter(problem, &model, withheld);
+        }
+        Self {
+            found,
+            refused,
+            scatter,
+            model,
+            sigmas: problem
+                .sigmas
+                .iter()
+                .zip(&louder)
+                .map(|(sigma, louder)| sigma * louder)
+                .collect(),
+            sought,
+            is_refused,
+        }
+    }
+
+    /// Whether it names nothing.
+    pub fn is_empty(&self) -> bool {
+        self.found.chosen.is_empty() && self.scatter.is_none()
+    }
+
+    /// Whether it is more likely a patchwork for an effect that the library does not have.
+    pub fn is_patchwork(&self) -> bool {
+        self.is_refused || self.sought + usize::from(self.scatter.is_some()) > MOST_CAUSES
+    }
+
+    /// Channels whose scatter is explained by more than its size. Louder white noise is in the weights, so that its
+    /// channels are judged like any other.
+    pub fn scattered(&self) -> Vec<usize> {
+        let scatter = self
+            .scatter
+            .iter()
+            .filter(|scatter| scatter.effect.page().name != LOUDER);
+        scatter.flat_map(|scatter| scatter.channels.clone()).collect()
+    }
+
+    /// Energy that it takes off what calibration and noise leave, in squares of noise.
+    pub fn energy(&self, quiet: &Model) -> f64 {
+        match &self.scatter {
+            // Louder noise takes in whatever is there: that it does is no sign of its law.
+            Some(scatter) if scatter.effect.page().name == LOUDER => self.energy_without(quiet, &scatter.channels),
+            Some(scatter) => self.energy_without(quiet, &scatter.channels) + 2.0 * scatter.gain,
+            None => self.energy_without(quiet, &[]),
+        }
+    }
+
+    /// Square root of the energy that the model takes off the fit windows.
+    pub fn signal_to_noise(&self, quiet: &Model) -> f64 {
+        (contribution::left(quiet) - contribution::left(&self.model))
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// Takes every effect back; returns their names.
+    pub fn withdraw(&mut self, library: &Library) -> Vec<&'static str> {
+        let readings = self.found.chosen.iter();
+        let mut names: Vec<&'static str> = readings
+            .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
+            .collect();
+        names.extend(self.scatter.take().map(|scatter| scatter.effect.page().name));
+        self.refused.append(&mut self.found.chosen);
+        names
+    }
+
+    fn energy_without(&self, quiet: &Model, scattered: &[usize]) -> f64 {
+        let energy = |model: &Model| -> f64 {
+            let channels = model.energies().into_iter().zip(&model.fitted.nuisance).enumerate();
+            channels
+                .filter(|(channel, _)| !scattered.contains(channel))
+                .map(|(_, (energy, open))| energy + open.norm_squared())
+                .sum()
+        };
+        (energy(quiet) - energy(&self.model)).max(0.0)
+    }
+}
+
+fn gains(chosen: &[Chosen]) -> f64 {
+    chosen.iter().map(|chosen| chosen.gain).sum()
+}
+
+/// How many effects are chosen: packets lost at three instants are one.
+fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
+    let names: std::collections::BTreeSet<&str> = chosen
+        .iter()
+        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
+        .collect();
+    names.len()
+}
+
+/// Takes the noise of each channel for so many times what it was.
+fn reweigh(problem: &mut Problem, library: &mut Library, factors: &[f64]) {
+    if factors.iter().all(|factor| *factor == 1.0) {
+        return;
+    }
+    problem.reweigh(factors);
+    let inverse: Vec<f64> = factors.iter().map(|factor| 1.0 / factor).collect();
+    library.products.reweigh(problem, &inverse);
+}
+
+fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
+    let all = scatters(problem, &model.predicted, withheld);
+    all.into_iter().next().filter(|scatter| scatter.gain > SCATTER_MARGIN)
+}
+
+/// A walk that alone explains the log best: what wanders at random looks like a little of everything.
+fn wandering(problem: &Problem, quiet: &Model, withheld: &[String]) -> Option<Scatter> {
+    let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
+    best_scatter(problem, quiet, withheld).filter(|scatter| {
+        scatter.effect.page().name == WANDERING && scatter.channels.iter().map(steps).all(|steps| steps >= STEPS)
+    })
+}
+
+/// How much more each channel scatters than the twin has it; 1 where the effect is not.
+fn louder(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
+    let energies = model.energies();
+    let factor = |channel: usize| {
+        let samples = problem.frames[channel].series.rows.len().max(1) as f64;
+        let is_in = scatter.channels.contains(&channel);
+        if is_in {
+            (energies[channel] / samples).sqrt().clamp(0.1, 1000.0)
+        } else {
+            1.0
+        }
+    };
+    (0..problem.frames.len()).map(factor).collect()
+}
