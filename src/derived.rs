@@ -16,6 +16,8 @@
 //! Numbers of 8 digits are IEEE 754, but for `health` and `sensors`, which are bits. With the packet of the same counter
 //! a frame holds all that [`estimate`](crate::estimate) was given, so a stream of both from the start gives its result again.
 
+mod health;
+
 use core::fmt;
 
 use crc::{CRC_16_IBM_3740, Crc};
@@ -28,6 +30,8 @@ use crate::{
     packet::hex_value,
     sample::{NO_SLOT, SENSOR_COUNT},
 };
+
+pub use health::Health;
 
 /// First byte of a derived frame.
 pub const DERIVED_START: u8 = b'$';
@@ -44,47 +48,6 @@ const NO_SLOT_CODE: u64 = 0xF_FFFF;
 
 /// CRC-16/CCITT-FALSE, which the catalogue calls IBM-3740; "123456789" gives 29B1.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
-
-/// Health of the unit in one cycle, one bit each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Health(pub u32);
-
-impl Health {
-    /// The sensor bus was recovered.
-    pub const BUS_RECOVERED: Health = Health(1 << 16);
-    /// The deadline closed the cycle before every sensor had its turn.
-    pub const DEADLINE: Health = Health(1 << 17);
-    /// Packets are being recorded.
-    pub const RECORDING: Health = Health(1 << 18);
-    /// The recorder refused the last packet.
-    pub const RECORDER_REFUSED: Health = Health(1 << 19);
-    /// A magnetometer axis overflowed.
-    pub const MAGNETOMETER_OVERFLOW: Health = Health(1 << 20);
-    /// A gyro reported an alarm.
-    pub const GYRO_ALARM: Health = Health(1 << 21);
-    /// A gyro stands at the end of its range.
-    pub const GYRO_SATURATED: Health = Health(1 << 22);
-    /// A sensor had lost its configuration and got it back.
-    pub const RECONFIGURED: Health = Health(1 << 23);
-    /// The crystal did not start: the unit's time is off by up to 8 %.
-    pub const INTERNAL_OSCILLATOR: Health = Health(1 << 24);
-
-    /// With these bits set too. Bits 0 to 15 are the packet's error identifier.
-    pub fn with(self, more: Health) -> Health {
-        Health(self.0 | more.0)
-    }
-
-    /// With these bits set too if `condition`.
-    pub fn with_if(self, more: Health, condition: bool) -> Health {
-        if condition { self.with(more) } else { self }
-    }
-
-    /// Whether all these bits are set.
-    pub fn contains(self, other: Health) -> bool {
-        self.0 & other.0 == other.0
-    }
-}
 
 /// What a derived frame says.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,6 +7,8 @@
 //! then asked for the commands of each millisecond of the step to come, so a command is on the line at its own
 //! millisecond, and every byte it hears carries its own instant. Refuses an image without the named statics.
 
+mod pilot;
+
 use std::{
     collections::BTreeSet,
     sync::mpsc::{Receiver, SyncSender, sync_channel},
@@ -17,19 +19,19 @@ use defmt_decoder::Table;
 use emems::board::ResetCause;
 use rigless::{
     device,
-    emulator::{self, Driver, Finished, Host, Start, Stop},
+    emulator::{self, Finished, Start},
     session::Session,
-    soc::Width,
     time::VirtualNanos,
 };
 use twin::{
     part::Nanos,
     plant::Plant,
-    run::{Bench, Fault, Flow, Scheduled},
+    run::{Bench, Flow, Scheduled},
 };
 
+use self::pilot::Pilot;
 use crate::{
-    chips::{Line, SharedPlant},
+    chips::SharedPlant,
     covers::Covers,
     image::{Image, ImageError},
     rtt,
@@ -38,9 +40,6 @@ use crate::{
 
 /// [ns] between two meetings of the core and the bench.
 pub const STEP: Nanos = 20_000_000;
-/// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
-const RETAINED: u64 = 0x2001_FF00;
-const RETAINED_BYTES: u64 = 256;
 const MILLISECOND: Nanos = 1_000_000;
 
 /// How a run differs from the plain one.
@@ -238,96 +237,6 @@ fn attend(bench: &mut dyn Bench, table: Option<&Table>, heard: &Receiver<Heard>,
         if to_core.send(Said { commands, flow }).is_err() {
             return;
         }
-    }
-}
-
-/// The core's side: what happens at the instants at which the run stops.
-struct Pilot {
-    plant: SharedPlant,
-    /// Latest first.
-    faults: Vec<Scheduled>,
-    duration: Nanos,
-    statics: Vec<(u64, usize)>,
-    log: Option<u64>,
-    to_bench: SyncSender<Heard>,
-    said: Receiver<Said>,
-    /// When the next meeting is.
-    next_meeting: Nanos,
-    instructions: u64,
-    static_bytes: Vec<Vec<u8>>,
-}
-
-impl Pilot {
-    fn strike(&mut self, session: &mut Session<Stand>, stop: Stop, host: &mut dyn Host) {
-        while let Some(scheduled) = self.faults.pop_if(|scheduled| scheduled.at <= stop.at.0) {
-            match scheduled.fault {
-                Fault::Reset => session.reset_by_pin(stop.at, stop.instruction_count, host),
-                Fault::PowerCut(_) => {
-                    self.plant.lock().apply(scheduled.fault, stop.at.0);
-                    session.board_mut().mcu.cut_power();
-                    // The emulator's memory survives; what a power cut loses is lost here (memory.x).
-                    for at in (RETAINED..RETAINED + RETAINED_BYTES).step_by(4) {
-                        let _ = host.write(at, Width::W32, 0xDEAD_BEEF);
-                    }
-                    session.reset_by_pin(stop.at, stop.instruction_count, host);
-                }
-                Fault::DmaHung => session.board_mut().mcu.hang_dma(),
-                Fault::SupplyFailing(failing) => session.board_mut().mcu.sag(failing),
-                fault => self.plant.lock().apply(fault, stop.at.0),
-            }
-        }
-    }
-
-    /// Tells the bench what was heard and puts its commands on the line; `None` ends the run.
-    fn meet(&mut self, session: &mut Session<Stand>, now: Nanos, host: &mut dyn Host) -> Option<()> {
-        let restarts = session.resets().len();
-        let mcu = &mut session.board_mut().mcu;
-        let heard = Heard {
-            now,
-            telemetry: mcu.telemetry().map(Line::take_heard).unwrap_or_default(),
-            umbilical: mcu.umbilical().map(Line::take_heard).unwrap_or_default(),
-            log: self.log.map(|block| rtt::drain(host, block)).unwrap_or_default(),
-            restarts,
-        };
-        self.to_bench.send(heard).ok()?;
-        let said = self.said.recv().ok()?;
-        for (at, bytes) in said.commands {
-            if let Some(line) = mcu.umbilical() {
-                line.say(at, &bytes);
-            }
-        }
-        (said.flow == Flow::Continue && now < self.duration).then_some(())
-    }
-}
-
-impl Driver<Stand> for Pilot {
-    fn on_stop(&mut self, session: &mut Session<Stand>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        let now = stop.at.0;
-        self.strike(session, stop, host);
-        if now >= self.next_meeting || now >= self.duration {
-            self.next_meeting = meeting_after(now);
-            if self.meet(session, now, host).is_none() {
-                self.instructions = stop.instruction_count;
-                self.static_bytes = (self.statics.iter())
-                    .map(|&(address, bytes)| {
-                        (address..address + bytes as u64)
-                            .map_while(|at| host.read(at, Width::W8).ok())
-                            .map(|byte| byte as u8)
-                            .collect()
-                    })
-                    .collect();
-                return None;
-            }
-        }
-        let line = session.board_mut().mcu.umbilical();
-        // The first byte of a burst needs a stop at its instant; the line itself fetches the others, frame by frame.
-        let command = line.and_then(|line| line.next_due()).filter(|&due| due > now);
-        let fault = self.faults.last().map(|scheduled| scheduled.at);
-        [Some(self.next_meeting), Some(self.duration), command, fault]
-            .into_iter()
-            .flatten()
-            .min()
-            .map(VirtualNanos)
     }
 }
 

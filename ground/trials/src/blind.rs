@@ -5,6 +5,8 @@
 //! salt and answer; `answer` publishes those of the verdicts; `reveal` opens the answers next to the cases; `score` checks all
 //! hashes and only then scores. A hash that does not fit is an error that names the case.
 
+mod files;
+
 use std::{
     collections::BTreeMap,
     fs, io,
@@ -12,9 +14,9 @@ use std::{
 };
 
 use indicatif::ProgressBar;
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use sha2::{Digest, Sha256};
+use serde::{Deserialize, Serialize};
 
+use self::files::{entries, files, hash, make, parse, read, stem, write};
 use crate::{
     answer::Answer,
     deal::{self, DealError, Ring},
@@ -309,68 +311,6 @@ fn answer_hash(path: &Path) -> Result<String, BlindError> {
         source,
     })?;
     Ok(hash(&[kept.salt.as_bytes(), &answer].concat()))
-}
-
-fn hash(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem()
-        .map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
-}
-
-fn entries(folder: &Path) -> Result<Vec<PathBuf>, BlindError> {
-    let failed = |source| BlindError::File {
-        path: folder.into(),
-        source,
-    };
-    let mut paths = fs::read_dir(folder)
-        .map_err(failed)?
-        .map(|entry| entry.map(|entry| entry.path()).map_err(failed))
-        .collect::<Result<Vec<_>, _>>()?;
-    paths.sort();
-    Ok(paths)
-}
-
-fn files(folder: &Path) -> Result<Vec<PathBuf>, BlindError> {
-    Ok(entries(folder)?
-        .into_iter()
-        .filter(|path| path.extension().is_some_and(|end| end == "json"))
-        .collect())
-}
-
-fn make(folder: &Path) -> Result<(), BlindError> {
-    fs::create_dir_all(folder).map_err(|source| BlindError::File {
-        path: folder.into(),
-        source,
-    })
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
-    fs::read(path).map_err(|source| BlindError::File {
-        path: path.into(),
-        source,
-    })
-}
-
-fn parse<T: DeserializeOwned>(path: &Path) -> Result<T, BlindError> {
-    serde_json::from_slice(&read(path)?).map_err(|source| BlindError::Json {
-        path: path.into(),
-        source,
-    })
-}
-
-fn write(path: &Path, value: &impl Serialize) -> Result<(), BlindError> {
-    let mut bytes = serde_json::to_vec_pretty(value).map_err(|source| BlindError::Json {
-        path: path.into(),
-        source,
-    })?;
-    bytes.push(b'\n');
-    fs::write(path, bytes).map_err(|source| BlindError::File {
-        path: path.into(),
-        source,
-    })
 }
 
 #[cfg(test)]
