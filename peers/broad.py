@@ -8,6 +8,7 @@ Packages: `python3 -m venv peers/.venv && peers/.venv/bin/pip install -r peers/r
 """
 
 import gzip
+import multiprocessing
 import pathlib
 import sys
 
@@ -139,16 +140,25 @@ def rmse(found, rows):
     return [np.degrees(np.sqrt(np.mean(angle**2))) for angle in angles]
 
 
+def lines_of(path):
+    with gzip.open(path, "rt") as text:
+        rows = np.genfromtxt(text, delimiter=",", skip_header=1)
+    lines = []
+    for mode, dt, part in modes(rows):
+        for name, run in FILTERS.items():
+            found = run(dt, part[:, 1:4], part[:, 4:7], part[:, 7:10])
+            errors = ",".join(f"{error:.4f}" for error in rmse(found, part))
+            lines.append(f"{name},{path.name[:2]},{mode},{errors}")
+    return lines
+
+
 def main():
     print("filter,recording,mode,total,heading,inclination")
-    for path in sorted(pathlib.Path(sys.argv[1]).glob("[0-9][0-9]*.csv.gz")):
-        with gzip.open(path, "rt") as text:
-            rows = np.genfromtxt(text, delimiter=",", skip_header=1)
-        for mode, dt, part in modes(rows):
-            for name, run in FILTERS.items():
-                found = run(dt, part[:, 1:4], part[:, 4:7], part[:, 7:10])
-                errors = ",".join(f"{error:.4f}" for error in rmse(found, part))
-                print(f"{name},{path.name[:2]},{mode},{errors}", flush=True)
+    paths = sorted(pathlib.Path(sys.argv[1]).glob("[0-9][0-9]*.csv.gz"))
+    with multiprocessing.Pool() as pool:
+        for done, found in enumerate(pool.imap(lines_of, paths), start=1):
+            print("\n".join(found), flush=True)
+            print(f"peers: {done} of {len(paths)} recordings", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,11 @@
 //! In: the CSV that the script prints. Out: mean total errors over the recordings, a filter a line. Where Python or a
 //! package is absent the table is ours alone, and says so.
 
-use std::{collections::BTreeMap, path::Path, process::Command};
+use std::{
+    collections::BTreeMap,
+    path::Path,
+    process::{Command, Stdio},
+};
 
 use crate::broad::{Line, REPORT, TUNE, mean_of};
 
@@ -21,13 +25,15 @@ pub type Totals = BTreeMap<String, BTreeMap<(String, String), f64>>;
 
 /// Runs the script, or says why not.
 pub fn run(mut python: Command, folder: &Path) -> Result<Totals, String> {
+    // Its progress and its complaints go to the terminal as they come: it takes minutes.
     let output = python
         .arg(SCRIPT)
         .arg(folder)
+        .stderr(Stdio::inherit())
         .output()
         .map_err(|error| format!("{SCRIPT}: {error}"))?;
     if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).trim().to_string());
+        return Err(format!("{SCRIPT}: {}", output.status));
     }
     Ok(parse(&String::from_utf8_lossy(&output.stdout)))
 }
