@@ -9,7 +9,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
     effect::Active,
-    predict::{Accuracy, Column, Feel, Kind, Twin},
+    predict::{Accuracy, Channel, Column, Kind, Twin},
 };
 
 use crate::{
@@ -31,24 +31,41 @@ pub const GYRO_INSTANT_SIGMA_S: f64 = 1.0 / 256.0 / 3.464;
 /// that evenly: of root mean square a period over the root of 3.
 pub const THERMOMETER_AGE_S: f64 = 0.25 / 1.732;
 
-/// What the calibration leaves open in one channel: its own, and the instant of a gyro's or a thermometer's conversion.
+/// [s] how well the instant of a channel is known: as its description says, or as its part lets anyone know it.
+pub fn instant_sigma_s(channel: &Channel) -> f64 {
+    channel.instant_sigma_s.unwrap_or(match channel.sensor {
+        Kind::Gyro => GYRO_INSTANT_SIGMA_S,
+        Kind::Thermometer => THERMOMETER_AGE_S,
+        Kind::Accelerometer | Kind::Magnetometer => 0.0,
+    })
+}
+
+/// What the calibration leaves open in one channel: its own, and the instant at which it is read. Where the description says
+/// that its part has a clock of its own, this instant drifts too.
 pub fn calibration(twin: &Twin, index: usize) -> Vec<Column> {
     let mut columns = twin.calibration(index);
     let channel = &twin.unit().channels[index];
-    let slope = |feel: &Feel| match channel.sensor {
-        Kind::Gyro => feel.rate_dot_b.dot(&channel.axis_b),
-        _ => feel.temperature_rate,
+    let sigma = instant_sigma_s(channel);
+    if sigma <= 0.0 {
+        return columns;
+    }
+    let slope = twin.by_instant(index);
+    let starts_s = twin.starts_s();
+    let (first, last) = (starts_s.first().unwrap_or(&0.0), starts_s.last().unwrap_or(&0.0));
+    let (middle, half) = (0.5 * (last + first), (0.5 * (last - first)).max(f64::MIN_POSITIVE));
+    let drifting = || {
+        slope
+            .iter()
+            .zip(starts_s)
+            .map(|(slope, t_s)| slope * (t_s - middle) / half)
     };
-    let sigma = match channel.sensor {
-        Kind::Gyro => GYRO_INSTANT_SIGMA_S,
-        Kind::Thermometer => THERMOMETER_AGE_S,
-        Kind::Accelerometer | Kind::Magnetometer => return columns,
-    };
-    columns.push(Column {
-        name: format!("instant_{}", channel.name),
+    let drift = channel.instant_sigma_s.map(|_| ("instant_drift", drifting().collect()));
+    let shapes = [("instant", slope.clone())].into_iter().chain(drift);
+    columns.extend(shapes.map(|(name, values)| Column {
+        name: format!("{name}_{}", channel.name),
         sigma,
-        entries: vec![(index, twin.feels(index).iter().map(slope).collect())],
-    });
+        entries: vec![(index, values)],
+    }));
     columns
 }
 

@@ -4,8 +4,8 @@
 //! the channels it is in. They are judged after the deterministic effects, whose misfit would look like noise, and those are
 //! then searched anew with the noise as found ([`crate::problem::Problem::reweigh`]).
 //!
-//! A gyro that converts by its own clock scatters with the angular acceleration in any case
-//! ([`crate::problem::GYRO_INSTANT_SIGMA_S`]); an effect counts only by what it says beyond that.
+//! A part that converts by its own clock scatters with the slope of what it measures in any case
+//! ([`crate::problem::instant_sigma_s`]); an effect counts only by what it says beyond that.
 //!
 //! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
 //! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
@@ -15,7 +15,7 @@ use twin::{
     predict::Kind,
 };
 
-use crate::problem::{GYRO_INSTANT_SIGMA_S, Problem};
+use crate::problem::{Problem, instant_sigma_s};
 
 /// An effect on the scatter, where it is and how large.
 #[derive(Clone)]
@@ -63,12 +63,13 @@ const CUT: f64 = 2.0;
 /// Median of the absolute value of a standard normal variable.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// [nats] what a gyro's own clock explains of a log.
+/// [nats] what a part's own clock explains of a log.
 fn own_clock(view: &View) -> f64 {
-    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| view.channel.sensor == Kind::Gyro);
-    let jitter = jitter.filter(|_| view.channel.bits.is_some());
+    let sigma_s = instant_sigma_s(view.channel);
+    let is_polled = view.channel.bits.is_some() && view.channel.sensor != Kind::Thermometer;
+    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| is_polled && sigma_s > 0.0);
     jitter.map_or(0.0, |jitter| {
-        (jitter.log_likelihood(&[GYRO_INSTANT_SIGMA_S], 0.0, &[*view]) - view.nominal()).max(0.0)
+        (jitter.log_likelihood(&[sigma_s], 0.0, &[*view]) - view.nominal()).max(0.0)
     })
 }
 

@@ -22,6 +22,9 @@ const RATE_HZ: usize = 5;
 /// [rad/s] white noise of a gyro.
 const NOISE: f64 = 0.003;
 
+/// [rad/s] pace of the motion.
+const W: f64 = 0.9;
+
 const CASE: &str = r#"format = "gap-case/1"
 name = "injected"
 kind = "csv"
@@ -35,8 +38,18 @@ fit = [[0.0, 120.0]]
 hold = [[120.0, 240.0]]
 "#;
 
+/// [rad/s] about z alone: phi(t) = (1 - cos(w t))/2.
+fn rate(t_s: f64) -> f64 {
+    W / 2.0 * (W * t_s).sin()
+}
+
 /// Three gyros along the axes of b, turning about z; gz reads `scale` of the time [s] too much.
 fn case(scale: impl Fn(f64) -> f64) -> TempDir {
+    erring(|t_s| scale(t_s) * rate(t_s), "")
+}
+
+/// The same; gz reads `error` [rad/s] of the time [s] too much, and its description has these keys too.
+fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros\"\n".to_owned();
     for (name, axis) in [
@@ -50,29 +63,27 @@ fn case(scale: impl Fn(f64) -> f64) -> TempDir {
              noise_sigma = {NOISE}\nbias_sigma = 0.001\nscale_sigma = 0.001\naxis_sigma_rad = 0.001\nrange = [-6.0, 6.0]\n"
         );
     }
+    unit += keys_of_gz;
     let mut motion = "t_s,qw,qx,qy,qz\n".to_owned();
     let mut measured = "t_s,gx,gy,gz\n".to_owned();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
-    // phi(t) = (1 - cos(w t))/2 about z alone, so the rate is w/2 sin(w t) there and nothing elsewhere.
-    let w = 0.9;
     for k in 0..=50 * SECONDS {
         let t = k as f64 / 50.0;
-        let half = (1.0 - (w * t).cos()) / 4.0;
+        let half = (1.0 - (W * t).cos()) / 4.0;
         let _ = writeln!(motion, "{t:.2},{:.9},0,0,{:.9}", half.cos(), half.sin());
     }
     // Earth's rate at the equator points north, which is x of n; the attitude turns it in the plane x, y of b.
     let earth = 7.292e-5;
     for k in 0..SECONDS * RATE_HZ {
         let t = k as f64 / RATE_HZ as f64;
-        let angle = (1.0 - (w * t).cos()) / 2.0;
+        let angle = (1.0 - (W * t).cos()) / 2.0;
         let mut noise = || -> f64 { NOISE * Distribution::<f64>::sample(&StandardNormal, &mut random) };
-        let rate = w / 2.0 * (w * t).sin();
         let _ = writeln!(
             measured,
             "{t:.1},{:.7},{:.7},{:.7}",
             earth * angle.cos() + noise(),
             -earth * angle.sin() + noise(),
-            (1.0 + scale(t)) * rate + noise()
+            rate(t) + error(t) + noise()
         );
     }
     for (name, text) in [
@@ -244,5 +255,24 @@ fn the_verdict_is_exactly_the_formats() {
             (0.0..=1.0).contains(&probability)
                 && twin::effect::by_name(named["effect"].as_str().expect("a name")).is_some()
         );
+    }
+}
+
+#[test]
+fn a_reading_that_is_late_by_less_than_its_instant_is_known_is_no_effect() {
+    // The drift of the second: the ages of two clocks differ more and more.
+    let errors: [fn(f64) -> f64; 2] = [
+        |t_s| rate(t_s - 0.012) - rate(t_s),
+        |t_s| rate(t_s - 1e-4 * t_s) - rate(t_s),
+    ];
+    for error in errors {
+        let said = |keys: &str| {
+            let diagnosis = diagnosed_in(&erring(error, keys)).1;
+            let causes = diagnosis.causes.iter().map(|cause| cause.probability);
+            let others = diagnosis.alternatives.iter().map(|(_, probability)| *probability);
+            causes.chain(others).sum::<f64>() + diagnosis.none_of_these
+        };
+        let (known, unknown) = (said(""), said("instant_sigma_s = 0.012\n"));
+        assert!(known > 0.9 && unknown < 0.5, "{known} {unknown}");
     }
 }

@@ -2,11 +2,11 @@
 //!
 //! In: two flights of the same parts with the same noise, one of them disturbed, each with its record and stated
 //! environment. Out: the marginal signal to noise ratio, sqrt(d' (I + N L N')^-1 d) over standardised differences d of
-//! "measured minus what the record says", where N holds for each channel a bias, a scale and two axis errors with the
-//! sigmas of the calibration: the measure in which the diagnosis' targets are stated.
+//! "measured minus what the record says", where N holds for each channel a bias, a scale, two axis errors and the instant of
+//! sampling with the sigmas of the unit's description: the measure in which the diagnosis' targets are stated.
 
 use emems::sample::Reading;
-use nalgebra::{DMatrix, DVector, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Vector3, Vector5};
 use packets::channel::{self, CHANNEL_COUNT, CHANNELS, Quantity};
 use twin::{environment::Environment, geometry};
 
@@ -70,20 +70,22 @@ fn channel_energy(index: usize, disturbed: &Told, undisturbed: &Told, instants: 
         let at_s = instants.zero_s + time_s + instants.slots_s[index];
         let [felt, told] = [undisturbed, disturbed].map(|told| felt(told, channel, at_s));
         differences.push(((code - quiet) * lsb - axis_b.dot(&(told - felt))) / sigma);
+        let [earlier, later] = [-STEP_S, STEP_S].map(|step_s| self::felt(undisturbed, channel, at_s + step_s));
         rows.push(
-            Vector4::new(
+            Vector5::new(
                 facts.bias,
                 facts.scale * axis_b.dot(&felt),
                 facts.axis_rad * across.dot(&felt),
                 facts.axis_rad * axis_b.cross(&across).dot(&felt),
+                facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S),
             ) / sigma,
         );
     }
-    let nuisance = DMatrix::from_fn(rows.len(), 4, |row, column| rows[row][column]);
+    let nuisance = DMatrix::from_fn(rows.len(), 5, |row, column| rows[row][column]);
     let difference = DVector::from_vec(differences);
     // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
     let seen = nuisance.tr_mul(&difference);
-    let inner = nuisance.tr_mul(&nuisance) + DMatrix::identity(4, 4);
+    let inner = nuisance.tr_mul(&nuisance) + DMatrix::identity(5, 5);
     let imitated = inner.cholesky().map_or(0.0, |inner| seen.dot(&inner.solve(&seen)));
     difference.norm_squared() - imitated
 }

@@ -26,6 +26,9 @@ pub struct Kind {
     range: [f64; 2],
     bits: u32,
     bandwidth_hz: Option<f64>,
+    /// [s] how well a sampling instant is known: the part converts by its own clock, so a reading's age is spread evenly over a
+    /// period. Zero for thermometers, whose part the twin knows.
+    pub instant_sigma_s: f64,
 }
 
 /// Facts about a kind of channel.
@@ -39,6 +42,12 @@ pub fn kind(quantity: Quantity) -> Kind {
         range,
         bits,
         bandwidth_hz,
+        instant_sigma_s: match sensor {
+            "accelerometer" => 1.0 / 50.0 / 12f64.sqrt(),
+            "magnetometer" => 1.0 / 75.0 / 12f64.sqrt(),
+            "gyro" => 1.0 / 256.0 / 12f64.sqrt(),
+            _ => 0.0,
+        },
     };
     match quantity {
         Quantity::SpecificForce => kind(
@@ -96,6 +105,9 @@ pub fn toml(instants: &Instants) -> String {
             "range = [{least}, {most}]\nbits = {}\nslot_s = {slot_s:.6}\n",
             facts.bits
         ));
+        if facts.instant_sigma_s > 0.0 {
+            put(format_args!("instant_sigma_s = {:.6}\n", facts.instant_sigma_s));
+        }
         if let Some(bandwidth_hz) = facts.bandwidth_hz {
             put(format_args!("bandwidth_hz = {bandwidth_hz}\n"));
         }

@@ -16,6 +16,9 @@ use super::{Aim, Twin};
 /// Terms of the drift.
 const DRIFT_TERMS: usize = 8;
 
+/// [s] step of the difference quotient by the instant: motions change over tenths of a second.
+const INSTANT_STEP_S: f64 = 1e-4;
+
 /// How well the reference and the field are known, one sigma each; zero for exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
@@ -90,6 +93,20 @@ impl Twin {
         let columns = axes.into_iter().map(column);
         columns
             .filter(|column| column.sigma > 0.0 && !column.entries.is_empty())
+            .collect()
+    }
+
+    /// Derivative of one channel's readings by the instant at which it is read.
+    pub fn by_instant(&self, index: usize) -> Vec<f64> {
+        let channel = &self.unit.channels[index];
+        let read_at = |later_s: f64| {
+            let mut chain = super::Chain::of(channel);
+            chain.read_late(move |_| later_s);
+            self.inputs(&chain, channel.tau_s(), &self.instants_s(index))
+        };
+        let pairs = read_at(INSTANT_STEP_S).into_iter().zip(read_at(-INSTANT_STEP_S));
+        pairs
+            .map(|(later, earlier)| (later - earlier) / (2.0 * INSTANT_STEP_S))
             .collect()
     }
 

@@ -110,6 +110,7 @@ fn thermometer() -> Channel {
         bits: Some(12),
         bandwidth_hz: None,
         slot_s: 0.0,
+        instant_sigma_s: None,
         lever_m: Vector3::zeros(),
     }
 }

@@ -146,3 +146,27 @@ fn beyond_its_range_a_channel_clips() {
     let twin = twin(unit);
     assert!(twin.predict(&[]).iter().flatten().all(|value| value.abs() <= 0.5));
 }
+
+#[test]
+fn the_slope_by_the_instant_is_that_of_a_twin_that_reads_later() {
+    let later_s = 1e-3;
+    let mut late = emems(thesis_slot_s);
+    late.channels.iter_mut().for_each(|channel| channel.slot_s += later_s);
+    let (now, late) = (twin(emems(thesis_slot_s)), twin(late));
+    for name in ["g2", "a1x", "m3z", "t1"] {
+        let index = now.unit().channel(name).unwrap();
+        let moved: Vec<f64> = now
+            .channel(index, &[])
+            .iter()
+            .zip(now.by_instant(index))
+            .map(|(reading, slope)| reading + slope * later_s)
+            .collect();
+        // Half of the second derivative times the square of a millisecond: below a millionth of 60 uT or 10 m/s2.
+        assert!(furthest(&moved, &late.channel(index, &[])) < 1e-4, "{name}");
+        assert_eq!(
+            name == "t1",
+            now.by_instant(index).iter().all(|slope| slope.abs() < 1e-9),
+            "{name}"
+        );
+    }
+}

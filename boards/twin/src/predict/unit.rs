@@ -74,6 +74,10 @@ pub struct Channel {
     /// [s] sampling instant after the start of the cycle.
     #[serde(default)]
     pub slot_s: f64,
+    /// [s] how well that instant is known; `None` for as well as the part's data sheet lets anyone know it. A part that
+    /// converts by its own clock gives a reading of unknown age, and the ages of two clocks drift.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instant_sigma_s: Option<f64>,
     /// [m] place in b from the centre of rotation; accelerometers only.
     #[serde(default)]
     pub lever_m: Vector3<f64>,
@@ -283,6 +287,7 @@ fn fault_of(channel: &Channel) -> Option<(&'static str, &'static str)> {
         ("bias_sigma", channel.bias_sigma),
         ("scale_sigma", channel.scale_sigma),
         ("axis_sigma_rad", channel.axis_sigma_rad),
+        ("instant_sigma_s", channel.instant_sigma_s.unwrap_or(0.0)),
     ];
     if let Some((key, _)) = spread
         .into_iter()
