@@ -78,7 +78,11 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
 fn gap(arguments: &Gap) -> Result<(), Box<dyn Error>> {
     if let Some(Challenge::Blind(step)) = &arguments.challenge {
         trials::command::run(step, &|case| Ok(gap::write_verdict(case)?), &|case, effects| {
-            Ok(gap::write_baselines(case, Some(effects))?)
+            gap::write_baselines(case, Some(effects))?;
+            if !effects.is_empty() {
+                gap::write_withheld(case, effects)?;
+            }
+            Ok(())
         })?;
     }
     if let Some(case) = &arguments.case {

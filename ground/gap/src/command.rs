@@ -150,6 +150,24 @@ pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
     unit
 }
 
+/// Leaves what is said of a case without its effects and their siblings in the library in its folder, withheld.json.
+///
+/// # Errors
+/// When the case cannot be judged or the file not written.
+pub fn write_withheld(case: &Path, effects: &[String]) -> Result<(), GapError> {
+    let subject = Subject::open(case)?;
+    let pages = effects
+        .iter()
+        .filter_map(|name| twin::effect::by_name(name))
+        .map(|effect| effect.page());
+    let left_out: Vec<String> = pages
+        .flat_map(|page| page.siblings.iter().chain([&page.name]).map(|name| (*name).to_owned()))
+        .collect();
+    let diagnosis = diagnose(&subject, &left_out, &|_, _| ());
+    let verdict = Verdict::new(&subject, &diagnosis, String::new());
+    put(case, "withheld.json", &serde_json::to_string_pretty(&verdict)?)
+}
+
 /// Leaves what the baselines say of a case in its folder, `verdict-NAME.json` each; that of the oracle where the effects are
 /// known.
 ///

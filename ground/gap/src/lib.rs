@@ -52,4 +52,4 @@ pub mod trace;
 pub mod verdict;
 pub mod windows;
 
-pub use command::{Arguments, GapError, run, write_baselines, write_verdict};
+pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

@@ -30,6 +30,8 @@ const MANIFEST: &str = "manifest.json";
 const ANSWERED: &str = "answered.json";
 /// The revealed answer of a case, in its folder.
 const ANSWER: &str = "answer.json";
+/// The verdict on a case whose effects were left out of the library, in its folder.
+pub const VERDICT_WITHHELD: &str = "withheld.json";
 /// The verdict on a case, in its folder.
 pub const VERDICT: &str = "verdict.json";
 
@@ -244,6 +246,26 @@ pub fn revealed(folder: &Path) -> Result<Vec<(PathBuf, Vec<String>)>, BlindError
     Ok(revealed)
 }
 
+/// The cases with effects that were diagnosed without them too, as cases of the ring [`score::WITHHELD`].
+///
+/// # Errors
+/// When a verdict cannot be read.
+pub fn withheld(folder: &Path, judged: &[Judged]) -> Result<Vec<Judged>, BlindError> {
+    let mut withheld = Vec::new();
+    for judged in judged.iter().filter(|judged| judged.answer.ring == "R1") {
+        let path = folder.join(&judged.answer.case).join(VERDICT_WITHHELD);
+        if path.exists() {
+            let mut answer = judged.answer.clone();
+            answer.ring = score::WITHHELD.to_owned();
+            withheld.push(Judged {
+                answer,
+                verdict: Some(parse(&path)?),
+            });
+        }
+    }
+    Ok(withheld)
+}
+
 /// The tables of the diagnosis and of every baseline that left a `verdict-NAME.json`, by name.
 ///
 /// # Errors
@@ -260,6 +282,7 @@ pub fn tools(folder: &Path, judged: &[Judged]) -> Result<Vec<(String, Vec<Line>)
     let mut tools = vec![("diagnosis".to_owned(), score::table(judged))];
     for name in names {
         let mut others = judged.to_vec();
+        others.retain(|judged| judged.answer.ring != score::WITHHELD);
         for other in &mut others {
             let path = folder.join(&other.answer.case).join(format!("verdict-{name}.json"));
             other.verdict = if path.exists() { Some(parse(&path)?) } else { None };

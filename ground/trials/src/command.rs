@@ -71,7 +71,8 @@ enum Step {
         #[arg(long)]
         answers: PathBuf,
     },
-    /// Has simpler methods, and an oracle that knows the effects, judge the revealed cases too, for `score` to set beside
+    /// Has simpler methods, and an oracle that knows the effects, judge the revealed cases too, for `score` to set beside,
+    /// and the diagnosis once more with their effects left out of its library
     Baselines {
         /// Folder of the cases
         folder: PathBuf,
@@ -86,7 +87,8 @@ enum Step {
 /// Writes verdict.json into the folder of a case.
 pub type Diagnose = dyn Fn(&Path) -> Result<(), Box<dyn Error>>;
 
-/// Writes `verdict-NAME.json` of every baseline into the folder of a case whose effects are these.
+/// Writes `verdict-NAME.json` of every baseline, and [`VERDICT_WITHHELD`](blind::VERDICT_WITHHELD), into the folder of a case
+/// whose effects are these.
 pub type Baselines = dyn Fn(&Path, &[String]) -> Result<(), Box<dyn Error>>;
 
 /// Takes a step of the protocol; `diagnose` is asked for cases without a verdict.
@@ -139,7 +141,8 @@ fn bar(length: usize) -> ProgressBar {
 }
 
 fn score(folder: &Path) -> Result<(), BlindError> {
-    let judged = blind::judged(folder)?;
+    let mut judged = blind::judged(folder)?;
+    judged.extend(blind::withheld(folder, &judged)?);
     let lines: Vec<String> = judged.iter().map(blind::line).collect();
     let tools = blind::tools(folder, &judged)?;
     let table = score::markdown(&tools);

@@ -25,6 +25,9 @@ pub struct Judged {
 /// Effects of at least this size are expected to be found.
 const MARGINAL_SNR: f64 = 8.0;
 
+/// Ring of the cases whose effects were withheld from the library: the right verdict is "none of these".
+pub const WITHHELD: &str = "R2";
+
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
@@ -119,6 +122,28 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
             false,
         ),
     ];
+    let withheld = || ring(WITHHELD).filter(|judged| judged.answer.snr_marginal >= MARGINAL_SNR);
+    lines.push(share(
+        "false name, withheld",
+        "<= 0.05",
+        withheld(),
+        |_, verdict| verdict.said().next().is_some() && !verdict.is_unknown(),
+        true,
+    ));
+    lines.push(share(
+        "none of these, withheld",
+        ">= 0.90",
+        withheld(),
+        |_, verdict| verdict.is_unknown(),
+        false,
+    ));
+    lines.push(share(
+        "90 % set holds the truth",
+        "0.88 to 0.97",
+        one(),
+        |answer, verdict| verdict.credible(0.9).contains(&Some(truth(answer).as_str())),
+        false,
+    ));
     for (stratum, least, most) in [
         ("8 to 15", 8.0, 15.0),
         ("15 to 50", 15.0, 50.0),

@@ -85,3 +85,25 @@ fn two_effects_are_counted_one_by_one() {
     assert_eq!(value(&lines, "two effects: precision"), 0.75);
     assert_eq!(value(&lines, "two effects: recall"), 0.75);
 }
+
+#[test]
+fn a_withheld_effect_that_is_given_a_neighbours_name_is_false() {
+    let lines = table(&[
+        judged(WITHHELD, &["gyro-bias"], Some(WRONG)),
+        judged(WITHHELD, &["gyro-bias"], Some(UNKNOWN)),
+        judged(WITHHELD, &["gyro-bias"], Some(NOTHING)),
+    ]);
+    assert!((value(&lines, "false name, withheld") - 1.0 / 3.0).abs() < 1e-12);
+    assert!((value(&lines, "none of these, withheld") - 1.0 / 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_set_of_ninety_percent_is_the_likeliest_names_that_reach_it() {
+    let lines = table(&[
+        judged("R1", &["gyro-g2"], Some(RIGHT)),
+        judged("R1", &["gyro-bias"], Some(RIGHT)),
+        judged("R1", &["gyro-bias"], Some(UNKNOWN)),
+    ]);
+    // The first name has 0.9 alone.
+    assert!((value(&lines, "90 % set holds the truth") - 1.0 / 3.0).abs() < 1e-12);
+}

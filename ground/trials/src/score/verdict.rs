@@ -79,6 +79,23 @@ impl Verdict {
         distinct
     }
 
+    /// The likeliest names that together have this probability, "none of these" among them as `None`.
+    pub(super) fn credible(&self, probability: f64) -> Vec<Option<&str>> {
+        let named = self.causes.iter().chain(&self.alternatives);
+        let mut ranked: Vec<(Option<&str>, f64)> = named
+            .map(|named| (Some(named.effect.as_str()), named.probability))
+            .chain([(None, self.none_of_these)])
+            .collect();
+        ranked.sort_by(|one, other| other.1.total_cmp(&one.1));
+        let mut before = 0.0;
+        let needed = ranked.into_iter().take_while(|(_, own)| {
+            let is_needed = before < probability;
+            before += own;
+            is_needed
+        });
+        needed.map(|(name, _)| name).collect()
+    }
+
     pub(super) fn probability_of(&self, name: &str) -> f64 {
         let all = self.causes.iter().chain(&self.alternatives);
         all.filter(|named| named.effect == name)
