@@ -2,7 +2,7 @@
 //!
 //! `cargo run --ignore-rust-version --target host-tuple -p bench --example allan_time [POINTS...]` prints a line for each
 //! length: the least of five runs, threads started. With `PYTHON` set to an interpreter that has allantools (see
-//! `ground/bench/peers/allan.py`), its time and the largest relative difference of any deviation stand beside.
+//! `peers/allan.py`), its time and the largest relative difference of any deviation stand beside.
 
 use std::{
     env,
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .flat_map(|value| value.to_le_bytes())
                 .collect::<Vec<u8>>(),
         )?;
-        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/allan.py");
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../peers/allan.py");
         let output = Command::new(python).arg(script).arg(&file).arg("20").output();
         fs::remove_file(&file)?;
         let text = String::from_utf8(output?.stdout)?;

@@ -1,7 +1,7 @@
 """Four deviations at octave averaging times with allantools 2024.6, timed; the least of five runs each.
 
 usage: python allan.py FILE RATE_HZ, FILE of little-endian doubles. Prints "seconds S", then "name factor value" lines.
-Wants: python -m venv peers && peers/bin/pip install allantools==2024.6
+Packages: requirements.txt beside it.
 """
 
 import sys
