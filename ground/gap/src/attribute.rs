@@ -8,11 +8,11 @@
 //! the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against all rivals in its
 //! place, and dropped if the rest can do without it.
 
-mod timed;
+mod variant;
 
 use nalgebra::{DMatrix, DVector};
 
-use self::timed::{bounded, sharpened};
+use self::variant::{bounded, sharpened};
 use crate::{
     library::Library,
     problem::{Component, Problem},

@@ -53,8 +53,8 @@ fn is_odd(view: &View) -> bool {
 /// would otherwise swallow any effect the library does not have, and be believed.
 const COLOURED: f64 = 0.2;
 
-/// Effects that stand for white noise, and for its outliers.
-const WHITE: [&str; 3] = ["noise-level", "packet-corruption", "shock"];
+/// Effects that stand for white noise, for its outliers, or for errors of each sample's own.
+const WHITE: [&str; 4] = ["noise-level", "packet-corruption", "shock", "sampling-jitter"];
 
 /// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
 /// and these must not make the rest of the log look alike.

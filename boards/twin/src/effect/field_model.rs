@@ -20,6 +20,7 @@ const PAGE: Page = Page {
         "table-tilt",
         "field-gradient",
         "mag-scale-temperature",
+        "mains-alias",
     ],
     confirm_by: "A proton magnetometer, or the same turns outdoors.",
     scope: Scope::Unit,

@@ -8,8 +8,9 @@ use crate::predict::{Chain, Kind};
 /// `accel-high-pass`.
 pub struct HighPass;
 
-/// [Hz] corners of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0) at 50, 100, 400 and 1000 Hz.
-const CORNERS_HZ: [f64; 11] = [20.0, 10.0, 8.0, 5.0, 4.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.125];
+/// [Hz] corners to begin from: those of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0) at 50 Hz and less, where an
+/// octave makes a difference to a log of 5 Hz.
+const CORNERS_HZ: [f64; 9] = [0.03, 0.06, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
 
 const PAGE: Page = Page {
     name: "accel-high-pass",
@@ -38,5 +39,9 @@ impl Effect for HighPass {
     /// Corners [Hz].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         CORNERS_HZ.to_vec()
+    }
+
+    fn has_values_between(&self) -> bool {
+        true
     }
 }

@@ -31,6 +31,8 @@ pub const ALL: Page = Page {
         "gyro-latency",
         "accel-latency",
         "mag-latency",
+        "gyro-lag",
+        "eddy-current",
         "read-skew",
         "packet-loss",
         "clock-rate",

@@ -198,6 +198,11 @@ pub trait Effect: Sync {
         vec![0.0]
     }
 
+    /// Whether values between the variants are possible too: the variants are then a grid to begin from.
+    fn has_values_between(&self) -> bool {
+        false
+    }
+
     /// Where it can be in this unit.
     fn localities(&self, unit: &UnitDescription) -> Vec<Locality> {
         cause::localities(self.page(), unit)

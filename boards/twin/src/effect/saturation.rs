@@ -1,4 +1,4 @@
-//! Saturation: the gyro is set to a smaller range than described, and clips.
+//! Saturation: the gyro is set to a smaller range than described, or something behind it clips.
 
 use core::f64::consts::PI;
 
@@ -8,8 +8,10 @@ use crate::predict::{Chain, Kind};
 /// `gyro-saturation`.
 pub struct Saturation;
 
-/// [deg/s] the ranges of the ADIS16265, and what they clip at with their fourth of headroom (data sheet: 80 reads up to 100).
-const RANGES_DEG: [f64; 6] = [80.0, 100.0, 160.0, 200.0, 320.0, 400.0];
+/// [deg/s] the least limit tried, and of how many: each is a twelfth above the one before, up to the ADIS16265's 400 with its
+/// headroom (data sheet: a range of 320).
+const LEAST_DEG: f64 = 20.0;
+const LIMITS: i32 = 38;
 
 const PAGE: Page = Page {
     name: "gyro-saturation",
@@ -41,6 +43,12 @@ impl Effect for Saturation {
 
     /// Limits [deg/s].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
-        RANGES_DEG.to_vec()
+        (0..LIMITS)
+            .map(|step| LEAST_DEG * (13.0 / 12.0_f64).powi(step))
+            .collect()
+    }
+
+    fn has_values_between(&self) -> bool {
+        true
     }
 }

@@ -12,7 +12,7 @@ const PAGE: Page = Page {
     equation: "from t0 on: y = (1 + g) n.m + b",
     source: "HMC5883L data sheet, set/reset strap: gains down by 10 to 100 %",
     excited_by: "an event",
-    siblings: &["hard-iron", "mag-scale-temperature"],
+    siblings: &["hard-iron", "mag-scale-temperature", "current-field"],
     confirm_by: "Give a set pulse: it comes back at once.",
     sensors: &[Kind::Magnetometer],
     parameters: &[Symbol::signed("g", "1", 0.2), Symbol::signed("b", "uT", 1.0)],

@@ -1,21 +1,23 @@
-//! When the effect added last is on: its onset moved to where it explains most, and the stretch after which it is gone.
+//! What of the effect added last is no parameter of the fit: its onset, or a limit or corner, moved to where it explains most,
+//! and the stretch after which it is gone.
 //!
-//! In: a set of hypotheses, refined. Out: the same set refined with another time, whose columns the library then has, or as
+//! In: a set of hypotheses, refined. Out: the same set refined with another value, whose columns the library then has, or as
 //! it was.
 
 use twin::effect::onsets;
 
 use crate::{
-    library::Library,
+    library::{Hypothesis, Library},
     onset,
     problem::Problem,
     refine::{Refined, model_of, refine},
 };
 
-/// Times the distance between onsets tried is halved: of a log of ten minutes, to a cycle.
-const HALVINGS: usize = 8;
+/// Times the distance between values tried is halved: an onset in a log of ten minutes to a cycle, a limit to a part in
+/// ten thousand.
+const HALVINGS: usize = 10;
 
-/// [nats] that make another onset a better one.
+/// [nats] that make another value a better one.
 const SHARPER: f64 = 0.5;
 
 /// Gives the member added last the stretch of time in which it is on, if it is not always.
@@ -56,36 +58,53 @@ pub(super) fn bounded(
     (set, best)
 }
 
-/// Moves the onset of the member added last to where it explains most: it is free, and a step that is seconds off leaves
-/// more than most effects make.
+/// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step
+/// that is seconds off, or a limit that is a percent off, leaves more than most effects make.
 pub(super) fn sharpened(problem: &Problem, library: &mut Library, set: &[usize], best: Refined) -> Refined {
     let Some(last) = set.last().copied() else {
         return best;
     };
-    let all: Vec<f64> = onsets(problem.twin.starts_s()).collect();
-    let mut onset_s = library.hypotheses[last].cause.variant;
-    if library.hypotheses[last].places.is_empty() || !all.contains(&onset_s) {
+    let mut variant = library.hypotheses[last].cause.variant;
+    let Some(mut step) = half_way(problem, &library.hypotheses[last]) else {
         return best;
-    }
+    };
     let mut best = best;
-    let mut step_s = 0.5 * (all[1] - all[0]);
     for _ in 0..HALVINGS {
-        for tried_s in [onset_s - step_s, onset_s + step_s] {
-            let refined = from_onset(problem, library, set, &best, tried_s);
+        for tried in [variant - step, variant + step] {
+            let refined = at_variant(problem, library, set, &best, tried);
             if refined.log_evidence > best.log_evidence + SHARPER {
-                (onset_s, best) = (tried_s, refined);
+                (variant, best) = (tried, refined);
                 break;
             }
         }
-        step_s *= 0.5;
+        step *= 0.5;
     }
-    from_onset(problem, library, set, &best, onset_s)
+    at_variant(problem, library, set, &best, variant)
 }
 
-/// A set refitted with another onset of its last member, whose columns are made anew.
-fn from_onset(problem: &Problem, library: &mut Library, set: &[usize], best: &Refined, onset_s: f64) -> Refined {
+/// Half the way to the farther neighbour of a hypothesis' variant; `None` where there is nothing between.
+fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
+    let starts_s = problem.twin.starts_s();
+    let (effect, variant) = (hypothesis.cause.effect, hypothesis.cause.variant);
+    let grid: Vec<f64> = if effect.has_values_between() {
+        effect.variants(starts_s)
+    } else if hypothesis.places.is_empty() {
+        return None;
+    } else {
+        onsets(starts_s).collect()
+    };
+    let at = grid.iter().position(|value| *value == variant)?;
+    let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
+    let distances = neighbours
+        .filter_map(|index| grid.get(index))
+        .map(|value| (value - variant).abs());
+    Some(0.5 * distances.fold(0.0, f64::max))
+}
+
+/// A set refitted with another variant of its last member, whose columns are made anew.
+fn at_variant(problem: &Problem, library: &mut Library, set: &[usize], best: &Refined, variant: f64) -> Refined {
     let last = set[set.len() - 1];
-    library.hypotheses[last].cause.variant = onset_s;
+    library.hypotheses[last].cause.variant = variant;
     let model = model_of(library, set, &best.thetas);
     let renewed = problem.slopes(&model, set.len() - 1);
     for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
