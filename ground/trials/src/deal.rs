@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// [s] of a case, and where its fit window ends and its hold window begins.
-const DURATION_S: f64 = 600.0;
+pub(crate) const DURATION_S: f64 = 600.0;
 const FIT_S: f64 = 300.0;
 
 /// [s] between rows of the record: motions of the trials have no tone above 0.5 Hz.

@@ -19,6 +19,9 @@ use twin::{
 
 use crate::{draw::Draw, motion::Wander, unit::kind};
 
+/// [s] step of the tables of slow filters.
+const STEP_S: f64 = 2e-3;
+
 /// What the truth instrument writes for an instant: attitude q_nb and position in n.
 pub type Record = Arc<dyn Fn(f64) -> (UnitQuaternion<f64>, Vector3<f64>) + Send + Sync>;
 
@@ -120,6 +123,27 @@ where
     })
 }
 
+/// A view through a first-order lag of any length, settled when it begins; a table up to `to_s`, exact for a view that is
+/// straight over [`STEP_S`].
+pub fn slow(view: &Input<Vector3<f64>>, tau_s: f64, to_s: f64) -> Input<Vector3<f64>> {
+    let steps = (to_s / STEP_S).ceil() as usize;
+    let decay = (-STEP_S / tau_s).exp();
+    // Of y' = (u - y)/tau over a step in which u is straight.
+    let later = 1.0 - tau_s / STEP_S * (1.0 - decay);
+    let mut state = view(0.0);
+    let mut table = vec![state];
+    for step in 1..=steps {
+        let [from, to] = [step - 1, step].map(|step| view(step as f64 * STEP_S));
+        state = state * decay + from * (1.0 - decay - later) + to * later;
+        table.push(state);
+    }
+    Arc::new(move |t_s| {
+        let place = (t_s / STEP_S).clamp(0.0, steps as f64);
+        let at = (place as usize).min(steps - 1);
+        table[at].lerp(&table[at + 1], place - at as f64)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,6 +157,24 @@ mod tests {
             let t = 0.1 * f64::from(step);
             let exact = ((w * t).sin() - w * tau * (w * t).cos()) / (1.0 + (w * tau).powi(2));
             assert!((lagged(t) - exact).abs() < 1e-6, "{} {exact}", lagged(t));
+        }
+    }
+    #[test]
+    fn a_slow_lag_of_a_step_is_an_exponential_and_of_a_sine_the_filters() {
+        let tau = 1.5;
+        let step: Input<Vector3<f64>> = Arc::new(|t| Vector3::x() * f64::from(t > 3.0));
+        let lagging = slow(&step, tau, 20.0);
+        assert_eq!(lagging(2.9), Vector3::zeros());
+        let w = 2.0_f64;
+        let sine: Input<Vector3<f64>> = Arc::new(move |t: f64| Vector3::x() * (w * t).sin());
+        let hummed = slow(&sine, tau, 60.0);
+        for at in 0..100 {
+            let t = 4.0 + 0.1 * f64::from(at);
+            let exact = 1.0 - (-(t - 3.0) / tau).exp();
+            assert!((lagging(t).x - exact).abs() < 1e-3, "at {t}");
+            let t = t + 40.0;
+            let exact = (w * t - (w * tau).atan()).sin() / (1.0 + (w * tau).powi(2)).sqrt();
+            assert!((hummed(t).x - exact).abs() < 1e-5, "at {t}");
         }
     }
 }

@@ -6,8 +6,9 @@ use twin::geometry;
 
 use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
 use crate::{
+    deal::DURATION_S,
     draw::Draw,
-    scene::{Scene, changed, lagged, shifted},
+    scene::{Scene, changed, shifted, slow},
 };
 
 /// [m/s2] of one milli-g.
@@ -126,7 +127,7 @@ fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 fn high_pass(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let (plates, tau_s) = (plates(draw), draw.log_uniform(0.5, 3.0));
     for &plate in &plates {
-        let slow = lagged(&scene.views.force_p[plate], tau_s);
+        let slow = slow(&scene.views.force_p[plate], tau_s, DURATION_S + 2.0);
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| force - slow(t));
     }
     channels(SpecificForce, &plates)
