@@ -272,6 +272,7 @@ pub fn markdown(tools: &[(String, Vec<Line>)]) -> String {
             .map(|(_, lines)| {
                 lines
                     .get(at)
+                    .filter(|line| line.trials > 0)
                     .map_or(" |".to_owned(), |line| format!(" {:.3} |", line.value))
             })
             .collect();
