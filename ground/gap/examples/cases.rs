@@ -1,27 +1,8 @@
 //! Diagnoses the cases given, a few lines each, with the seconds each took, and leaves a verdict.json in the folder that
-//! `VERDICTS` names, one folder a case: for looking at many at once. Where `WITHHOLD` names a folder of answers `CASE.json`,
-//! the true effects of each case and their siblings are left out of the library: the right verdict is then "none of these".
+//! `VERDICTS` names, one folder a case: for looking at many at once.
 use std::{error::Error, fs, path::Path, time::Instant};
 
 use gap::{case::Subject, diagnose::diagnose, verdict::Verdict};
-
-/// The effects of an answer, and what they are mistaken for.
-fn withheld(answers: &str, case: &Path) -> Result<Vec<String>, Box<dyn Error>> {
-    let file = Path::new(answers)
-        .join(case.file_name().unwrap_or_default())
-        .with_extension("json");
-    let kept: serde_json::Value = serde_json::from_str(&fs::read_to_string(file)?)?;
-    let answer = kept.get("answer").unwrap_or(&kept);
-    let names = answer["effects"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(|effect| effect["effect"].as_str());
-    let pages = names.filter_map(twin::effect::by_name).map(|effect| effect.page());
-    Ok(pages
-        .flat_map(|page| page.siblings.iter().chain([&page.name]).map(|name| (*name).to_owned()))
-        .collect())
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     for case in std::env::args().skip(1) {
@@ -33,11 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
         };
-        let left_out = match std::env::var("WITHHOLD") {
-            Ok(answers) => withheld(&answers, Path::new(&case))?,
-            Err(_) => Vec::new(),
-        };
-        let d = diagnose(&subject, &left_out, &|_, _| {});
+        let d = diagnose(&subject, &[], &|_, _| {});
         if let Ok(folder) = std::env::var("VERDICTS") {
             let name = Path::new(&case).file_name().unwrap_or_default();
             let folder = Path::new(&folder).join(name);
