@@ -8,8 +8,8 @@ use crate::predict::{Chain, Kind};
 /// `accel-high-pass`.
 pub struct HighPass;
 
-/// [Hz] corners to begin from: those of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0) at 50 Hz and less, where an
-/// octave makes a difference to a log of 5 Hz.
+/// [Hz] corners to begin from: of those of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0; in proportion to the data rate,
+/// so lower in its low-power modes) as many as a log of 5 Hz tells apart.
 const CORNERS_HZ: [f64; 9] = [0.03, 0.06, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
 
 const PAGE: Page = Page {

@@ -8,8 +8,8 @@ use crate::predict::{Chain, Kind};
 /// `gyro-saturation`.
 pub struct Saturation;
 
-/// [deg/s] the least limit tried, and of how many: each is a twelfth above the one before, up to the ADIS16265's 400 with its
-/// headroom (data sheet: a range of 320).
+/// [deg/s] the least limit tried, and of how many: each is a twelfth above the one before, up to 386. The ADIS16265's largest
+/// range is 320 (data sheet), and it reads a little beyond.
 const LEAST_DEG: f64 = 20.0;
 const LIMITS: i32 = 38;
 
