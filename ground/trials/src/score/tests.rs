@@ -45,6 +45,19 @@ fn right_and_wrong_names_are_told_apart() {
 }
 
 #[test]
+fn a_sensor_is_found_by_any_of_its_axes() {
+    let mut case = judged("R1", &["accel-bias"], Some(RIGHT));
+    let channels = |names: [&str; 3]| names.map(str::to_owned).to_vec();
+    case.answer.effects[0].channels = channels(["a3x", "a3y", "a3z"]);
+    let verdict = case.verdict.as_mut().expect("given");
+    verdict.causes[0].channels = vec!["a3y".into(), "a4y".into()];
+    let lines = table(&[case]);
+    // One sensor of two named is right, and the one there is is named; of the axes one of three.
+    assert!((value(&lines, "localisation F1 (sensors)") - 2.0 / 3.0).abs() < 1e-12);
+    assert!((value(&lines, "localisation F1 (channels)") - 2.0 / 5.0).abs() < 1e-12);
+}
+
+#[test]
 fn a_name_where_there_is_none_is_false() {
     let lines = table(&[
         judged("R0", &[], Some(RIGHT)),
