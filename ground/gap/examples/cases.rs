@@ -58,6 +58,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             d.alternatives.iter().take(4).collect::<Vec<_>>(),
             d.indistinguishable
         );
+        for held in &d.promises {
+            let promise = held.promise;
+            println!(
+                "   held out: {} {:.2} +- {:.2}",
+                held.effect, promise.factor, promise.sigma
+            );
+        }
         for a in d.leftover.aspects.iter().take(3) {
             println!("   left: {} {:.1}", a.what, a.size);
         }

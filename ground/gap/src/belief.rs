@@ -1,12 +1,17 @@
 //! How far a name is believed: from the odds of its evidence to a probability.
 //!
 //! In: causes with the probability that their evidence gives them among their rivals, and what they leave. Out: the same
-//! causes, believed less where something the library does not have could be like them. Four things speak for that: what
-//! is left over, few nats, a size far below the strongest cause's, and windows that do not confirm it.
+//! causes, believed less where something the library does not have could be like them. Five things speak for that: what
+//! is left over, few nats, a size far below the strongest cause's, blocks that do not confirm it when they are left out, and
+//! another strength on the held-out windows than on the fitted ones.
 
 use crate::{
     cause::Cause,
     crossval::{self, Key},
+    held::{
+        Held,
+        strength::{Claimed, Promise},
+    },
     leftover::Leftover,
     library::Library,
     model::Model,
@@ -38,10 +43,14 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// From what is left over, and the energy that was explained in squares of noise.
-    pub fn of(left: &Leftover, explained: f64) -> Self {
-        let unknown = left.unknown(UNKNOWN_PRIOR);
-        let unlike = left.energy() / (left.energy() + UNLIKE * explained).max(f64::MIN_POSITIVE);
+    /// From what is left over, the energy that was explained in squares of noise, and promises: what an effect explained
+    /// and does not explain on the held-out windows is left over too.
+    pub fn of(left: &Leftover, explained: f64, promises: &[Promised]) -> Self {
+        let kept: f64 = promises.iter().map(|promised| 1.0 - promised.doubt()).product();
+        let broken: f64 = promises.iter().map(Promised::broken).sum();
+        let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * kept;
+        let energy = left.energy() + broken;
+        let unlike = energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE);
         Self {
             unknown,
             trust: 1.0 - unknown * unlike,
@@ -83,6 +92,64 @@ pub fn second_keys(
     said.collect()
 }
 
+/// What the held-out windows say of an effect's strength.
+#[derive(Clone, Debug)]
+pub struct Promised {
+    /// Its name.
+    pub effect: &'static str,
+    /// How strong it is there.
+    pub promise: Promise,
+    /// How far that is what it promised on the fit windows, 0 to 1.
+    pub confidence: f64,
+    /// How far it was believed before.
+    believed: f64,
+    /// [nats] what it explained there.
+    gain: f64,
+}
+
+impl Promised {
+    /// Probability that something else was taken for it; an effect that was not believed was taken for nothing.
+    fn doubt(&self) -> f64 {
+        self.believed * (1.0 - self.confidence)
+    }
+
+    /// Energy that it explained and does not explain, in squares of noise.
+    fn broken(&self) -> f64 {
+        2.0 * self.gain.max(0.0) * self.doubt()
+    }
+}
+
+/// What the held-out windows say of each cause, which are the model's effects in their order; one that does not keep there
+/// what it promised on the fit windows is believed less.
+pub fn promises(held: &Held, problem: &Problem, model: &Model, sigmas: &[f64], causes: &mut [Cause]) -> Vec<Promised> {
+    if causes.len() != model.components.len() {
+        // They were withdrawn.
+        return Vec::new();
+    }
+    let promised = |(index, cause): (usize, &mut Cause)| {
+        let added = problem.added(&model.components, index);
+        let open: Vec<_> = added.iter().map(|(channel, _)| problem.still_open(*channel)).collect();
+        let promise = held.promise(Claimed {
+            added: &added,
+            open: &open,
+            after: &model.predicted,
+            sigmas,
+        })?;
+        // A gain of g nats is an amplitude known to one part in the root of 2 g.
+        let confidence = promise.confidence((2.0 * cause.gain).max(1.0).sqrt().recip());
+        let believed = cause.probability;
+        cause.probability *= confidence;
+        Some(Promised {
+            effect: cause.effect,
+            promise,
+            confidence,
+            believed,
+            gain: cause.gain,
+        })
+    };
+    causes.iter_mut().enumerate().filter_map(promised).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,11 +165,39 @@ mod tests {
 
     #[test]
     fn a_small_misfit_of_a_large_effect_is_its_own_and_a_large_one_another_effect() {
-        let of_a_large_effect = Belief::of(&left(1e-9), 1e6);
-        let of_a_small_one = Belief::of(&left(1e-9), 1e3);
+        let of_a_large_effect = Belief::of(&left(1e-9), 1e6, &[]);
+        let of_a_small_one = Belief::of(&left(1e-9), 1e3, &[]);
         assert!(of_a_large_effect.unknown > 0.99 && of_a_small_one.unknown > 0.99);
         assert!(of_a_large_effect.trust > 0.99, "{}", of_a_large_effect.trust);
         assert!(of_a_small_one.trust < 0.4, "{}", of_a_small_one.trust);
-        assert!(Belief::of(&left(0.5), 1e3).trust > 0.94);
+        assert!(Belief::of(&left(0.5), 1e3, &[]).trust > 0.94);
+    }
+
+    #[test]
+    fn a_promise_that_one_cause_breaks_is_doubt_of_all() {
+        let promised = |factor: f64| {
+            let promise = Promise { factor, sigma: 0.05 };
+            Promised {
+                effect: "gyro-scale",
+                promise,
+                confidence: promise.confidence(0.05),
+                believed: 1.0,
+                gain: 60.0,
+            }
+        };
+        let kept = Belief::of(&left(0.5), 300.0, &[promised(1.1)]);
+        assert!(
+            kept.unknown < 0.06 && kept.trust > 0.94,
+            "{} {}",
+            kept.unknown,
+            kept.trust
+        );
+        let broken = Belief::of(&left(0.5), 300.0, &[promised(1.0), promised(-0.2)]);
+        assert!(
+            broken.unknown > 0.99 && broken.trust < 0.1,
+            "{} {}",
+            broken.unknown,
+            broken.trust
+        );
     }
 }

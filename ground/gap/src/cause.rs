@@ -22,8 +22,12 @@ pub const TEMPERATURE: f64 = 2.0;
 /// Of its largest size, from where an engineer should look twice.
 const SUSPICIOUS: f64 = 0.25;
 
-/// Share of an effect's energy below which a channel is not named.
+/// Share of an effect's energy from which a channel is named.
 const NAMED_SHARE: f64 = 0.02;
+
+/// Energy, in squares of noise, from which it is named whatever its share: three sigma. A delay that is large in the gyros
+/// is in the magnetometers too.
+const NAMED_ENERGY: f64 = 9.0;
 
 /// One parameter of a cause.
 #[derive(Clone, Debug)]
@@ -65,24 +69,17 @@ pub struct Cause {
 
 /// The chosen effects as causes; their shares are still energies.
 pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> Vec<Cause> {
-    let unit = problem.twin.unit();
     let feels = problem.twin.feels(0);
     let model = found.model(library);
     let cause = |(index, chosen): (usize, &Chosen)| {
         let hypothesis = &library.hypotheses[chosen.hypothesis];
         let page = hypothesis.cause.effect.page();
-        let mut others = model.clone();
-        others.remove(index);
         let mut energy = vec![0.0; feels.len()];
         let mut by_channel = Vec::new();
-        for channel in hypothesis.cause.channels(unit) {
-            let (with, without) = (problem.predict(channel, &model), problem.predict(channel, &others));
-            let of_row = |row: &u32| {
-                ((with[*row as usize] - without[*row as usize]) / problem.frames[channel].weight_sigma).powi(2)
-            };
+        for (channel, added) in problem.contribution(&model, index) {
             let rows = &problem.frames[channel].series.rows;
-            rows.iter().for_each(|row| energy[*row as usize] += of_row(row));
-            by_channel.push((channel, rows.iter().map(of_row).sum::<f64>()));
+            (rows.iter().zip(added.iter())).for_each(|(row, value)| energy[*row as usize] += value * value);
+            by_channel.push((channel, added.norm_squared()));
         }
         by_channel.sort_by(|one, other| other.1.total_cmp(&one.1));
         let total: f64 = by_channel.iter().map(|(_, energy)| energy).sum();
@@ -98,7 +95,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
             locality: hypothesis.cause.locality.to_string(),
             channels: by_channel
                 .iter()
-                .filter(|(_, energy)| *energy >= NAMED_SHARE * total)
+                .filter(|(_, energy)| *energy >= (NAMED_SHARE * total).min(NAMED_ENERGY))
                 .map(|(channel, _)| *channel)
                 .collect(),
             probability: probability(library, chosen),

@@ -90,11 +90,8 @@ fn blocks(problem: &Problem) -> Vec<Vec<usize>> {
 
 /// Whether most of an effect is in one block.
 fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &[Vec<usize>]) -> bool {
-    let mut others = components.to_vec();
-    let own = others.remove(index);
     let mut energies = [0.0; BLOCKS];
-    for channel in own.active.cause.channels(problem.twin.unit()) {
-        let apart = problem.residual(channel, &others) - problem.residual(channel, components);
+    for (channel, apart) in problem.contribution(components, index) {
         for (value, block) in apart.iter().zip(&blocks[channel]) {
             energies[*block] += value * value;
         }

@@ -5,7 +5,7 @@
 
 use crate::{
     attribute::attribute,
-    belief::{Belief, second_keys},
+    belief::{Belief, Promised, promises, second_keys},
     case::Subject,
     cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, share_out},
     confusion, contribution,
@@ -14,7 +14,7 @@ use crate::{
     explain::{Explanation, SAID},
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
-    leftover::{self, Leftover},
+    leftover::{self, Leftover, Suspect},
     library::Library,
     model::Model,
     place::{self, Place},
@@ -51,6 +51,8 @@ pub struct Diagnosis {
     pub correction: Option<Correction>,
     /// What cross-validation says of the causes that are effects on readings.
     pub keys: Vec<(&'static str, Key)>,
+    /// How strong they are on the held-out windows.
+    pub promises: Vec<Promised>,
     /// Per channel, by how much more it scatters than described, for an effect on the scatter.
     pub louder: Vec<f64>,
     /// Effects that were withdrawn because they do not shrink it.
@@ -80,7 +82,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let found = attribute(&problem, &mut library, &search);
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
-    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[]);
+    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
     let place = place::locate(&problem, &quiet);
 
@@ -90,11 +92,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         gate.clone()
     } else {
         let model = &explanation.model;
+        let disturb = explanation.disturb(&problem);
         leftover::judge(
             &sight::views(&problem),
             &model.joint,
             &model.fitted,
-            &explanation.scattered(),
+            &suspects(&problem, model),
+            disturb.as_ref().map(|disturb| disturb as leftover::Disturb),
         )
     };
 
@@ -127,10 +131,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
 
     progress("confusion", 0.0);
     let (found, model) = (&explanation.found, &explanation.model);
-    let belief = Belief::of(&left, explanation.energy(&quiet));
     let mut causes = causes_of(&problem, &library, found);
     contribution::settle(&problem, &library, found, &mut causes);
     let keys = second_keys(&problem, &library, model, &mut causes);
+    let promises = promises(&subject.held, &problem, model, &explanation.sigmas, &mut causes);
+    let belief = Belief::of(&left, explanation.energy(&quiet), &promises);
     let scatter = explanation.scatter.as_ref();
     causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
     belief.weigh(&mut causes);
@@ -177,6 +182,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         stages,
         correction,
         keys,
+        promises,
         louder: finished
             .sigmas_after
             .iter()
@@ -206,6 +212,15 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         causes,
         withdrawn,
     }
+}
+
+/// What each of a model's effects adds to the fitted samples.
+fn suspects(problem: &Problem, model: &Model) -> Vec<Suspect> {
+    let suspect = |index: usize| Suspect {
+        name: model.components[index].active.cause.effect.page().name.to_owned(),
+        entries: problem.contribution(&model.components, index),
+    };
+    (0..model.components.len()).map(suspect).collect()
 }
 
 fn root_mean_square(problem: &Problem) -> f64 {

@@ -6,6 +6,9 @@
 //! An effect on the scatter is judged on what the others leave. With the noise as found, everything else is searched anew;
 //! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged.
 
+use nalgebra::DVector;
+use twin::part::signal::Noise;
+
 use crate::{
     attribute::{Attribution, Chosen, attribute},
     cause::probability_of_any,
@@ -130,14 +133,17 @@ impl Explanation {
         self.is_refused || self.sought + usize::from(self.scatter.is_some()) > MOST_CAUSES
     }
 
-    /// Channels whose scatter is explained by more than its size. Louder white noise is in the weights, so that its
-    /// channels are judged like any other.
-    pub fn scattered(&self) -> Vec<usize> {
-        let scatter = self
-            .scatter
-            .iter()
-            .filter(|scatter| scatter.effect.page().name != LOUDER);
-        scatter.flat_map(|scatter| scatter.channels.clone()).collect()
+    /// What its effect on the scatter makes of noise, given as residuals in units of noise. Louder white noise is in those
+    /// units already.
+    pub fn disturb<'a>(&'a self, problem: &'a Problem) -> Option<impl Fn(&mut [DVector<f64>], u64) + 'a> {
+        let scatter = self.scatter.as_ref()?;
+        (scatter.effect.page().name != LOUDER).then_some(move |residuals: &mut [DVector<f64>], seed: u64| {
+            let frames = problem.frames.iter();
+            let units: Vec<f64> = frames.map(|frame| frame.weight_sigma).collect();
+            let described = problem.sigmas.iter().zip(&self.sigmas);
+            (residuals.iter_mut().zip(described)).for_each(|(residual, (sigma, found))| *residual *= sigma / found);
+            scatter.disturb(problem, &self.model.predicted, &units, residuals, Noise::new(seed));
+        })
     }
 
     /// Energy that it takes off what calibration and noise leave, in squares of noise.

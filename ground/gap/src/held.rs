@@ -9,9 +9,11 @@
 //! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is 1; its
 //! ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
 //!
-//! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`].
+//! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
+//! [`strength`].
 
 pub mod stages;
+pub mod strength;
 
 use core::fmt;
 

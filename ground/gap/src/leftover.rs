@@ -4,17 +4,22 @@
 //! and the aspects of the residual that say otherwise, largest first. What is looked at is in [`aspects`].
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
-//! spread over logs simulated from the model: same motion, same holes, calibration drawn from its sigmas, white noise with
-//! the tails of a Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian. The p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
+//! spread over logs [`simulated`] from the model. The p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use crate::joint::{Fitted, Joint};
 
 mod aspects;
+mod common;
+mod shapes;
+mod simulated;
+mod strength;
 use aspects::Sights;
+use simulated::simulate;
+pub use simulated::{Clock, Disturb};
+pub use strength::Suspect;
 
 /// Stretches of time.
 pub const STRETCHES: usize = 20;
@@ -22,11 +27,11 @@ pub const STRETCHES: usize = 20;
 /// Simulated logs: fewest (p then has a floor of 1/101) and most.
 const SIMULATIONS: [usize; 2] = [100, 200];
 
+/// Mean cube root of an aspect below which the fit takes away whatever is there (a square of noise has 0.8).
+const FITTED: f64 = 0.3;
+
 /// Normal numbers drawn in all, so that long logs take bounded time.
 const DRAWS: usize = 20_000_000;
-
-/// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
-const TAILS: f64 = 10.0;
 
 /// Fixed, so that one case gives one verdict.
 const SEED: u64 = 0x5eed_0005;
@@ -47,6 +52,10 @@ pub struct View {
     /// What a small rotation of the unit against its reference adds to each sample, in units of noise for 1 rad about the
     /// axes of b.
     pub turned: DMatrix<f64>,
+    /// What it feels at each sample, in units of noise.
+    pub felt: DVector<f64>,
+    /// The clock of its part, where that is its own.
+    pub clock: Option<Clock>,
     /// For each quantity of [`LEVELLED`], in which of [`LEVELS`] equally filled levels each sample stands.
     pub levels: Vec<Vec<u8>>,
 }
@@ -117,15 +126,22 @@ fn log_tail(size: f64, [mean, spread]: [f64; 2]) -> f64 {
     }
 }
 
-/// Judges the residuals of a model. Channels in `explained` are not looked at: another effect says how they scatter.
-pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]) -> Leftover {
-    let sights = Sights::new(views, explained);
+/// Judges the residuals of a model, whose named effects on readings are the `suspects`; `disturb` is what the one on the
+/// scatter makes of noise.
+pub fn judge(
+    views: &[View],
+    joint: &Joint,
+    fitted: &Fitted,
+    suspects: &[Suspect],
+    disturb: Option<Disturb>,
+) -> Leftover {
+    let sights = Sights::new(views, suspects);
     let observed = sights.sums(fitted);
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sights.sums(&joint.fit(&simulate(joint, &mut random))))
+        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, disturb, &mut random))))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
@@ -136,7 +152,7 @@ pub fn judge(views: &[View], joint: &Joint, fitted: &Fitted, explained: &[usize]
     let sizes = |run: &[f64]| -> Vec<f64> {
         run.iter()
             .zip(&spreads)
-            .map(|(value, (mean, spread))| if *spread > 0.0 { (value - mean) / spread } else { 0.0 })
+            .map(|(value, (mean, spread))| if *mean > FITTED { (value - mean) / spread } else { 0.0 })
             .collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -164,26 +180,6 @@ fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let mean = values.clone().sum::<f64>() / count;
     let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (mean, variance.sqrt())
-}
-
-fn simulate(joint: &Joint, random: &mut Xoshiro256PlusPlus) -> Vec<DVector<f64>> {
-    let spread = ChiSquared::new(TAILS);
-    // A Student variable of n degrees has variance n / (n - 2).
-    let unit = (TAILS - 2.0).sqrt();
-    joint
-        .columns()
-        .map(|columns| {
-            let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
-            let mut residual = DVector::from_fn(columns.nuisance.nrows(), |_, _| {
-                let normal: f64 = StandardNormal.sample(&mut *random);
-                spread
-                    .as_ref()
-                    .map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
-            });
-            residual.gemv(1.0, &columns.nuisance, &open, 1.0);
-            residual
-        })
-        .collect()
 }
 
 #[cfg(test)]

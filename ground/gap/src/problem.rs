@@ -23,21 +23,31 @@ use crate::{
 /// in it.
 pub const REFERENCE_CORRELATION_S: f64 = 1.0;
 
-/// [s] how well a gyro's instant is known: it converts 256 times a second by its own clock (ADIS16265 data sheet, table 1), so
-/// a reading is up to half a period older or younger than described, and that evenly: a period over the root of 12.
-pub const GYRO_INSTANT_SIGMA_S: f64 = 1.0 / 256.0 / 3.464;
+/// [s] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
+const GYRO_PERIOD_S: f64 = 1.0 / 256.0;
 
-/// [s] how old a thermometer's reading is: it converts four times a second by its own clock (SBOS397), so up to a period, and
-/// that evenly: of root mean square a period over the root of 3.
-pub const THERMOMETER_AGE_S: f64 = 0.25 / 1.732;
+/// [s] between a thermometer's, by its own clock (TMP102, SBOS397).
+const THERMOMETER_PERIOD_S: f64 = 0.25;
 
-/// [s] how well the instant of a channel is known: as its description says, or as its part lets anyone know it.
-pub fn instant_sigma_s(channel: &Channel) -> f64 {
-    channel.instant_sigma_s.unwrap_or(match channel.sensor {
-        Kind::Gyro => GYRO_INSTANT_SIGMA_S,
-        Kind::Thermometer => THERMOMETER_AGE_S,
+/// [s] between the conversions of a channel's part by its own clock; 0 where it has none that is known of. A reading is up
+/// to half of it older or younger than described, and that evenly, so a stated sigma is a period over the root of 12.
+pub fn conversion_period_s(channel: &Channel) -> f64 {
+    let stated = channel.instant_sigma_s.map(|sigma_s| sigma_s * 12f64.sqrt());
+    stated.unwrap_or(match channel.sensor {
+        Kind::Gyro => GYRO_PERIOD_S,
+        Kind::Thermometer => THERMOMETER_PERIOD_S,
         Kind::Accelerometer | Kind::Magnetometer => 0.0,
     })
+}
+
+/// [s] how well the instant of a channel is known: as its description says, or as its part lets anyone know it. A
+/// thermometer is described as read at once, and is up to a whole period older.
+pub fn instant_sigma_s(channel: &Channel) -> f64 {
+    let spread = match (channel.sensor, channel.instant_sigma_s) {
+        (Kind::Thermometer, None) => 3f64.sqrt(),
+        _ => 12f64.sqrt(),
+    };
+    conversion_period_s(channel) / spread
 }
 
 /// What the calibration leaves open in one channel: its own, and the instant at which it is read. Where the description says
@@ -230,6 +240,43 @@ impl<'a> Problem<'a> {
         let pairs = frame.series.rows.iter().zip(&frame.series.values);
         let errors = pairs.map(|(row, value)| (value - predicted[*row as usize]) / frame.weight_sigma);
         DVector::from_iterator(frame.series.rows.len(), errors)
+    }
+
+    /// What `model[of]` adds to each channel it touches at every row, in physical units.
+    pub fn added(&self, model: &[Component], of: usize) -> Vec<(usize, Vec<f64>)> {
+        let mut others = model.to_vec();
+        let own = others.remove(of);
+        let difference = |channel: usize| {
+            let pairs = self
+                .predict(channel, model)
+                .into_iter()
+                .zip(self.predict(channel, &others));
+            (channel, pairs.map(|(with, without)| with - without).collect())
+        };
+        let touched = own.active.cause.channels(self.twin.unit());
+        touched.into_iter().map(difference).collect()
+    }
+
+    /// The same at the fitted samples, in units of noise.
+    pub fn contribution(&self, model: &[Component], of: usize) -> Vec<(usize, DVector<f64>)> {
+        let fitted = |(channel, added): (usize, Vec<f64>)| {
+            let frame = &self.frames[channel];
+            let rows = frame.series.rows.iter();
+            let values = rows.map(|row| added[*row as usize] / frame.weight_sigma);
+            (channel, DVector::from_iterator(frame.series.rows.len(), values))
+        };
+        self.added(model, of).into_iter().map(fitted).collect()
+    }
+
+    /// What a channel's calibration still leaves open once it is fitted, in physical units at every row of the log: a row of
+    /// the matrix for each direction, for one standard deviation.
+    pub fn still_open(&self, channel: usize) -> DMatrix<f64> {
+        let columns = calibration(self.twin, channel);
+        let mut open = DMatrix::from_fn(columns.len(), self.twin.starts_s().len(), |column, row| {
+            columns[column].entries[0].1[row] * columns[column].sigma
+        });
+        self.frames[channel].solve_open(&mut open);
+        open
     }
 
     /// Derivatives by the parameters of `model[of]`: for each parameter, the channels it touches, in units of noise.

@@ -10,8 +10,10 @@
 //! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
 //! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
 
+use nalgebra::DVector;
 use twin::{
     effect::{Effect, LIBRARY, Nature, Scope, View, most_likely},
+    part::signal::Noise,
     predict::Kind,
 };
 
@@ -30,6 +32,63 @@ pub struct Scatter {
     pub thetas: Vec<Vec<f64>>,
     /// [nats] over the nominal scatter, prices paid.
     pub gain: f64,
+}
+
+impl Scatter {
+    /// What it makes of noise: residuals a channel of a log that scatters as described, in place, both in physical units over
+    /// `unit_of` the channel. `predicted` holds every row.
+    pub fn disturb(
+        &self,
+        problem: &Problem,
+        predicted: &[Vec<f64>],
+        unit_of: &[f64],
+        residuals: &mut [DVector<f64>],
+        noise: Noise,
+    ) {
+        let twin = problem.twin;
+        let unit = twin.unit();
+        let block_of = |channel: usize| match self.effect.page().scope {
+            Scope::Channel => unit.channels[channel].name.as_str(),
+            Scope::Plate => unit.channels[channel].group.as_str(),
+            Scope::Unit => "",
+        };
+        let mut blocks: Vec<(&str, Vec<usize>)> = Vec::new();
+        for (at, channel) in self.channels.iter().enumerate() {
+            match blocks.iter_mut().find(|(name, _)| *name == block_of(*channel)) {
+                Some((_, block)) => block.push(at),
+                None => blocks.push((block_of(*channel), vec![at])),
+            }
+        }
+        for (number, (_, block)) in blocks.iter().enumerate() {
+            let rows_of = |channel: usize| problem.frames[channel].series.rows.iter().map(|row| *row as usize);
+            // Where nothing was logged something that is never read.
+            let mut measured: Vec<Vec<f64>> = block.iter().map(|at| predicted[self.channels[*at]].clone()).collect();
+            let instants: Vec<Vec<f64>> = block.iter().map(|at| twin.instants_s(self.channels[*at])).collect();
+            for (measured, at) in measured.iter_mut().zip(block) {
+                let channel = self.channels[*at];
+                (rows_of(channel).zip(residuals[channel].iter()))
+                    .for_each(|(row, residual)| measured[row] += residual * unit_of[channel]);
+            }
+            let views: Vec<View> = (block.iter().zip(&measured).zip(&instants))
+                .map(|((at, measured), t_s)| View {
+                    channel: &unit.channels[self.channels[*at]],
+                    t_s,
+                    predicted: &predicted[self.channels[*at]],
+                    measured,
+                })
+                .collect();
+            let theta = &self.thetas[block[0]];
+            let disturbed = self
+                .effect
+                .disturb(theta, self.variant, &views, noise.stream(number as u64));
+            for (disturbed, at) in disturbed.iter().zip(block) {
+                let channel = self.channels[*at];
+                (rows_of(channel).zip(residuals[channel].iter_mut())).for_each(|(row, residual)| {
+                    *residual = (disturbed[row] - predicted[channel][row]) / unit_of[channel];
+                });
+            }
+        }
+    }
 }
 
 /// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.

@@ -1,12 +1,12 @@
 //! What the leftover test looks at of each channel: its place in time, what the unit does at each sample, and what a small
 //! rotation would add to it: `d(n.v) = (v x n).delta` for the vector `v` (force, rate or field) a sensor along `n` feels.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Feel, Kind};
 
 use crate::{
-    leftover::{LEVELS, View},
-    problem::{Frame, Problem},
+    leftover::{Clock, LEVELS, View},
+    problem::{Frame, Problem, conversion_period_s},
 };
 
 /// Quantities of the motion: rate, force and field in b, temperature.
@@ -29,6 +29,15 @@ pub fn views(problem: &Problem) -> Vec<View> {
     let view = |(index, frame): (usize, &Frame)| {
         let channel = &twin.unit().channels[index];
         let own = problem.predict(index, &[]);
+        let felt_b = |row: usize| {
+            let feel = &feels[frame.series.rows[row] as usize];
+            match channel.sensor {
+                Kind::Accelerometer => feel.force_b,
+                Kind::Gyro => feel.rate_b,
+                Kind::Magnetometer => feel.field_b_ut,
+                Kind::Thermometer => Vector3::zeros(),
+            }
+        };
         let at = |quantity: &dyn Fn(usize) -> f64| {
             let values: Vec<f64> = frame.series.rows.iter().map(|row| quantity(*row as usize)).collect();
             levels(&values)
@@ -52,15 +61,12 @@ pub fn views(problem: &Problem) -> Vec<View> {
                 states[(frame.series.rows[row] as usize, column)]
             }),
             turned: DMatrix::from_fn(frame.series.rows.len(), 3, |row, axis| {
-                let feel = &feels[frame.series.rows[row] as usize];
-                let felt_b = match channel.sensor {
-                    Kind::Accelerometer => feel.force_b,
-                    Kind::Gyro => feel.rate_b,
-                    Kind::Magnetometer => feel.field_b_ut,
-                    Kind::Thermometer => Vector3::zeros(),
-                };
-                felt_b.cross(&channel.axis_b)[axis] / frame.weight_sigma
+                felt_b(row).cross(&channel.axis_b)[axis] / frame.weight_sigma
             }),
+            felt: DVector::from_fn(frame.series.rows.len(), |row, _| {
+                felt_b(row).dot(&channel.axis_b) / frame.weight_sigma
+            }),
+            clock: clock(problem, index),
             levels: vec![
                 at(&|row| own[row]),
                 at(&|row| feels[row].rate_b.norm()),
@@ -70,6 +76,21 @@ pub fn views(problem: &Problem) -> Vec<View> {
         }
     };
     problem.frames.iter().enumerate().map(view).collect()
+}
+
+/// The clock of a channel's part at the fitted samples.
+fn clock(problem: &Problem, index: usize) -> Option<Clock> {
+    let (twin, frame) = (problem.twin, &problem.frames[index]);
+    let period_s = conversion_period_s(&twin.unit().channels[index]);
+    let at_rows = |values: &[f64], scale: f64| -> Vec<f64> {
+        let rows = frame.series.rows.iter();
+        rows.map(|row| values[*row as usize] * scale).collect()
+    };
+    (period_s > 0.0).then(|| Clock {
+        period_s,
+        instants_s: at_rows(&twin.instants_s(index), 1.0),
+        slopes: at_rows(&twin.by_instant(index), 1.0 / frame.weight_sigma),
+    })
 }
 
 /// The motion, each quantity about zero with unit spread; one that does not change is zero.

@@ -90,6 +90,13 @@ pub fn why(subject: &Subject, diagnosis: &Diagnosis) -> String {
             key.gain, key.error
         );
     }
+    for promised in &diagnosis.promises {
+        let _ = writeln!(
+            text,
+            "        {} is {:.2} +- {:.2} times as strong on the held-out windows",
+            promised.effect, promised.promise.factor, promised.promise.sigma
+        );
+    }
     text
 }
 

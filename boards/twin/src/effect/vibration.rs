@@ -106,16 +106,19 @@ impl Effect for Vibration {
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
         let humming = |(number, view): (usize, &View)| {
             let phase = TAU * noise.uniform(number as u64);
+            let step_s = view.t_s.windows(2).map(|pair| pair[1] - pair[0]).next().unwrap_or(1.0);
+            let any_hz = 0.5 / step_s * noise.stream(1).uniform(0);
+            let frequency_hz = if variant > 0.0 { variant } else { any_hz };
             let amplitude = theta[0] * view.channel.sigma();
             let samples = view.measured.iter().zip(view.t_s);
             samples
-                .map(|(measured, t_s)| measured + amplitude * (TAU * variant * t_s + phase).sin())
+                .map(|(measured, t_s)| measured + amplitude * (TAU * frequency_hz * t_s + phase).sin())
                 .collect()
         };
         views.iter().enumerate().map(humming).collect()
     }
 
-    /// Any frequency: the likelihood averages over them. To inject, the variant is the frequency [Hz].
+    /// Any frequency: the likelihood averages over them. To inject, the variant is the frequency [Hz], or 0 for a drawn one.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0]
     }

@@ -1,5 +1,7 @@
 //! Residuals with and without something in them.
 
+use rand_distr::{Distribution, StandardNormal};
+
 use super::*;
 use crate::joint::Columns;
 
@@ -21,6 +23,8 @@ fn scene() -> (Vec<View>, Joint) {
             let felt_b = Vector3::new(1.0, (row as f64 * 0.03).sin(), (row as f64 * 0.02).cos());
             felt_b.cross(&Vector3::ith(channel, 1.0))[axis]
         }),
+        felt: DVector::from_fn(SAMPLES, |row, _| (row as f64 * 0.07 + channel as f64).sin()),
+        clock: None,
         levels: vec![(0..SAMPLES).map(|row| (row % LEVELS) as u8).collect(); LEVELLED.len()],
     };
     let columns = Columns {
@@ -39,26 +43,31 @@ fn noise(seed: u64) -> Vec<DVector<f64>> {
     (0..CHANNELS).map(|_| channel()).collect()
 }
 
-fn judged(explained: &[usize], change: impl Fn(usize, &mut DVector<f64>)) -> Leftover {
+fn judged(change: impl Fn(usize, &mut DVector<f64>)) -> Leftover {
     let (views, joint) = scene();
     let mut residuals = noise(7);
     residuals
         .iter_mut()
         .enumerate()
         .for_each(|(channel, residual)| change(channel, residual));
-    judge(&views, &joint, &joint.fit(&residuals), explained)
+    judge(&views, &joint, &joint.fit(&residuals), &[], None)
+}
+
+/// The channel that stands out most.
+fn first_channel(left: &Leftover) -> Option<usize> {
+    left.aspects.iter().find_map(|aspect| aspect.channel)
 }
 
 #[test]
 fn noise_alone_is_enough() {
-    let left = judged(&[], |_, _| {});
+    let left = judged(|_, _| {});
     assert!(left.p > 0.05, "{left:?}");
     assert!(left.unknown(0.05) < 0.06);
 }
 
 #[test]
 fn a_slow_wave_in_one_channel_is_found_there() {
-    let left = judged(&[], |channel, residual| {
+    let left = judged(|channel, residual| {
         if channel == 1 {
             residual
                 .iter_mut()
@@ -67,13 +76,13 @@ fn a_slow_wave_in_one_channel_is_found_there() {
         }
     });
     assert!(left.p < 0.01, "{left:?}");
-    assert_eq!(left.aspects[0].channel, Some(1));
+    assert_eq!(first_channel(&left), Some(1));
     assert!(left.unknown(0.05) > 0.9);
 }
 
 #[test]
 fn what_hides_in_the_calibration_is_found_by_its_size() {
-    let left = judged(&[], |channel, residual| {
+    let left = judged(|channel, residual| {
         if channel == 2 {
             residual.add_scalar_mut(5.0 * 8.0);
         }
@@ -83,20 +92,178 @@ fn what_hides_in_the_calibration_is_found_by_its_size() {
 }
 
 #[test]
-fn what_another_effect_explains_no_longer_counts() {
-    let louder = |channel: usize, residual: &mut DVector<f64>| {
-        if channel == 0 {
-            *residual *= 2.0;
-        }
+fn what_an_effect_on_the_scatter_explains_no_longer_counts() {
+    let louder = |residuals: &mut [DVector<f64>]| residuals[0] *= 2.0;
+    let (views, joint) = scene();
+    let mut residuals = noise(7);
+    louder(&mut residuals);
+    let fitted = joint.fit(&residuals);
+    assert!(judge(&views, &joint, &fitted, &[], None).p < 0.01);
+    let explained = judge(&views, &joint, &fitted, &[], Some(&|residuals, _| louder(residuals)));
+    assert!(explained.p > 0.05, "{explained:?}");
+}
+
+#[test]
+fn a_channel_that_scatters_as_explained_is_looked_at_for_everything_else() {
+    let louder = |residuals: &mut [DVector<f64>]| residuals[0] *= 2.0;
+    let (views, joint) = scene();
+    let mut residuals = noise(7);
+    louder(&mut residuals);
+    (residuals[0].iter_mut().enumerate()).for_each(|(row, value)| *value += (row as f64 * 0.05).sin());
+    let left = judge(
+        &views,
+        &joint,
+        &joint.fit(&residuals),
+        &[],
+        Some(&|residuals, _| louder(residuals)),
+    );
+    assert!(left.p < 0.01, "{left:?}");
+    assert_eq!(first_channel(&left), Some(0));
+}
+
+#[test]
+fn noise_that_comes_and_goes_is_told_from_louder_noise() {
+    let scaled = |factor: fn(usize) -> f64| {
+        judged(|_, residual| {
+            residual
+                .iter_mut()
+                .enumerate()
+                .for_each(|(row, value)| *value *= factor(row));
+        })
     };
-    assert!(judged(&[], louder).p < 0.01);
-    assert!(judged(&[0], louder).p > 0.05);
+    let names = |left: &Leftover| -> Vec<String> { left.aspects.iter().map(|aspect| aspect.what.clone()).collect() };
+    let comes = |left: &Leftover| names(left).iter().any(|what| what.contains("comes and goes"));
+    // The same energy, in one seventh of the time or always.
+    let bursts = scaled(|row| if row / 20 % 7 == 3 { 2.5 } else { 1.0 });
+    assert!(comes(&bursts), "{:?}", names(&bursts));
+    let louder = scaled(|_| 1.32);
+    assert!(louder.p < 0.01 && !comes(&louder), "{:?}", names(&louder));
+}
+
+#[test]
+fn what_is_small_in_each_of_many_channels_shows_in_all_together() {
+    let left = judged(|_, residual| {
+        residual
+            .iter_mut()
+            .enumerate()
+            .for_each(|(row, value)| *value += 0.22 * (row as f64 * 0.05).sin());
+    });
+    let size = |what: &str| {
+        let own = left.aspects.iter().find(|aspect| aspect.what.starts_with(what));
+        own.map_or(0.0, |aspect| aspect.size)
+    };
+    let each = (0..CHANNELS).map(|channel| size(&format!("g{channel}: a shape in time")));
+    let together = size("gyros together: a shape in time");
+    assert!(
+        together > 3.0 && each.fold(0.0, f64::max) < together,
+        "{:?}",
+        left.aspects
+    );
+}
+
+/// What a law `|rate|` leaves of another one, its root, and what it leaves of itself.
+#[test]
+fn another_law_than_the_named_one_shows_in_how_its_strength_changes() {
+    let (views, joint) = scene();
+    let rate = |row: usize| (row as f64 * 0.03).sin().abs();
+    let suspect = Suspect {
+        name: "current-field".into(),
+        entries: (0..CHANNELS)
+            .map(|channel| (channel, DVector::from_fn(SAMPLES, |row, _| rate(row) - 0.637)))
+            .collect(),
+    };
+    let of = |law: &dyn Fn(usize) -> f64| {
+        let mut residuals = noise(7);
+        for residual in &mut residuals {
+            (residual.iter_mut().enumerate()).for_each(|(row, value)| *value += 3.0 * law(row));
+        }
+        let fitted = joint.fit(&residuals);
+        judge(&views, &joint, &fitted, std::slice::from_ref(&suspect), None)
+    };
+    // The best fit of the named law to its own root, taken off.
+    let other = of(&|row| rate(row).sqrt() - 0.763 - 0.9 * (rate(row) - 0.637));
+    let strength = other.aspects.iter().find(|aspect| aspect.what.contains("strength"));
+    assert!(
+        strength.is_some_and(|strength| strength.size > 4.0),
+        "{:?}",
+        other.aspects
+    );
+    let own = of(&|_| 0.0);
+    assert!(own.p > 0.05, "{own:?}");
+}
+
+#[test]
+fn a_strength_that_is_fitted_in_each_channel_is_no_leftover() {
+    let (views, _) = scene();
+    // How much each channel knows of its own strength is another.
+    let law = |channel: usize, row: usize| (channel + 1) as f64 * (row as f64 * 0.03).sin();
+    let columns = |channel: usize| Columns {
+        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
+        effects: DMatrix::from_fn(
+            SAMPLES,
+            CHANNELS,
+            |row, own| if own == channel { law(channel, row) } else { 0.0 },
+        ),
+    };
+    let joint = Joint::new((0..CHANNELS).map(columns).collect(), &[100.0; CHANNELS]);
+    let strengths = [200.0, -150.0, 30.0];
+    let mut residuals = noise(7);
+    for (channel, (residual, strength)) in residuals.iter_mut().zip(strengths).enumerate() {
+        (residual.iter_mut().enumerate()).for_each(|(row, value)| *value += strength * law(channel, row));
+    }
+    let entry = |(channel, strength): (usize, f64)| {
+        (
+            channel,
+            DVector::from_fn(SAMPLES, |row, _| strength * law(channel, row)),
+        )
+    };
+    let suspect = Suspect {
+        name: "gyro-scale".into(),
+        entries: strengths.into_iter().enumerate().map(entry).collect(),
+    };
+    let left = judge(&views, &joint, &joint.fit(&residuals), &[suspect], None);
+    assert!(left.p > 0.05, "{left:?}");
+}
+
+#[test]
+fn a_supply_that_sags_is_found_by_the_factor_all_sensors_share() {
+    let left = judged(|channel, residual| {
+        let felt = scene().0[channel].felt.clone();
+        (residual.iter_mut().enumerate())
+            .for_each(|(row, value)| *value += 0.8 * (row as f64 / SAMPLES as f64 - 0.5) * felt[row]);
+    });
+    assert!(left.p < 0.01, "{left:?}");
+    assert!(
+        left.aspects.iter().any(|aspect| aspect.what.contains("common factor")),
+        "{left:?}"
+    );
+}
+
+#[test]
+fn a_part_that_converts_by_its_own_clock_scatters_with_what_it_measures() {
+    let (mut views, joint) = scene();
+    for (channel, view) in views.iter_mut().enumerate() {
+        view.clock = (channel == 0).then(|| Clock {
+            period_s: 0.01,
+            instants_s: (0..SAMPLES).map(|row| row as f64 * 0.2).collect(),
+            slopes: (0..SAMPLES).map(|row| 300.0 * (row as f64 * 0.05).cos()).collect(),
+        });
+    }
+    let mut residuals = noise(7);
+    (residuals[0].iter_mut().enumerate()).for_each(|(row, value)| {
+        let age_s = ((row as f64 * 0.317).fract() - 0.5) * 0.01;
+        *value += 300.0 * (row as f64 * 0.05).cos() * age_s;
+    });
+    let fitted = joint.fit(&residuals);
+    assert!(judge(&views, &joint, &fitted, &[], None).p > 0.05);
+    views[0].clock = None;
+    assert!(judge(&views, &joint, &fitted, &[], None).p < 0.02);
 }
 
 #[test]
 fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
     let slips = |row: usize| if row * 7 / SAMPLES % 2 == 1 { 0.5 } else { 0.0 };
-    let left = judged(&[], |channel, residual| {
+    let left = judged(|channel, residual| {
         let turned = scene().0[channel].turned.clone();
         let about_z = |row: usize| slips(row) * turned[(row, 2)];
         residual
@@ -114,7 +281,7 @@ fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
 
 #[test]
 fn a_wrong_law_is_found_by_the_steps_between_levels() {
-    let left = judged(&[], |channel, residual| {
+    let left = judged(|channel, residual| {
         if channel == 0 {
             let of_level = |row: usize| 0.3 * ((row % LEVELS) as f64 - 3.5) / 2.3;
             residual

@@ -1,0 +1,138 @@
+//! Whether an effect is as strong on the held-out windows as it was fitted.
+//!
+//! In: what an effect of a finished model adds to every row, and what the model predicts. Out: [`Promise`], the factor of
+//! that contribution which fits the held-out samples best: one for the true law, whatever its size; anything else for a law
+//! that only happened to look like the truth on the fit windows.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Held;
+use crate::next::erfc;
+
+/// What is said of a finished effect.
+#[derive(Clone, Copy, Debug)]
+pub struct Claimed<'a> {
+    /// Channels with what it adds to every row, in physical units.
+    pub added: &'a [(usize, Vec<f64>)],
+    /// For each of them what its fitted calibration still leaves open, a row for a column that is known to one: its standard
+    /// deviation at every row of the log, in physical units.
+    pub open: &'a [DMatrix<f64>],
+    /// Predictions of every row with everything in, channel by channel.
+    pub after: &'a [Vec<f64>],
+    /// Standard deviation of a sample, one a channel.
+    pub sigmas: &'a [f64],
+}
+
+/// An effect's strength on the held-out windows over that on the fit windows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise {
+    /// Best factor.
+    pub factor: f64,
+    /// Its standard deviation, of the held-out noise alone.
+    pub sigma: f64,
+}
+
+/// Difference from one that a true effect may show: the calibration that was fitted beside it is not exact on another
+/// motion, and a real law is only nearly the library's.
+const TOLERATED: f64 = 0.15;
+
+/// Standard deviation above which the held-out windows hardly show the effect, and say nothing.
+const SHOWN: f64 = 0.5;
+
+impl Promise {
+    /// Probability of being as far from one, for an effect whose strength was fitted to `fitted_sigma` (relative).
+    pub fn confidence(&self, fitted_sigma: f64) -> f64 {
+        if self.sigma > SHOWN {
+            return 1.0;
+        }
+        let away = ((self.factor - 1.0).abs() - TOLERATED).max(0.0);
+        erfc(away / self.sigma.hypot(fitted_sigma) / core::f64::consts::SQRT_2)
+    }
+}
+
+impl Held {
+    /// How strong an effect is here, apart from what the calibration may still do; nothing where it adds nothing.
+    pub fn promise(&self, claimed: Claimed) -> Option<Promise> {
+        let (mut energy, mut along) = (0.0, 0.0);
+        for ((channel, added), open) in claimed.added.iter().zip(claimed.open) {
+            let (series, sigma) = (&self.channels[*channel], claimed.sigmas[*channel]);
+            let after = &claimed.after[*channel];
+            let samples = series.rows.iter().map(|row| *row as usize).zip(&series.values);
+            let seen: Vec<(usize, f64)> = samples
+                .map(|(row, value)| (row, (value - after[row]) / sigma))
+                .filter(|(row, rest)| rest.is_finite() && added[*row].is_finite())
+                .collect();
+            let own = DVector::from_iterator(seen.len(), seen.iter().map(|(row, _)| added[*row] / sigma));
+            let rest = DVector::from_iterator(seen.len(), seen.iter().map(|(_, rest)| *rest));
+            let nuisance = DMatrix::from_fn(seen.len(), open.nrows(), |at, column| {
+                open[(column, seen[at].0)] / sigma
+            });
+            // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
+            let imitated = nuisance.tr_mul(&own);
+            let inner = DMatrix::identity(open.nrows(), open.nrows()) + nuisance.tr_mul(&nuisance);
+            let Some(inner) = inner.cholesky() else { continue };
+            let apart = &own - &nuisance * inner.solve(&imitated);
+            energy += apart.dot(&own);
+            along += apart.dot(&rest);
+        }
+        (energy > 0.0).then(|| Promise {
+            factor: 1.0 + along / energy,
+            sigma: energy.sqrt().recip(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Series;
+
+    const SAMPLES: usize = 400;
+
+    fn sine(row: usize, rate: f64) -> f64 {
+        (row as f64 * rate).sin()
+    }
+
+    /// The promise of an effect `sin 0.1 k` of a channel whose readings are `measured`, its bias open.
+    fn promised(measured: impl Fn(usize) -> f64) -> Promise {
+        let held = Held::new(vec![Series {
+            rows: (0..SAMPLES as u32).collect(),
+            values: (0..SAMPLES).map(measured).collect(),
+        }]);
+        let added = [(0, (0..SAMPLES).map(|row| sine(row, 0.1)).collect())];
+        let open = [DMatrix::from_element(1, SAMPLES, 100.0)];
+        let after = [(0..SAMPLES).map(|row| sine(row, 0.1)).collect()];
+        let claimed = Claimed {
+            added: &added,
+            open: &open,
+            after: &after,
+            sigmas: &[0.1],
+        };
+        held.promise(claimed).expect("it adds something")
+    }
+
+    #[test]
+    fn an_effect_that_keeps_its_promise_is_believed_and_one_that_does_not_is_not() {
+        let kept = promised(|row| sine(row, 0.1) + 0.1 * sine(row, 1.7));
+        assert!((kept.factor - 1.0).abs() < 2.0 * kept.sigma, "{kept:?}");
+        assert!(kept.confidence(0.01) > 0.99);
+        let gone = promised(|row| 0.1 * sine(row, 1.7));
+        assert!(gone.factor.abs() < 2.0 * gone.sigma, "{gone:?}");
+        assert!(gone.confidence(0.01) < 1e-6);
+    }
+
+    #[test]
+    fn what_the_calibration_leaves_open_breaks_no_promise() {
+        let biased = promised(|row| sine(row, 0.1) + 3.0);
+        assert!(biased.confidence(0.01) > 0.99, "{biased:?}");
+    }
+
+    #[test]
+    fn windows_that_hardly_show_an_effect_say_nothing() {
+        let promise = Promise {
+            factor: -2.0,
+            sigma: 0.8,
+        };
+        assert_eq!(promise.confidence(0.01), 1.0);
+    }
+}

@@ -1,0 +1,96 @@
+//! Logs simulated from a model: same motion, same holes, everything drawn that the model leaves to chance.
+//!
+//! In: the finished model's columns ([`Joint`]), and what its effect on the scatter, if it names one, makes of noise. Out:
+//! residuals a channel, in units of noise. Drawn are the calibration from its sigmas; white noise with the tails of a
+//! Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian; and the clocks of the parts, by which a
+//! reading is older or younger than described in a saw-tooth over samples.
+
+use nalgebra::DVector;
+use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
+
+use super::View;
+use crate::joint::Joint;
+
+/// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
+const TAILS: f64 = 10.0;
+
+/// Part by which a clock inside a part may be off: an RC oscillator's few percent.
+const OFF: f64 = 0.05;
+
+/// Beats a sample between the two clocks below which the age drifts and does not scatter: that is the calibration's, whose
+/// instant is open and may drift.
+const SLOWEST: f64 = 0.1;
+
+/// Draws after which any beat will do: a clock and a sampling that are as slow as each other have no other.
+const TRIES: usize = 20;
+
+/// When a part converts by its own clock.
+#[derive(Clone, Debug)]
+pub struct Clock {
+    /// [s] between conversions.
+    pub period_s: f64,
+    /// [s] instant of each sample.
+    pub instants_s: Vec<f64>,
+    /// What a second of age adds to each sample, in units of noise.
+    pub slopes: Vec<f64>,
+}
+
+/// What a model's effect on the scatter makes of noise, given as residuals a channel in units of noise; drawn from a seed.
+pub type Disturb<'a> = &'a dyn Fn(&mut [DVector<f64>], u64);
+
+/// One log.
+pub fn simulate(
+    views: &[View],
+    joint: &Joint,
+    disturb: Option<Disturb>,
+    random: &mut Xoshiro256PlusPlus,
+) -> Vec<DVector<f64>> {
+    let spread = ChiSquared::new(TAILS);
+    // A Student variable of n degrees has variance n / (n - 2).
+    let unit = (TAILS - 2.0).sqrt();
+    let mut residuals: Vec<DVector<f64>> = Vec::new();
+    for columns in joint.columns() {
+        residuals.push(DVector::from_fn(columns.nuisance.nrows(), |_, _| {
+            let normal: f64 = StandardNormal.sample(&mut *random);
+            spread
+                .as_ref()
+                .map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
+        }));
+    }
+    if let Some(disturb) = disturb {
+        disturb(&mut residuals, random.next_u64());
+    }
+    for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
+        let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
+        residual.gemv(1.0, &columns.nuisance, &open, 1.0);
+        if let Some(clock) = &view.clock {
+            clock.age(residual, random);
+        }
+    }
+    residuals
+}
+
+impl Clock {
+    /// Adds what a clock of unknown phase and rate makes of a channel. The mean age is the calibration's.
+    fn age(&self, residual: &mut DVector<f64>, random: &mut Xoshiro256PlusPlus) {
+        let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
+        let step_s = self.instants_s.get(1).map_or(0.0, |second| second - self.instants_s[0]);
+        let phase = between(0.0, 1.0);
+        let mut period_s = self.period_s;
+        for _ in 0..TRIES {
+            period_s = self.period_s * (1.0 + between(-OFF, OFF));
+            let beat = (step_s / period_s).fract();
+            if (SLOWEST..1.0 - SLOWEST).contains(&beat) {
+                break;
+            }
+        }
+        let ages_s: Vec<f64> = (self.instants_s.iter())
+            .map(|t_s| (t_s / period_s + phase).rem_euclid(1.0) * period_s)
+            .collect();
+        let mean_s = ages_s.iter().sum::<f64>() / ages_s.len().max(1) as f64;
+        for ((residual, age_s), slope) in residual.iter_mut().zip(ages_s).zip(&self.slopes) {
+            *residual += slope * (age_s - mean_s);
+        }
+    }
+}
