@@ -47,8 +47,7 @@ fn right_and_wrong_names_are_told_apart() {
 #[test]
 fn a_sensor_is_found_by_any_of_its_axes() {
     let mut case = judged("R1", &["accel-bias"], Some(RIGHT));
-    let channels = |names: [&str; 3]| names.map(str::to_owned).to_vec();
-    case.answer.effects[0].channels = channels(["a3x", "a3y", "a3z"]);
+    case.answer.effects[0].channels = ["a3x", "a3y", "a3z"].map(str::to_owned).into();
     let verdict = case.verdict.as_mut().expect("given");
     verdict.causes[0].channels = vec!["a3y".into(), "a4y".into()];
     let lines = table(&[case]);
