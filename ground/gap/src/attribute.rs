@@ -164,18 +164,21 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         let mut with = model.clone();
         with.push(hypothesis.component(&DVector::zeros(0)));
         let touched = hypothesis.cause.channels(unit);
-        // No effect takes off more than there is above the noise.
-        let excess: f64 = touched
-            .iter()
-            .map(|channel| before[*channel] - problem.frames[*channel].series.rows.len() as f64)
-            .sum();
-        if 0.5 * excess + hypothesis.log_prior < 0.0 {
+        // No effect takes off more than there is above the noise: of a gross one that is not there the first channel says so.
+        let above = |channel: usize| before[channel] - problem.frames[channel].series.rows.len() as f64;
+        let mut possible: f64 = touched.iter().map(|channel| above(*channel)).sum();
+        let mut fall = 0.0;
+        let mut channels = touched.into_iter();
+        while 0.5 * possible + hypothesis.log_prior >= 0.0
+            && let Some(channel) = channels.next()
+        {
+            let own = before[channel] - energy(channel, &with);
+            possible += own - above(channel);
+            fall += own;
+        }
+        if 0.5 * possible + hypothesis.log_prior < 0.0 {
             continue;
         }
-        let fall: f64 = touched
-            .iter()
-            .map(|channel| before[*channel] - energy(*channel, &with))
-            .sum();
         gains[index] = 0.5 * fall + hypothesis.log_prior;
     }
 }
