@@ -29,8 +29,15 @@ pub struct Strength {
     /// In words.
     pub what: String,
     channels: Vec<usize>,
-    /// Orthonormal, over the samples of all those channels one after another.
-    basis: DMatrix<f64>,
+    along: Along,
+}
+
+/// What is left is looked at along this, over the samples of all channels one after another.
+enum Along {
+    /// Orthonormal columns.
+    Weighted(DMatrix<f64>),
+    /// The contribution itself, each channel's part apart from the whole.
+    Each(DVector<f64>),
 }
 
 impl Strength {
@@ -61,41 +68,56 @@ impl Strength {
             ),
             ("with its size".into(), vec![weighted(&|_, _, size| size.abs())]),
             ("with its sign".into(), vec![weighted(&|_, _, size| size.signum())]),
-            (
-                "from channel to channel".into(),
-                entries
-                    .iter()
-                    .map(|(channel, _)| {
-                        weighted(&|view, _, _| f64::from(u8::from(std::ptr::eq(view, &views[*channel]))))
-                    })
-                    .collect(),
-            ),
         ];
         for (quantity, name) in LEVELLED.iter().enumerate() {
             let level = |view: &View, row: usize, _: f64| f64::from(view.levels[quantity][row]) / LEVELS as f64;
             ways.push((format!("with {name}"), vec![weighted(&level)]));
         }
         let channels: Vec<usize> = entries.iter().map(|(channel, _)| *channel).collect();
-        let strength = |(how, columns): (String, Vec<DVector<f64>>)| {
-            Some(Strength {
-                what: format!("{}: its strength changes {how}", suspect.name),
-                channels: channels.clone(),
-                basis: apart(&contribution, &columns)?,
-            })
+        let strength = |how: String, along: Along| Strength {
+            what: format!("{}: its strength changes {how}", suspect.name),
+            channels: channels.clone(),
+            along,
         };
-        ways.into_iter().filter_map(strength).collect()
+        let mut all: Vec<Strength> = ways
+            .into_iter()
+            .filter_map(|(how, columns)| Some(strength(how, Along::Weighted(apart(&contribution, &columns)?))))
+            .collect();
+        if channels.len() > 1 {
+            all.push(strength("from channel to channel".into(), Along::Each(contribution)));
+        }
+        all
     }
 
     /// Energy of what is left along the weighted contributions.
     pub fn sum(&self, fitted: &Fitted) -> f64 {
-        let mut along = DVector::zeros(self.basis.ncols());
         let mut from = 0;
-        for channel in &self.channels {
+        let mut parts = self.channels.iter().map(|channel| {
             let rest = &fitted.rest[*channel];
-            along += self.basis.rows(from, rest.len()).tr_mul(rest);
             from += rest.len();
+            (from - rest.len(), rest)
+        });
+        match &self.along {
+            Along::Weighted(basis) => {
+                let along = parts.fold(DVector::zeros(basis.ncols()), |along: DVector<f64>, (from, rest)| {
+                    along + basis.rows(from, rest.len()).tr_mul(rest)
+                });
+                along.norm_squared()
+            }
+            Along::Each(contribution) => {
+                let (mut each, mut along, mut energy) = (0.0, 0.0, 0.0);
+                for (from, rest) in &mut parts {
+                    let own = contribution.rows(from, rest.len());
+                    let (own_along, own_energy) = (own.dot(rest), own.norm_squared());
+                    if own_energy > 0.0 {
+                        each += own_along * own_along / own_energy;
+                    }
+                    along += own_along;
+                    energy += own_energy;
+                }
+                each - along * along / energy
+            }
         }
-        along.norm_squared()
     }
 }
 
