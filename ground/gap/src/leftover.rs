@@ -141,7 +141,7 @@ pub fn judge(
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, disturb, &mut random))))
+        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &fitted.parameters, disturb, &mut random))))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();

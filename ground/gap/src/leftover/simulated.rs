@@ -1,7 +1,8 @@
 //! Logs simulated from a model: same motion, same holes, everything drawn that the model leaves to chance.
 //!
-//! In: the finished model's columns ([`Joint`]), and what its effect on the scatter, if it names one, makes of noise. Out:
-//! residuals a channel, in units of noise. Drawn are the calibration from its sigmas; white noise with the tails of a
+//! In: the finished model's columns ([`Joint`]), the parameters it found, and what its effect on the scatter, if it names
+//! one, makes of noise. Out: residuals a channel, in units of noise. The effects are in as large as they were found, so that
+//! what the prior takes off a large one is left over here too. Drawn are the calibration from its sigmas; white noise with the tails of a
 //! Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian; and the clocks of the parts, by which a
 //! reading is older or younger than described in a saw-tooth over samples.
 
@@ -43,6 +44,7 @@ pub type Disturb<'a> = &'a dyn Fn(&mut [DVector<f64>], u64);
 pub fn simulate(
     views: &[View],
     joint: &Joint,
+    parameters: &DVector<f64>,
     disturb: Option<Disturb>,
     random: &mut Xoshiro256PlusPlus,
 ) -> Vec<DVector<f64>> {
@@ -64,6 +66,7 @@ pub fn simulate(
     for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
         let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
         residual.gemv(1.0, &columns.nuisance, &open, 1.0);
+        residual.gemv(1.0, &columns.effects, parameters, 1.0);
         if let Some(clock) = &view.clock {
             clock.age(residual, random);
         }
