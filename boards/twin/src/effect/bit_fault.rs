@@ -63,10 +63,15 @@ impl Effect for BitFault {
                     let from = residual + f64::from(i32::from(origin) - i32::from(code)) * lsb;
                     view.within(from - 0.5 * lsb, from + 0.5 * lsb)
                 };
-                match could {
+                let fault = match could {
                     [None, None] => IMPOSSIBLE,
                     [Some(one), None] | [None, Some(one)] => mass(one),
                     [Some(one), Some(other)] => mixed(0.5, mass(one), mass(other)) + 2.0_f64.ln(),
+                };
+                if fault > IMPOSSIBLE + 1.0 {
+                    fault
+                } else {
+                    view.refuting(residual)
                 }
             };
             view.residuals().map(sample).sum()

@@ -34,11 +34,14 @@ impl Effect for CoarseQuantisation {
             let sample = |(k, residual): (usize, f64)| {
                 let code = view.measured[k] / q;
                 if view.channel.bits.is_none() || (code - code.round()).abs() > 0.25 * view.channel.lsb / q {
-                    return IMPOSSIBLE;
+                    return view.refuting(residual);
                 }
                 // Rounded, the value was within half a step; cut off, within the step above.
                 let low = if variant > 0.0 { residual - 0.5 * q } else { residual };
-                view.within(low, low + q)
+                match view.within(low, low + q) {
+                    mass if mass > IMPOSSIBLE => mass,
+                    _ => view.refuting(residual),
+                }
             };
             view.residuals().map(sample).sum()
         };

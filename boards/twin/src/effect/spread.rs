@@ -79,6 +79,12 @@ impl View<'_> {
         }
     }
 
+    /// ln probability of a sample that a law calls impossible: what noise makes of it, if that is less. No law gains by samples
+    /// that neither it nor noise explains.
+    pub(super) fn refuting(&self, residual: f64) -> f64 {
+        self.normal(residual, self.channel.sigma()).min(IMPOSSIBLE)
+    }
+
     /// ln probability of the log of this channel if nothing is wrong.
     pub fn nominal(&self) -> f64 {
         let sigma = self.channel.sigma();

@@ -161,3 +161,39 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
         }
     }
 }
+
+/// One digit in a hundred samples is another: no bit is stuck, and no law that leaves those samples unexplained may gain by
+/// them.
+#[test]
+fn digits_garbled_here_and_there_are_no_stuck_bit() {
+    let twin = twin(DENSE);
+    let predicted = twin.predict(&[]);
+    let channel = Cause {
+        effect: by_name("packet-corruption").unwrap(),
+        locality: Locality::Channel("a3z".to_owned()),
+        variant: 0.0,
+    }
+    .channels(twin.unit())[0];
+    let lsb = twin.unit().channels[channel].lsb;
+    let mut measured = logged(&twin, &noisy(&twin, &predicted, 5))[channel].clone();
+    for (k, value) in measured.iter_mut().enumerate().step_by(100) {
+        *value = f64::from((*value / lsb).round() as i16 ^ (1 << (k / 100 % 4 + 7))) * lsb;
+    }
+    let t_s = twin.instants_s(channel);
+    let view = View {
+        channel: &twin.unit().channels[channel],
+        t_s: &t_s,
+        predicted: &predicted[channel],
+        measured: &measured,
+    };
+    let gain = |name: &str| {
+        let effect = by_name(name).unwrap();
+        let variants = effect.variants(twin.starts_s()).into_iter();
+        let gains = variants.map(|variant| most_likely(effect, variant, &[view]).1);
+        gains.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let garbled = gain("packet-corruption");
+    for name in ["bit-fault", "coarse-quantisation", "stuck-channel"] {
+        assert!(gain(name) < 0.5 * garbled, "{name}: {} of {garbled}", gain(name));
+    }
+}
