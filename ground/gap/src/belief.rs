@@ -6,6 +6,7 @@
 //! another strength on the held-out windows than on the fitted ones.
 
 use crate::{
+    attribute::Chosen,
     cause::Cause,
     crossval::{self, Key},
     held::{
@@ -28,8 +29,8 @@ const DOUBTED: f64 = 20.0;
 const DOUBT_STEP: f64 = 4.0;
 
 /// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
-/// from its law leaves less than a part in a hundred; another effect's law, which happens to be like it, leaves more.
-const UNLIKE: f64 = 0.02;
+/// from its law leaves a few parts in a hundred; another effect's law, which happens to be like it, leaves more.
+const UNLIKE: f64 = 0.05;
 
 /// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
 const REMAINDER: f64 = 0.005;
@@ -121,22 +122,35 @@ impl Promised {
 
 /// What the held-out windows say of each cause, which are the model's effects in their order; one that does not keep there
 /// what it promised on the fit windows is believed less.
-pub fn promises(held: &Held, problem: &Problem, model: &Model, sigmas: &[f64], causes: &mut [Cause]) -> Vec<Promised> {
-    if causes.len() != model.components.len() {
+pub fn promises(
+    held: &Held,
+    problem: &Problem,
+    model: &Model,
+    chosen: &[Chosen],
+    sigmas: &[f64],
+    causes: &mut [Cause],
+) -> Vec<Promised> {
+    if causes.len() != model.components.len() || chosen.len() != causes.len() {
         // They were withdrawn.
         return Vec::new();
     }
+    let actives: Vec<_> = model
+        .components
+        .iter()
+        .map(|component| component.active.clone())
+        .collect();
     let promised = |(index, cause): (usize, &mut Cause)| {
         let added = problem.added(&model.components, index);
         let open: Vec<_> = added.iter().map(|(channel, _)| problem.still_open(*channel)).collect();
         let promise = held.promise(Claimed {
             added: &added,
             open: &open,
+            slopes: &problem.twin.jacobian(&actives, index),
+            covariance: &chosen[index].covariance,
             after: &model.predicted,
             sigmas,
         })?;
-        // A gain of g nats is an amplitude known to one part in the root of 2 g.
-        let confidence = promise.confidence((2.0 * cause.gain).max(1.0).sqrt().recip());
+        let confidence = promise.confidence();
         let believed = cause.probability;
         cause.probability *= confidence;
         Some(Promised {
@@ -166,7 +180,7 @@ mod tests {
     #[test]
     fn a_small_misfit_of_a_large_effect_is_its_own_and_a_large_one_another_effect() {
         let of_a_large_effect = Belief::of(&left(1e-9), 1e6, &[]);
-        let of_a_small_one = Belief::of(&left(1e-9), 1e3, &[]);
+        let of_a_small_one = Belief::of(&left(1e-9), 3e2, &[]);
         assert!(of_a_large_effect.unknown > 0.99 && of_a_small_one.unknown > 0.99);
         assert!(of_a_large_effect.trust > 0.99, "{}", of_a_large_effect.trust);
         assert!(of_a_small_one.trust < 0.4, "{}", of_a_small_one.trust);
@@ -180,7 +194,7 @@ mod tests {
             Promised {
                 effect: "gyro-scale",
                 promise,
-                confidence: promise.confidence(0.05),
+                confidence: promise.confidence(),
                 believed: 1.0,
                 gain: 60.0,
             }
@@ -194,7 +208,7 @@ mod tests {
         );
         let broken = Belief::of(&left(0.5), 300.0, &[promised(1.0), promised(-0.2)]);
         assert!(
-            broken.unknown > 0.99 && broken.trust < 0.1,
+            broken.unknown > 0.99 && broken.trust < 0.15,
             "{} {}",
             broken.unknown,
             broken.trust

@@ -134,7 +134,14 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut causes = causes_of(&problem, &library, found);
     contribution::settle(&problem, &library, found, &mut causes);
     let keys = second_keys(&problem, &library, model, &mut causes);
-    let promises = promises(&subject.held, &problem, model, &explanation.sigmas, &mut causes);
+    let promises = promises(
+        &subject.held,
+        &problem,
+        model,
+        &found.chosen,
+        &explanation.sigmas,
+        &mut causes,
+    );
     let belief = Belief::of(&left, explanation.energy(&quiet), &promises);
     let scatter = explanation.scatter.as_ref();
     causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
