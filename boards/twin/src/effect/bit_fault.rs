@@ -68,11 +68,7 @@ impl Effect for BitFault {
                     [Some(one), None] | [None, Some(one)] => mass(one),
                     [Some(one), Some(other)] => mixed(0.5, mass(one), mass(other)) + 2.0_f64.ln(),
                 };
-                if fault > IMPOSSIBLE + 1.0 {
-                    fault
-                } else {
-                    view.refuting(residual)
-                }
+                view.explained(fault, residual)
             };
             view.residuals().map(sample).sum()
         };

@@ -34,14 +34,11 @@ impl Effect for CoarseQuantisation {
             let sample = |(k, residual): (usize, f64)| {
                 let code = view.measured[k] / q;
                 if view.channel.bits.is_none() || (code - code.round()).abs() > 0.25 * view.channel.lsb / q {
-                    return view.refuting(residual);
+                    return view.explained(IMPOSSIBLE, residual);
                 }
                 // Rounded, the value was within half a step; cut off, within the step above.
                 let low = if variant > 0.0 { residual - 0.5 * q } else { residual };
-                match view.within(low, low + q) {
-                    mass if mass > IMPOSSIBLE => mass,
-                    _ => view.refuting(residual),
-                }
+                view.explained(view.within(low, low + q), residual)
             };
             view.residuals().map(sample).sum()
         };

@@ -79,10 +79,15 @@ impl View<'_> {
         }
     }
 
-    /// ln probability of a sample that a law calls impossible: what noise makes of it, if that is less. No law gains by samples
-    /// that neither it nor noise explains.
-    pub(super) fn refuting(&self, residual: f64) -> f64 {
-        self.normal(residual, self.channel.sigma()).min(IMPOSSIBLE)
+    /// ln probability of a sample by a law that gives it `mass` [ln]; where the law calls it impossible, what noise makes of it,
+    /// if that is less. No law gains by samples that neither it nor noise explains.
+    pub(super) fn explained(&self, mass: f64, residual: f64) -> f64 {
+        // Of two impossible origins the mixture is as impossible, but for its ln 2.
+        if mass > IMPOSSIBLE + 1.0 {
+            mass
+        } else {
+            self.normal(residual, self.channel.sigma()).min(IMPOSSIBLE)
+        }
     }
 
     /// ln probability of the log of this channel if nothing is wrong.

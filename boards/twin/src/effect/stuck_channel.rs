@@ -1,6 +1,6 @@
 //! A stuck channel: from some instant on it says the same, whatever happens.
 
-use super::spread::View;
+use super::spread::{IMPOSSIBLE, View};
 use super::{Effect, Nature, Page, onsets};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -38,7 +38,7 @@ impl Effect for StuckChannel {
                     .map(|k| view.measured[k]);
                 match before {
                     Some(before) if (view.measured[k] - before).abs() < 0.5 * view.resolution() => 0.0,
-                    Some(before) if before.is_finite() => view.refuting(residual),
+                    Some(before) if before.is_finite() => view.explained(IMPOSSIBLE, residual),
                     // The value it is stuck at may be any: no worse than one in a range of counts.
                     _ if view.t_s[k] >= variant => -(view.span() / view.resolution()).ln(),
                     _ => view.normal(residual, sigma),
