@@ -206,6 +206,17 @@ mod tests {
             kept.unknown,
             kept.trust
         );
+        let hardly_believed = Promised {
+            believed: 0.1,
+            ..promised(-0.2)
+        };
+        let beside = Belief::of(&left(0.5), 300.0, &[promised(1.0), hardly_believed]);
+        assert!(
+            beside.unknown < 0.2 && beside.trust > 0.85,
+            "{} {}",
+            beside.unknown,
+            beside.trust
+        );
         let broken = Belief::of(&left(0.5), 300.0, &[promised(1.0), promised(-0.2)]);
         assert!(
             broken.unknown > 0.99 && broken.trust < 0.15,

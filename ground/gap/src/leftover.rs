@@ -4,7 +4,8 @@
 //! and the aspects of the residual that say otherwise, largest first. What is looked at is in [`aspects`].
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
-//! spread over logs [`simulated`] from the model. The p-value counts how many of those have as large a largest aspect, so it is paid for having looked everywhere.
+//! spread over logs [`simulated`] from the model. The p-value counts how many of those have as large a largest aspect, so it
+//! is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -27,7 +28,8 @@ pub const STRETCHES: usize = 20;
 /// Simulated logs: fewest (p then has a floor of 1/101) and most.
 const SIMULATIONS: [usize; 2] = [100, 200];
 
-/// Mean cube root of an aspect below which the fit takes away whatever is there (a square of noise has 0.8).
+/// Mean cube root of an aspect below which the fit takes away whatever is there, and what is left is rounding (a square of
+/// noise has 0.8).
 const FITTED: f64 = 0.3;
 
 /// Normal numbers drawn in all, so that long logs take bounded time.
@@ -140,8 +142,9 @@ pub fn judge(
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let parameters = unshrunk(joint, &fitted.parameters);
     let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &fitted.parameters, disturb, &mut random))))
+        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &parameters, disturb, &mut random))))
         .collect();
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
@@ -173,6 +176,13 @@ pub fn judge(
         scale: [scale.0, scale.1],
         aspects,
     }
+}
+
+/// The parameters as they were before the prior shrank them, nearly: the fit shrinks what it found once more, and by as much
+/// they were larger.
+fn unshrunk(joint: &Joint, found: &DVector<f64>) -> DVector<f64> {
+    let alone: Vec<DVector<f64>> = joint.columns().map(|columns| &columns.effects * found).collect();
+    found * 2.0 - joint.fit(&alone).parameters
 }
 
 fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {

@@ -35,8 +35,9 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// What it makes of noise: residuals a channel of a log that scatters as described, in place, both in physical units over
-    /// `unit_of` the channel. `predicted` holds every row.
+    /// What it makes of noise: takes the residuals of a log that scatters as described, a vector a channel, and leaves those
+    /// of one with the effect in their place. They count in `unit_of` the channel [physical units]; `predicted` holds every
+    /// row.
     pub fn disturb(
         &self,
         problem: &Problem,

@@ -1,5 +1,6 @@
-//! What the leftover test looks at of each channel: its place in time, what the unit does at each sample, and what a small
-//! rotation would add to it: `d(n.v) = (v x n).delta` for the vector `v` (force, rate or field) a sensor along `n` feels.
+//! What the leftover test looks at of each channel: its place in time, what the unit does at each sample, when its part
+//! converts, and what a small rotation would add to it: `d(n.v) = (v x n).delta` for the vector `v` (force, rate or field) a
+//! sensor along `n` feels.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Feel, Kind};

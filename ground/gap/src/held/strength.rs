@@ -109,6 +109,11 @@ mod tests {
 
     /// The promise of an effect `sin 0.1 k` of a channel whose readings are `measured`, its bias open.
     fn promised(measured: impl Fn(usize) -> f64) -> Promise {
+        promised_by(measured, 0.01)
+    }
+
+    /// The same of an amplitude that was fitted to `fitted_sigma`.
+    fn promised_by(measured: impl Fn(usize) -> f64, fitted_sigma: f64) -> Promise {
         let held = Held::new(vec![Series {
             rows: (0..SAMPLES as u32).collect(),
             values: (0..SAMPLES).map(measured).collect(),
@@ -116,7 +121,6 @@ mod tests {
         let added = [(0, (0..SAMPLES).map(|row| sine(row, 0.1)).collect())];
         let open = [DMatrix::from_element(1, SAMPLES, 100.0)];
         let after = [(0..SAMPLES).map(|row| sine(row, 0.1)).collect()];
-        // Known to a hundredth of what it is.
         let slopes = [Column {
             name: "amplitude".into(),
             sigma: 1.0,
@@ -126,7 +130,7 @@ mod tests {
             added: &added,
             open: &open,
             slopes: &slopes,
-            covariance: &DMatrix::from_element(1, 1, 1e-4),
+            covariance: &DMatrix::from_element(1, 1, fitted_sigma * fitted_sigma),
             after: &after,
             sigmas: &[0.1],
         };
@@ -147,6 +151,15 @@ mod tests {
     fn what_the_calibration_leaves_open_breaks_no_promise() {
         let biased = promised(|row| sine(row, 0.1) + 3.0);
         assert!(biased.confidence() > 0.99, "{biased:?}");
+    }
+
+    #[test]
+    fn an_amplitude_that_is_hardly_known_may_be_another_here() {
+        let half = |row: usize| 0.5 * sine(row, 0.1) + 0.1 * sine(row, 1.7);
+        let (known, hardly_known) = (promised_by(half, 0.01), promised_by(half, 0.25));
+        assert!(known.confidence() < 1e-6, "{known:?}");
+        assert!(hardly_known.confidence() > 0.3, "{hardly_known:?}");
+        assert!((known.factor - hardly_known.factor).abs() < 1e-12);
     }
 
     #[test]

@@ -7,8 +7,9 @@
 //! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); heavy tails; the size
 //! of the fitted calibration, without which an unknown effect hides in the calibration; steps between levels of one
 //! quantity, which a wrong law leaves. Of all channels together: the energy of a stretch of time; the same vector in all
-//! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose mount or a reference that slips leaves and no
-//! single channel shows. Of a named effect: whether it is as strong everywhere as its law says ([`super::strength`]).
+//! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
+//! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
+//! as its law says ([`super::strength`]).
 
 use nalgebra::{DMatrix, Vector1};
 
@@ -29,7 +30,7 @@ const CUT: f64 = 3.0;
 /// the energy; here it would only make the simulated logs' own few hide everyone else's.
 const FAR: f64 = 5.0;
 
-/// Stretches in which vectors and rotations common to sensors are sought: of seconds, and of a minute.
+/// Stretches in which vectors, factors and rotations common to sensors are sought: of seconds, and of a minute.
 const COMMON: [usize; 2] = [60, 12];
 
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];

@@ -1,10 +1,10 @@
 //! Logs simulated from a model: same motion, same holes, everything drawn that the model leaves to chance.
 //!
-//! In: the finished model's columns ([`Joint`]), the parameters it found, and what its effect on the scatter, if it names
-//! one, makes of noise. Out: residuals a channel, in units of noise. The effects are in as large as they were found, so that
-//! what the prior takes off a large one is left over here too. Drawn are the calibration from its sigmas; white noise with the tails of a
-//! Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian; and the clocks of the parts, by which a
-//! reading is older or younger than described in a saw-tooth over samples.
+//! In: the finished model's columns ([`Joint`]), its parameters, and what its effect on the scatter, if it names one, makes of
+//! noise. Out: residuals a channel, in units of noise. The effects are in as large as they are, so that what the prior takes
+//! off a large one is left over here too. Drawn are the calibration from its sigmas; white noise with
+//! the tails of a Student law of ten degrees of freedom, for no sensor's noise is quite Gaussian; and the clocks of the
+//! parts, by which a reading is older or younger than described in a saw-tooth over samples.
 
 use nalgebra::DVector;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
