@@ -3,7 +3,7 @@
 //! In: the fit windows' residual with the calibration refitted and no effect in ([`Model`]), and what the unit does at each
 //! row. Out: a [`Place`]: shares of the excess (energy above noise and calibration) by channel, plate and octave, each
 //! adding up to one; by regime as LMG shares of the energy from row to row ([`crate::shapley`]); the cells that stand out
-//! ([`cells`]); and when the gap is there ([`passage`]).
+//! ([`cells`]); and when the gap is there ([`passage`]). What an effect strains the calibration by counts as its channel's.
 //!
 //! What noise and calibration leave is simulated on the case's own motion and holes, so a share is of what is above that.
 
@@ -17,7 +17,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use self::{cells::Cell, octaves::Octave, passage::Passage};
-use crate::{joint::Joint, model::Model, problem::Problem};
+use crate::{
+    joint::{Fitted, Joint},
+    model::Model,
+    problem::Problem,
+};
 
 /// Logs simulated: their mean is known to a tenth of the spread, and their spread to a fourteenth.
 const SIMULATIONS: usize = 100;
@@ -49,7 +53,7 @@ pub struct Place {
 
 /// What is looked at of the residuals of one log, real or simulated: sums of squares.
 pub(crate) struct Sums {
-    /// By channel.
+    /// By channel, with the strain of its calibration: that is where an effect shows which the calibration takes up.
     channels: Vec<f64>,
     /// By channel and octave.
     octaves: Vec<Vec<f64>>,
@@ -64,17 +68,23 @@ pub fn locate(problem: &Problem, quiet: &Model) -> Place {
     let scales: Vec<f64> = (problem.frames.iter().zip(&problem.sigmas))
         .map(|(frame, sigma)| frame.weight_sigma / sigma)
         .collect();
-    let sums = |rests: &[DVector<f64>]| Sums {
-        channels: rests.iter().map(DVector::norm_squared).collect(),
-        octaves: rests.iter().map(|rest| octaves::energies(rest.as_slice())).collect(),
-        cells: layout.sums(rests),
+    let sums = |fitted: &Fitted| Sums {
+        channels: (fitted.rest.iter().zip(&fitted.nuisance))
+            .map(|(rest, open)| rest.norm_squared() + open.norm_squared())
+            .collect(),
+        octaves: fitted
+            .rest
+            .iter()
+            .map(|rest| octaves::energies(rest.as_slice()))
+            .collect(),
+        cells: layout.sums(&fitted.rest),
     };
-    let observed = sums(&quiet.fitted.rest);
+    let observed = sums(&quiet.fitted);
     let samples: usize = problem.frames.iter().map(|frame| frame.series.rows.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(LEAST_SIMULATIONS, SIMULATIONS);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Sums> = (0..count)
-        .map(|_| sums(&quiet.joint.fit(&simulate(&quiet.joint, &mut random)).rest))
+        .map(|_| sums(&quiet.joint.fit(&simulate(&quiet.joint, &mut random))))
         .collect();
     let mean = |of: &dyn Fn(&Sums) -> f64| simulated.iter().map(of).sum::<f64>() / count as f64;
     let excess: Vec<f64> = (observed.channels.iter().enumerate())

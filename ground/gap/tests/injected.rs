@@ -276,3 +276,28 @@ fn a_reading_that_is_late_by_less_than_its_instant_is_known_is_no_effect() {
         assert!(known > 0.9 && unknown < 0.5, "{known} {unknown}");
     }
 }
+
+/// Rewrites the cells of measured.csv below its header, given where their row begins.
+fn rewritten(folder: TempDir, change: impl Fn(&mut [String])) -> TempDir {
+    let path = folder.path().join("measured.csv");
+    let text = fs::read_to_string(&path).expect("a file");
+    let (header, rows) = text.split_once('\n').expect("a header");
+    let mut changed = header.to_owned();
+    for row in rows.lines() {
+        let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+        change(&mut cells);
+        changed += &format!("\n{}", cells.join(","));
+    }
+    fs::write(&path, changed + "\n").expect("a file");
+    folder
+}
+
+#[test]
+fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
+    let folder = rewritten(case(|_| 0.02), |cells| cells[2].clear());
+    let (subject, diagnosis) = diagnosed_in(&folder);
+    let cause = diagnosis.causes.first().expect("a cause");
+    assert_eq!(subject.names(cause.channels.iter().copied()), ["gz"]);
+    let screen = terminal::screen(&subject, &diagnosis, "");
+    assert!(screen.contains("WHERE   gz 100 %"), "{screen}");
+}
