@@ -98,7 +98,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             &model.joint,
             &model.fitted,
             &suspects(&problem, model),
-            disturb.as_ref().map(|disturb| disturb as leftover::Disturb),
+            (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| leftover::Disturb {
+                channels: &scatter.channels,
+                of,
+            }),
         )
     };
 

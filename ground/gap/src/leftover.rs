@@ -16,6 +16,7 @@ mod aspects;
 mod common;
 mod shapes;
 mod simulated;
+mod spectrum;
 mod strength;
 use aspects::Sights;
 use simulated::simulate;
@@ -75,7 +76,7 @@ pub struct Aspect {
     pub what: String,
     /// The channel it belongs to, where there is one.
     pub channel: Option<usize>,
-    /// Standard deviations above what the model leaves.
+    /// Standard deviations above what the model leaves, or on either side of what an effect on the scatter claims.
     pub size: f64,
 }
 
@@ -137,7 +138,7 @@ pub fn judge(
     suspects: &[Suspect],
     disturb: Option<Disturb>,
 ) -> Leftover {
-    let sights = Sights::new(views, suspects);
+    let sights = Sights::new(views, suspects, disturb.map_or(&[], |disturb| disturb.channels));
     let observed = sights.sums(fitted);
     let samples: usize = views.iter().map(|view| view.phase.len()).sum();
     let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
@@ -152,21 +153,25 @@ pub fn judge(
     let spreads: Vec<(f64, f64)> = (0..observed.len())
         .map(|at| moments(simulated.iter().map(|run| run[at])))
         .collect();
+    let labels = sights.labels();
     let sizes = |run: &[f64]| -> Vec<f64> {
-        run.iter()
-            .zip(&spreads)
-            .map(|(value, (mean, spread))| if *mean > FITTED { (value - mean) / spread } else { 0.0 })
+        (run.iter().zip(&spreads).zip(&labels))
+            .map(|((value, (mean, spread)), label)| {
+                let size = if *mean > FITTED { (value - mean) / spread } else { 0.0 };
+                if label.is_claimed { size.abs() } else { size }
+            })
             .collect()
     };
     let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
     let scale = moments(simulated.iter().map(|run| largest(run)));
     let beyond = simulated.iter().filter(|run| largest(run) >= seen).count();
-    let mut aspects: Vec<Aspect> = sights
-        .labels()
-        .into_iter()
-        .zip(sizes(&observed))
-        .map(|((what, channel), size)| Aspect { what, channel, size })
+    let mut aspects: Vec<Aspect> = (labels.iter().zip(sizes(&observed)))
+        .map(|(label, size)| Aspect {
+            what: label.what.clone(),
+            channel: label.channel,
+            size,
+        })
         .filter(|aspect| aspect.size > 3.0)
         .collect();
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));

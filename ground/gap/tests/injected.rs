@@ -301,3 +301,23 @@ fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     let screen = terminal::screen(&subject, &diagnosis, "");
     assert!(screen.contains("WHERE   gz 100 %"), "{screen}");
 }
+
+#[test]
+fn a_tone_is_not_called_a_walk_of_the_zero() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut zero = 0.0;
+    let walk: Vec<f64> = (0..SECONDS * RATE_HZ)
+        .map(|_| {
+            let step: f64 = StandardNormal.sample(&mut random);
+            zero += 0.1 * NOISE * step;
+            zero
+        })
+        .collect();
+    let walked = diagnosed_in(&erring(|t_s| walk[(t_s * RATE_HZ as f64).round() as usize], "")).1;
+    assert_eq!(walked.causes.first().expect("a cause").effect, "gyro-bias-walk");
+    assert!(walked.none_of_these < 0.1, "{}", walked.none_of_these);
+    let tone = |t_s: f64| 2.0 * NOISE * (std::f64::consts::TAU * t_s / 17.0).sin();
+    let hummed = diagnosed_in(&erring(tone, "")).1;
+    assert!(hummed.causes.is_empty(), "{:?}", hummed.causes);
+    assert!(hummed.none_of_these > 0.9, "{}", hummed.none_of_these);
+}

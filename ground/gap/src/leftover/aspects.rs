@@ -4,12 +4,13 @@
 //! name. A test that looks at many shapes at once sees none of them well, so each suspicion has a sum of its own. Of a
 //! channel, and of all channels of a kind together, for what is small in each of twelve is large in all: its energy; slow
 //! shapes in time; shapes in time and motion together ([`super::shapes`]); the motion itself; neighbouring samples alike
-//! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); heavy tails; the size
+//! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone ([`super::spectrum`]); heavy tails; the size
 //! of the fitted calibration, without which an unknown effect hides in the calibration; steps between levels of one
 //! quantity, which a wrong law leaves. Of all channels together: the energy of a stretch of time; the same vector in all
 //! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
 //! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
-//! as its law says ([`super::strength`]).
+//! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
+//! it claims, no more and no less.
 
 use nalgebra::{DMatrix, Vector1};
 
@@ -17,8 +18,10 @@ use super::{
     Fitted, LEVELLED, LEVELS, STRETCHES, Suspect, View,
     common::Common,
     shapes::{BINS, Shapes},
+    spectrum::Spectrum,
     strength::Strength,
 };
+use crate::place::octaves;
 
 /// Lags of the whiteness tests.
 const LAGS: usize = 10;
@@ -36,13 +39,14 @@ const COMMON: [usize; 2] = [60, 12];
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
 
 /// What is looked at in each channel, before the levels.
-const OF_CHANNEL: [&str; 8] = [
+const OF_CHANNEL: [&str; 9] = [
     "more energy than noise",
     "a slow shape in time",
     "a shape in time or motion",
     "goes with the motion",
     "neighbouring samples alike",
     "noise that comes and goes",
+    "a tone",
     "outliers",
     "a calibration beyond its sigmas",
 ];
@@ -50,10 +54,24 @@ const OF_CHANNEL: [&str; 8] = [
 /// Of them all, levels included.
 const EACH: usize = OF_CHANNEL.len() + LEVELLED.len();
 
+/// What a sum is of.
+#[derive(Clone, Debug)]
+pub struct Label {
+    /// In words.
+    pub what: String,
+    /// The channel it belongs to, where there is one.
+    pub channel: Option<usize>,
+    /// Whether a named effect claims as much: then less speaks against it too.
+    pub is_claimed: bool,
+}
+
 /// The views made ready for sums.
 pub struct Sights<'a> {
     views: &'a [View],
+    /// The channels that an effect on the scatter is in.
+    scattered: &'a [usize],
     shapes: Vec<Shapes>,
+    spectra: Vec<Spectrum>,
     vectors: Vec<Vec<Common<3>>>,
     factors: Vec<Vec<Common<1>>>,
     turns: Vec<Common<3>>,
@@ -61,8 +79,8 @@ pub struct Sights<'a> {
 }
 
 impl<'a> Sights<'a> {
-    /// Of all channels, and of the effects that a model names.
-    pub fn new(views: &'a [View], suspects: &[Suspect]) -> Self {
+    /// Of all channels, and of the effects that a model names: on readings, and on the scatter of some channels.
+    pub fn new(views: &'a [View], suspects: &[Suspect], scattered: &'a [usize]) -> Self {
         let vector = |kind: usize, stretches: usize| {
             Common::new(
                 views,
@@ -78,7 +96,9 @@ impl<'a> Sights<'a> {
         let turned = |view: &View, row: usize| view.turned.fixed_view::<1, 3>(row, 0).transpose();
         Sights {
             views,
+            scattered,
             shapes: views.iter().map(Shapes::new).collect(),
+            spectra: views.iter().map(|view| Spectrum::new(view.phase.len())).collect(),
             vectors: (0..kinds(views))
                 .map(|kind| COMMON.map(|stretches| vector(kind, stretches)).into())
                 .collect(),
@@ -96,7 +116,7 @@ impl<'a> Sights<'a> {
     }
 
     /// What each entry of [`Sights::sums`] is.
-    pub fn labels(&self) -> Vec<(String, Option<usize>)> {
+    pub fn labels(&self) -> Vec<Label> {
         let mut labels = Vec::new();
         let each = |name: &str| -> Vec<String> {
             let of_channel = OF_CHANNEL.iter().map(|what| format!("{name}: {what}"));
@@ -104,7 +124,11 @@ impl<'a> Sights<'a> {
             of_channel.chain(levelled).collect()
         };
         for (index, view) in self.views.iter().enumerate() {
-            labels.extend(each(&view.name).into_iter().map(|what| (what, Some(index))));
+            labels.extend(each(&view.name).into_iter().map(|what| Label {
+                what,
+                channel: Some(index),
+                is_claimed: false,
+            }));
         }
         let mut of_all = Vec::new();
         for kind in 0..kinds(self.views) {
@@ -117,7 +141,22 @@ impl<'a> Sights<'a> {
         }
         of_all.extend(COMMON.map(|stretches| format!("all sensors: a common rotation in stretches of 1/{stretches}")));
         of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
-        labels.extend(of_all.into_iter().map(|what| (what, None)));
+        labels.extend(of_all.into_iter().map(|what| Label {
+            what,
+            channel: None,
+            is_claimed: false,
+        }));
+        for channel in self.scattered {
+            let view = &self.views[*channel];
+            labels.extend(waves(view.phase.len()).into_iter().map(|length| Label {
+                what: format!(
+                    "{}: waves of {length} samples have not the energy that is claimed",
+                    view.name
+                ),
+                channel: Some(*channel),
+                is_claimed: true,
+            }));
+        }
         labels
     }
 
@@ -140,6 +179,7 @@ impl<'a> Sights<'a> {
                 along.motion,
                 alike(values),
                 alike(&squares(values)),
+                self.spectra[index].line(values),
                 values.iter().map(|value| value.clamp(-FAR, FAR).powi(4)).sum(),
                 fitted.nuisance[index].norm_squared(),
             ];
@@ -160,6 +200,9 @@ impl<'a> Sights<'a> {
         }
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
+        for channel in self.scattered {
+            sums.extend(octaves::energies(fitted.rest[*channel].as_slice()));
+        }
         sums
     }
 }
@@ -167,6 +210,16 @@ impl<'a> Sights<'a> {
 /// Number of kinds in the views.
 fn kinds(views: &[View]) -> usize {
     views.iter().map(|view| view.kind + 1).max().unwrap_or(0)
+}
+
+/// How long the waves are, in samples, of each of the [`octaves`] of so long a series.
+fn waves(count: usize) -> Vec<String> {
+    let octaves = octaves::energies(&vec![0.0; count]).len();
+    let length = |octave: usize| match 1 << (octave + 1) {
+        shortest if octave + 1 == octaves => format!("{shortest} or more"),
+        shortest => format!("{shortest} to {}", 2 * shortest),
+    };
+    (0..octaves).map(length).collect()
 }
 
 /// In which of so many equal parts of the log.

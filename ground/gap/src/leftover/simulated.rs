@@ -37,8 +37,14 @@ pub struct Clock {
     pub slopes: Vec<f64>,
 }
 
-/// What a model's effect on the scatter makes of noise, given as residuals a channel in units of noise; drawn from a seed.
-pub type Disturb<'a> = &'a dyn Fn(&mut [DVector<f64>], u64);
+/// A model's effect on the scatter.
+#[derive(Clone, Copy)]
+pub struct Disturb<'a> {
+    /// The channels it is in.
+    pub channels: &'a [usize],
+    /// What it makes of noise, given as residuals a channel in units of noise; drawn from a seed.
+    pub of: &'a dyn Fn(&mut [DVector<f64>], u64),
+}
 
 /// One log.
 pub fn simulate(
@@ -61,7 +67,7 @@ pub fn simulate(
         }));
     }
     if let Some(disturb) = disturb {
-        disturb(&mut residuals, random.next_u64());
+        (disturb.of)(&mut residuals, random.next_u64());
     }
     for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
         let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
