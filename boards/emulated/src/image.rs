@@ -11,7 +11,7 @@ use std::{
 use defmt_decoder::Table;
 use rigless::symbols::Symbols;
 
-pub use crate::toolchain::build;
+pub use crate::toolchain::{build, build_package};
 
 /// ELF32, little endian, `e_machine` EM_ARM (ELF specification, header; ELF for the Arm architecture 5.2).
 const ELF_MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];

@@ -22,13 +22,23 @@ const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 ///
 /// [`ImageError::Compile`], or [`ImageError::NoCompiler`] with what was tried.
 pub fn build() -> Result<Image, ImageError> {
+    build_package("emems")
+}
+
+/// The same of another package with a binary of its own name; its opt-level is that of the release profile or of
+/// `CARGO_PROFILE_RELEASE_OPT_LEVEL`.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_package(package: &str) -> Result<Image, ImageError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = root.canonicalize().map_err(|error| ImageError::Read(root, error))?;
     let target_dir = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let mut tried = Vec::new();
     if has_target(&mut tried) {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        return compile(Command::new(cargo), &root, &target_dir);
+        return compile(Command::new(cargo), package, &root, &target_dir);
     }
     if debian(&root, &mut tried) {
         let mut cargo = Command::new(DEBIAN_CARGO);
@@ -38,15 +48,15 @@ pub fn build() -> Result<Image, ImageError> {
             // Debian's compiler is a stable one; -Zbuild-std is what makes it serve a target it ships no core for.
             .env("RUSTC_BOOTSTRAP", "1")
             .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
-        return compile(cargo, &root, &target_dir.join("debian"));
+        return compile(cargo, package, &root, &target_dir.join("debian"));
     }
     Err(ImageError::NoCompiler(tried))
 }
 
 /// Runs `cargo build --release` for the board and reads what it leaves.
-fn compile(mut cargo: Command, root: &Path, target_dir: &Path) -> Result<Image, ImageError> {
+fn compile(mut cargo: Command, package: &str, root: &Path, target_dir: &Path) -> Result<Image, ImageError> {
     cargo
-        .args(["build", "--release", "--ignore-rust-version", "--package", "emems"])
+        .args(["build", "--release", "--ignore-rust-version", "--package", package])
         .args(["--target", TARGET, "--target-dir"])
         .arg(target_dir)
         // The default of build.rs; unset, so that a plain `cargo build --release` leaves the same image.
@@ -54,7 +64,7 @@ fn compile(mut cargo: Command, root: &Path, target_dir: &Path) -> Result<Image, 
         .current_dir(root)
         .stdin(Stdio::null());
     match cargo.status() {
-        Ok(status) if status.success() => Image::read(&target_dir.join(TARGET).join("release/emems")),
+        Ok(status) if status.success() => Image::read(&target_dir.join(TARGET).join("release").join(package)),
         Ok(_) => Err(ImageError::Compile),
         Err(error) => Err(ImageError::NoCompiler(vec![format!("cargo does not start: {error}")])),
     }
