@@ -2,7 +2,8 @@
 //!
 //! In: ring and seed. Out: `CASE/{case.toml, unit.toml, measured.txt.gz, motion.csv.gz}` after the case format, and
 //! the [`Answer`]. The unit is flown twice at the same noise, with and without what is wrong, to learn how strong that
-//! is; the strength is then set so that the marginal signal to noise ratio is what the draw asked for.
+//! is; the strength is then set so that the marginal signal to noise ratio is what the draw asked for, unless no part is
+//! so bad.
 
 use std::{
     fmt::Write as _,
@@ -43,6 +44,9 @@ const SNR: (f64, f64) = (8.0, 100.0);
 
 /// Where a disturbance's size is measured: far above the rounding of codes.
 const LARGE_SNR: f64 = 400.0;
+
+/// Largest strength of what has a name, in typical sizes: no part of its kind is worse, and the priors of a diagnosis say so.
+const LARGEST: f64 = 5.0;
 
 /// What is wrong with a case, by how much is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -106,19 +110,27 @@ pub fn deal(folder: &Path, name: &str, ring: Ring, seed: u64) -> Result<Answer, 
         }
     };
     let quiet = fly(&[]);
-    let snr = |flown: &Flown| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, FIT_S);
+    let snr = |flown: &Flown, random| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, FIT_S, random);
     let mut sizes = draw.stream(9);
     let mut strengths = Vec::new();
     let mut energy = 0.0;
     for (index, disturbance) in chosen.iter().enumerate() {
         let wanted = sizes.log_uniform(SNR.0, SNR.1);
+        let at = |strength: f64| snr(&fly(&[(index, strength)]), disturbance.random);
+        // The ratio of a variance goes with the square of its strength.
+        let power = if disturbance.random { 0.5 } else { 1.0 };
         let (strength, reached) = match disturbance.graded {
-            false => (1.0, snr(&fly(&[(index, 1.0)]))),
+            false => (1.0, at(1.0)),
             true => {
                 // Near the size of a count, rounding adds to the difference of two flights: measured where it does not
                 // matter and scaled down.
-                let gross = (LARGE_SNR / snr(&fly(&[(index, 1.0)])).max(0.1)).clamp(0.1, 100.0);
-                (wanted * gross / snr(&fly(&[(index, gross)])).max(0.1), wanted)
+                let gross = (LARGE_SNR / at(1.0).max(0.1)).powf(power).clamp(0.1, 100.0);
+                let strength = gross * (wanted / at(gross).max(0.1)).powf(power);
+                let largest = if ring == Ring::R3 { f64::INFINITY } else { LARGEST };
+                match strength <= largest {
+                    true => (strength, wanted),
+                    false => (largest, wanted * (largest / strength).powf(1.0 / power)),
+                }
             }
         };
         energy += reached * reached;
@@ -278,11 +290,13 @@ mod tests {
             }
         };
         let quiet = fly(None);
-        let snr = |flown: &Flown| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, LONG_S);
-        assert!(snr(&quiet) < 1e-6);
+        let snr =
+            |flown: &Flown, random| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, LONG_S, random);
+        assert!(snr(&quiet, false) < 1e-6);
         for disturbance in [disturbance::named(), novel::ALL.to_vec()].concat() {
             let flown = fly(Some(disturbance));
-            assert!(snr(&flown) > 5.0, "{}: {}", disturbance.name, snr(&flown));
+            let snr = snr(&flown, disturbance.random);
+            assert!(snr > 5.0, "{}: {snr}", disturbance.name);
             let touched = &flown.touched[0];
             for (index, channel) in CHANNELS
                 .iter()

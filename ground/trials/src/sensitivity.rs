@@ -4,6 +4,9 @@
 //! environment. Out: the marginal signal to noise ratio, sqrt(d' (I + N L N')^-1 d) over standardised differences d of
 //! "measured minus what the record says", where N holds for each channel a bias, a scale, two axis errors and the instant of
 //! sampling with the sigmas of the unit's description: the measure in which the diagnosis' targets are stated.
+//!
+//! What is random from sample to sample has no shape that could be matched, only a variance: of it the ratio is that of the
+//! best test of a variance, sqrt(sum of E^2 / 2n) over stretches of n samples whose energy is E.
 
 use emems::sample::Reading;
 use nalgebra::{DMatrix, DVector, Vector3, Vector5};
@@ -29,65 +32,101 @@ pub struct Told<'a> {
     pub claimed: &'a Environment,
 }
 
-/// Over packets whose time is below `until_s`.
-pub fn marginal_snr(disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64) -> f64 {
+/// Samples of a stretch in which a variance is taken as one: four seconds.
+const STRETCH: usize = 20;
+
+/// Over packets whose time is below `until_s`; `random` if it is so from sample to sample.
+pub fn marginal_snr(disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64, random: bool) -> f64 {
     let energy: f64 = (0..CHANNEL_COUNT)
-        .map(|index| channel_energy(index, disturbed, undisturbed, instants, until_s))
+        .filter_map(|index| Differences::of(index, disturbed, undisturbed, instants, until_s))
+        .map(|differences| {
+            if random {
+                differences.in_variance()
+            } else {
+                differences.in_shape()
+            }
+        })
         .sum();
     energy.max(0.0).sqrt()
 }
 
-fn channel_energy(index: usize, disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64) -> f64 {
-    let channel = CHANNELS[index];
-    let facts = kind(channel.quantity);
-    let (lsb, _) = channel.quantity.scale();
-    let sigma = (facts.noise * facts.noise + lsb * lsb / 12.0).sqrt();
-    let Some(axis_b) = axis_b(channel) else {
-        return 0.0;
-    };
-    let aside = if axis_b.x.abs() < 0.9 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
-    let across = axis_b.cross(&aside).normalize();
-    let code = |reading: &Reading| channel::counts(reading)[index].map(f64::from);
-    let same_packet = |reading: &Reading| {
-        let first = undisturbed.readings.first()?.counter;
-        undisturbed
-            .readings
-            .get(usize::from(reading.counter.checked_sub(first)?))
-    };
-    let (mut rows, mut differences) = (Vec::new(), Vec::new());
-    for reading in disturbed.readings {
-        let time_s = CYCLE_S * f64::from(reading.counter);
-        if time_s >= until_s {
-            break;
-        }
-        let Some((code, quiet)) = code(reading).zip(same_packet(reading).and_then(code)) else {
-            continue;
-        };
-        let at_s = instants.zero_s + time_s + instants.slots_s[index];
-        let [felt, told] = [undisturbed, disturbed].map(|told| felt(told, channel, at_s));
-        differences.push(((code - quiet) * lsb - axis_b.dot(&(told - felt))) / sigma);
-        let [earlier, later] = [-STEP_S, STEP_S].map(|step_s| self::felt(undisturbed, channel, at_s + step_s));
-        rows.push(
-            Vector5::new(
-                facts.bias,
-                facts.scale * axis_b.dot(&felt),
-                facts.axis_rad * across.dot(&felt),
-                facts.axis_rad * axis_b.cross(&across).dot(&felt),
-                facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S),
-            ) / sigma,
-        );
+/// What a disturbance changes in a channel, in units of noise.
+struct Differences {
+    difference: DVector<f64>,
+    /// What calibration errors may do, times their sigmas.
+    nuisance: DMatrix<f64>,
+}
+
+impl Differences {
+    fn in_shape(&self) -> f64 {
+        // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
+        let seen = self.nuisance.tr_mul(&self.difference);
+        let inner = self.nuisance.tr_mul(&self.nuisance) + DMatrix::identity(5, 5);
+        let imitated = inner.cholesky().map_or(0.0, |inner| seen.dot(&inner.solve(&seen)));
+        self.difference.norm_squared() - imitated
     }
-    let nuisance = DMatrix::from_fn(rows.len(), 5, |row, column| rows[row][column]);
-    let difference = DVector::from_vec(differences);
-    // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
-    let seen = nuisance.tr_mul(&difference);
-    let inner = nuisance.tr_mul(&nuisance) + DMatrix::identity(5, 5);
-    let imitated = inner.cholesky().map_or(0.0, |inner| seen.dot(&inner.solve(&seen)));
-    difference.norm_squared() - imitated
+
+    fn in_variance(&self) -> f64 {
+        let stretches = self.difference.as_slice().chunks(STRETCH);
+        let of_stretch = |values: &[f64]| {
+            let (count, energy) = (
+                values.len() as f64,
+                values.iter().map(|value| value * value).sum::<f64>(),
+            );
+            // The square of a sum of n squares of a Gaussian is too large by 2/n.
+            energy * energy / (2.0 * count) / (1.0 + 2.0 / count)
+        };
+        stretches.map(of_stretch).sum()
+    }
+
+    /// `None` for a channel without an axis.
+    fn of(index: usize, disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64) -> Option<Self> {
+        let channel = CHANNELS[index];
+        let facts = kind(channel.quantity);
+        let (lsb, _) = channel.quantity.scale();
+        let sigma = (facts.noise * facts.noise + lsb * lsb / 12.0).sqrt();
+        let axis_b = axis_b(channel)?;
+        let aside = if axis_b.x.abs() < 0.9 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let across = axis_b.cross(&aside).normalize();
+        let code = |reading: &Reading| channel::counts(reading)[index].map(f64::from);
+        let same_packet = |reading: &Reading| {
+            let first = undisturbed.readings.first()?.counter;
+            undisturbed
+                .readings
+                .get(usize::from(reading.counter.checked_sub(first)?))
+        };
+        let (mut rows, mut differences) = (Vec::new(), Vec::new());
+        for reading in disturbed.readings {
+            let time_s = CYCLE_S * f64::from(reading.counter);
+            if time_s >= until_s {
+                break;
+            }
+            let Some((code, quiet)) = code(reading).zip(same_packet(reading).and_then(code)) else {
+                continue;
+            };
+            let at_s = instants.zero_s + time_s + instants.slots_s[index];
+            let [felt, told] = [undisturbed, disturbed].map(|told| felt(told, channel, at_s));
+            differences.push(((code - quiet) * lsb - axis_b.dot(&(told - felt))) / sigma);
+            let [earlier, later] = [-STEP_S, STEP_S].map(|step_s| self::felt(undisturbed, channel, at_s + step_s));
+            rows.push(
+                Vector5::new(
+                    facts.bias,
+                    facts.scale * axis_b.dot(&felt),
+                    facts.axis_rad * across.dot(&felt),
+                    facts.axis_rad * axis_b.cross(&across).dot(&felt),
+                    facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S),
+                ) / sigma,
+            );
+        }
+        Some(Differences {
+            nuisance: DMatrix::from_fn(rows.len(), 5, |row, column| rows[row][column]),
+            difference: DVector::from_vec(differences),
+        })
+    }
 }
 
 /// What an ideal part of this channel's kind would feel at its place, in b, if record and environment are right.
@@ -119,7 +158,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::flight::instants;
+    use crate::{draw::Draw, flight::instants};
 
     fn told<'a>(readings: &'a [Reading], record: &'a Record, claimed: &'a Environment) -> Told<'a> {
         Told {
@@ -150,6 +189,7 @@ mod tests {
                 &told(&quiet, &still, &site),
                 &instants,
                 80.0,
+                false,
             )
         };
         // One count is 0.85 of a calibration's sigma and 0.37 of the noise's: over 400 packets 7.4 sigmas in all.
@@ -181,8 +221,31 @@ mod tests {
             &told(&readings, &still, &site),
             &instants,
             80.0,
+            false,
         );
         // Four plates feel 9.8 m/s2 * 0.01 rad * sin in all: rms 0.069 over 0.0458 noise, 400 packets, four plates.
         assert!((snr - 60.0).abs() < 6.0, "{snr}");
+    }
+
+    #[test]
+    fn louder_noise_is_as_plain_as_the_best_test_of_a_variance_finds_it() {
+        // A variance of 0.3 beside one, 1500 samples: the energy of all of them lies 450 above the 1500 it should be, give or
+        // take sqrt(3000).
+        let mut random = Draw::new(5);
+        let difference = DVector::from_fn(1500, |_, _| 0.3f64.sqrt() * random.normal());
+        let snr = |difference: DVector<f64>| {
+            let nuisance = DMatrix::zeros(difference.len(), 5);
+            Differences { difference, nuisance }.in_variance().sqrt()
+        };
+        assert!((snr(difference.clone()) - 450.0 / 3000f64.sqrt()).abs() < 1.0);
+        // All of it in a tenth of the time is plainer by the root of ten.
+        let bursts = DVector::from_fn(1500, |row, _| {
+            if row % 200 < 20 {
+                10f64.sqrt() * difference[row]
+            } else {
+                0.0
+            }
+        });
+        assert!((snr(bursts) / snr(difference) - 10f64.sqrt()).abs() < 0.5);
     }
 }

@@ -25,6 +25,8 @@ pub struct Disturbance {
     pub warm: bool,
     /// Whether its size is a strength; if not it is there or not.
     pub graded: bool,
+    /// Whether it is random from sample to sample: its variance goes with the square of its strength.
+    pub random: bool,
     /// Disturbs; says which channels it touches (indices into [`CHANNELS`]).
     pub apply: fn(&mut Scene, &mut Draw, f64) -> Vec<usize>,
 }
@@ -34,6 +36,7 @@ const fn graded(name: &'static str, apply: fn(&mut Scene, &mut Draw, f64) -> Vec
         name,
         warm: false,
         graded: true,
+        random: false,
         apply,
     }
 }
@@ -41,6 +44,13 @@ const fn graded(name: &'static str, apply: fn(&mut Scene, &mut Draw, f64) -> Vec
 const fn warm(name: &'static str, apply: fn(&mut Scene, &mut Draw, f64) -> Vec<usize>) -> Disturbance {
     Disturbance {
         warm: true,
+        ..graded(name, apply)
+    }
+}
+
+const fn random(name: &'static str, apply: fn(&mut Scene, &mut Draw, f64) -> Vec<usize>) -> Disturbance {
+    Disturbance {
+        random: true,
         ..graded(name, apply)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use packets::channel::Quantity::{Field, Rate, SpecificForce};
 use twin::part::signal::Noise;
 
-use super::{ALL_PLATES, Disturbance, channels, graded};
+use super::{ALL_PLATES, Disturbance, channels, graded, random};
 use crate::{
     draw::Draw,
     scene::{Scene, changed},
@@ -15,7 +15,7 @@ use crate::{
 pub const ALL: &[Disturbance] = &[
     graded("cross-talk", cross_talk),
     graded("slow-tone", slow_tone),
-    graded("noise-bursts", noise_bursts),
+    random("noise-bursts", noise_bursts),
     graded("sticking-mount", sticking_mount),
     graded("supply-ramp", supply_ramp),
     graded("sun-heating", sun_heating),

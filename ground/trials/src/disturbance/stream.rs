@@ -8,7 +8,7 @@ use packets::channel::{
 };
 use twin::part::signal::Noise;
 
-use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving, plates};
+use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving, plates, random};
 use crate::{
     draw::Draw,
     scene::{Scene, changed, shifted},
@@ -16,10 +16,10 @@ use crate::{
 
 /// All of this file.
 pub const ALL: &[Disturbance] = &[
-    graded("noise-level", noise_level),
+    random("noise-level", noise_level),
     graded("vibration", vibration),
     graded("shock", shock),
-    graded("sampling-jitter", sampling_jitter),
+    random("sampling-jitter", sampling_jitter),
     graded("stale-sample", stale_sample),
     gross("packet-loss", packet_loss),
     gross("coarse-quantisation", coarse_quantisation),
