@@ -201,13 +201,14 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
             Scope::Unit => vec![concerned],
         };
         let variants = effect.variants(twin.starts_s());
-        for variant in &variants {
+        let count = LIBRARY.len() * variants.len();
+        let seek = |variant: f64| {
             let mut scatter = Scatter {
                 effect: *effect,
-                variant: *variant,
+                variant,
                 channels: Vec::new(),
                 thetas: Vec::new(),
-                gain: -((LIBRARY.len() * variants.len()) as f64).ln(),
+                gain: -(count as f64).ln(),
             };
             for block in blocks.iter().filter(|block| block.iter().any(|index| odd[*index])) {
                 let views: Vec<View> = block.iter().map(view).collect();
@@ -215,7 +216,7 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
                 if WHITE.contains(&page.name) && views.iter().any(is_coloured) {
                     continue;
                 }
-                let (theta, gain) = most_likely(*effect, *variant, &views);
+                let (theta, gain) = most_likely(*effect, variant, &views);
                 let gain = gain - block.iter().map(|index| own_clock[*index]).sum::<f64>();
                 let price = 0.5 * (samples.max(1) as f64).ln() * theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
                 if gain > price {
@@ -224,9 +225,13 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
                     scatter.thetas.extend(block.iter().map(|_| theta.clone()));
                 }
             }
-            if !scatter.channels.is_empty() && scatter.gain > 0.0 {
-                found.push(scatter);
-            }
+            Some(scatter).filter(|scatter| !scatter.channels.is_empty() && scatter.gain > 0.0)
+        };
+        for scatter in variants.iter().filter_map(|variant| seek(*variant)) {
+            let views: Vec<View> = scatter.channels.iter().map(view).collect();
+            // Where channels agree on a variant that each alone had to average over, more of them show it.
+            let settled = effect.settled(&views).and_then(seek);
+            found.push(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter));
         }
     }
     found.sort_by(|one, other| other.gain.total_cmp(&one.gain));

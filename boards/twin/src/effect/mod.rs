@@ -198,6 +198,12 @@ pub trait Effect: Sync {
         vec![0.0]
     }
 
+    /// The variant that these channels, in which it was found, speak for together; `None` where the likelihood does not
+    /// average over variants.
+    fn settled(&self, _views: &[View]) -> Option<f64> {
+        None
+    }
+
     /// Whether values between the variants are possible too: the variants are then a grid to begin from.
     fn has_values_between(&self) -> bool {
         false

@@ -23,41 +23,97 @@ const FEWEST: usize = 10;
 const AROUND: usize = 12;
 const LEAKED: usize = 3;
 
+/// Part of a block that must hold samples.
+const FULL: f64 = 0.25;
+
+/// Steps a bin in which the frequency is sought: between two of them a line loses a hundredth of its power.
+const FINE: usize = 8;
+
 /// Median over mean of an exponential variable.
 const MEDIAN: f64 = core::f64::consts::LN_2;
 
-/// Powers over the level of those around each, or over that of white noise if this is higher.
-fn above_level(powers: &[f64]) -> Vec<f64> {
-    let over = |bin: usize| {
-        let near = bin.saturating_sub(AROUND)..(bin + AROUND + 1).min(powers.len());
-        let mut level: Vec<f64> = near
-            .filter(|other| other.abs_diff(bin) >= LEAKED)
-            .map(|other| powers[other])
-            .collect();
-        let middle = level.len() / 2;
-        let median = *level.select_nth_unstable_by(middle, f64::total_cmp).1;
-        powers[bin] / (median / MEDIAN).max(1.0)
-    };
-    (FEWEST..powers.len()).map(over).collect()
+/// The power of a line over the level of the powers around it, or over that of white noise if this is higher.
+fn above_level(power: f64, mut around: Vec<f64>) -> f64 {
+    let middle = around.len() / 2;
+    let median = *around.select_nth_unstable_by(middle, f64::total_cmp).1;
+    power / (median / MEDIAN).max(1.0)
 }
 
-/// Power of the standardised residual in each bin from [`FEWEST`] on, block by block, of mean 1 for white noise.
-fn powers(view: &View) -> Vec<Vec<f64>> {
-    let mut whitened = vec![0.0; view.measured.len()];
-    for (k, residual) in view.residuals() {
-        whitened[k] = residual / view.channel.sigma();
+/// Bins that tell the level about so many cycles a block.
+fn around(cycles: f64) -> impl Iterator<Item = f64> {
+    let offsets = (LEAKED..=AROUND).map(|offset| offset as f64);
+    offsets
+        .flat_map(move |offset| [cycles - offset, cycles + offset])
+        .filter(|cycles| (0.0..(BLOCK / 2) as f64).contains(cycles))
+}
+
+/// A stretch of the standardised residual, zero where there is none.
+struct Block {
+    values: Vec<f64>,
+    count: f64,
+}
+
+impl Block {
+    /// All of a channel that have something in them.
+    fn all(view: &View) -> Vec<Block> {
+        let mut values = vec![0.0; view.measured.len()];
+        let mut is_there = vec![false; view.measured.len()];
+        for (k, residual) in view.residuals() {
+            values[k] = residual / view.channel.sigma();
+            is_there[k] = true;
+        }
+        let count = |is_there: &[bool]| is_there.iter().filter(|is_there| **is_there).count() as f64;
+        (values.chunks_exact(BLOCK).zip(is_there.chunks_exact(BLOCK)))
+            .map(|(values, is_there)| Block {
+                values: values.to_vec(),
+                count: count(is_there),
+            })
+            .filter(|block| block.count >= FULL * BLOCK as f64)
+            .collect()
     }
-    let circle: Vec<(f64, f64)> = (0..BLOCK).map(|k| (TAU * k as f64 / BLOCK as f64).sin_cos()).collect();
-    let power = |block: &[f64], bin: usize| {
-        let turn = |k: usize| circle[k * bin % BLOCK];
-        let sums = block.iter().enumerate().map(|(k, z)| (z * turn(k).0, z * turn(k).1));
-        let (sin, cos) = sums.fold((0.0, 0.0), |sum, term| (sum.0 + term.0, sum.1 + term.1));
-        (sin * sin + cos * cos) / BLOCK as f64
-    };
-    let blocks = whitened.chunks_exact(BLOCK);
-    blocks
-        .map(|block| above_level(&(0..BLOCK / 2).map(|bin| power(block, bin)).collect::<Vec<f64>>()))
-        .collect()
+
+    /// Power at so many cycles a block, of mean 1 for white noise.
+    fn power(&self, cycles: f64) -> f64 {
+        // A vector that turns on from sample to sample: sines cost ten times as much, and this is all that is computed here.
+        let (turn_s, turn_c) = (TAU * cycles / BLOCK as f64).sin_cos();
+        let (mut s, mut c, mut sin, mut cos) = (0.0, 1.0, 0.0, 0.0);
+        for z in &self.values {
+            (sin, cos) = (sin + z * s, cos + z * c);
+            (s, c) = (s * turn_c + c * turn_s, c * turn_c - s * turn_s);
+        }
+        (sin * sin + cos * cos) / self.count
+    }
+
+    /// The same, over the level about it.
+    fn line(&self, cycles: f64) -> f64 {
+        above_level(
+            self.power(cycles),
+            around(cycles).map(|cycles| self.power(cycles)).collect(),
+        )
+    }
+
+    /// The same in each bin from [`FEWEST`] on.
+    fn lines(&self) -> Vec<f64> {
+        let powers: Vec<f64> = (0..BLOCK / 2).map(|bin| self.power(bin as f64)).collect();
+        let line = |bin: usize| {
+            above_level(
+                powers[bin],
+                around(bin as f64).map(|bin| powers[bin as usize]).collect(),
+            )
+        };
+        (FEWEST..BLOCK / 2).map(line).collect()
+    }
+
+    /// [nats] that a line of amplitude `a` sigma gains whose power is `line`.
+    fn gain(&self, a: f64, line: f64) -> f64 {
+        let v = 1.0 + self.count * a * a / 4.0;
+        line * (1.0 - 1.0 / v) - v.ln()
+    }
+}
+
+/// [s] between samples.
+fn step_s(view: &View) -> f64 {
+    view.t_s.windows(2).map(|pair| pair[1] - pair[0]).next().unwrap_or(1.0)
 }
 
 /// `vibration`.
@@ -84,18 +140,18 @@ impl Effect for Vibration {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
-        let _ = variant;
         let of = |view: &View| -> f64 {
-            let powers = powers(view);
+            let blocks = Block::all(view);
+            if variant > 0.0 {
+                let cycles = variant * BLOCK as f64 * step_s(view);
+                let gain = blocks.iter().map(|block| block.gain(theta[0], block.line(cycles)));
+                return view.nominal() + gain.sum::<f64>();
+            }
             // A line through all blocks stays in its bin.
-            let v = 1.0 + BLOCK as f64 * theta[0].powi(2) / 4.0;
-            let gain = |bin: usize| {
-                powers
-                    .iter()
-                    .map(|block| block[bin] * (1.0 - 1.0 / v) - v.ln())
-                    .sum::<f64>()
-            };
-            let gains: Vec<f64> = (0..BLOCK / 2 - FEWEST).map(gain).collect();
+            let mut gains = vec![0.0; BLOCK / 2 - FEWEST];
+            for block in &blocks {
+                (gains.iter_mut().zip(block.lines())).for_each(|(gain, line)| *gain += block.gain(theta[0], line));
+            }
             let most = gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let mean = gains.iter().map(|gain| (gain - most).exp()).sum::<f64>() / gains.len() as f64;
             view.nominal() + most + mean.ln()
@@ -106,8 +162,7 @@ impl Effect for Vibration {
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
         let humming = |(number, view): (usize, &View)| {
             let phase = TAU * noise.uniform(number as u64);
-            let step_s = view.t_s.windows(2).map(|pair| pair[1] - pair[0]).next().unwrap_or(1.0);
-            let any_hz = 0.5 / step_s * noise.stream(1).uniform(0);
+            let any_hz = 0.5 / step_s(view) * noise.stream(1).uniform(0);
             let frequency_hz = if variant > 0.0 { variant } else { any_hz };
             let amplitude = theta[0] * view.channel.sigma();
             let samples = view.measured.iter().zip(view.t_s);
@@ -118,7 +173,27 @@ impl Effect for Vibration {
         views.iter().enumerate().map(humming).collect()
     }
 
-    /// Any frequency: the likelihood averages over them. To inject, the variant is the frequency [Hz], or 0 for a drawn one.
+    /// What shakes one sensor shakes others at the same frequency: the one at which all of them have most.
+    fn settled(&self, views: &[View]) -> Option<f64> {
+        let blocks: Vec<Block> = views.iter().flat_map(Block::all).collect();
+        let power = |cycles: &f64| -> f64 { blocks.iter().map(|block| block.power(*cycles)).sum() };
+        let most = |all: &mut dyn Iterator<Item = f64>| {
+            let powers = all.map(|cycles| (power(&cycles), cycles));
+            powers
+                .max_by(|one, other| one.0.total_cmp(&other.0))
+                .map(|(_, cycles)| cycles)
+        };
+        let mut sums = vec![0.0; BLOCK / 2 - FEWEST];
+        for block in &blocks {
+            (sums.iter_mut().zip(block.lines())).for_each(|(sum, line)| *sum += line);
+        }
+        let bin = (0..sums.len()).max_by(|one, other| sums[*one].total_cmp(&sums[*other]))? + FEWEST;
+        let about = |step: usize| bin as f64 - 1.0 + step as f64 / FINE as f64;
+        let cycles = most(&mut (0..=2 * FINE).map(about))?;
+        Some(cycles / (BLOCK as f64 * step_s(views.first()?)))
+    }
+
+    /// Any frequency: the likelihood averages over them, unless the variant says which [Hz]. To inject, 0 is a drawn one.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0]
     }
@@ -136,7 +211,13 @@ mod tests {
             .collect();
         let mut line = drift.clone();
         line[100] += 500.0;
-        let most = |powers: &[f64]| above_level(powers).into_iter().fold(0.0, f64::max);
+        let over = |powers: &[f64], bin: usize| {
+            above_level(
+                powers[bin],
+                around(bin as f64).map(|bin| powers[bin as usize]).collect(),
+            )
+        };
+        let most = |powers: &[f64]| (FEWEST..powers.len()).map(|bin| over(powers, bin)).fold(0.0, f64::max);
         assert!(most(&drift) < 4.0, "{}", most(&drift));
         assert!(most(&line) > 30.0, "{}", most(&line));
         // A level below that of white noise makes no line of white noise.
