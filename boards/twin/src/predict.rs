@@ -178,6 +178,8 @@ impl Twin {
                 (true, Some((_, felt))) => chain.added(&felt[row], *reading),
                 (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s) - channel.tau_s()), *reading),
             };
+            let felt_before = |ago_s: f64| self.scene.feel(chain.instant(*t_s) - ago_s);
+            let added = added + chain.added_gross(channel.tau_s(), felt_before);
             // A high-pass takes the bias with it.
             *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
         }

@@ -61,7 +61,7 @@ impl Effect for ReferenceSign {
     fn act<'a>(&self, _theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
         if variant < 0.0 {
             let (signs, aim, earth_n) = (signs(-variant as u32), chain.aim, site.environment.earth_rate_n());
-            chain.add(move |feel, _| aim.input(&truly(feel, signs, earth_n)) - aim.input(feel));
+            chain.add_gross(move |feel| aim.input(&truly(feel, signs, earth_n)) - aim.input(feel));
             return;
         }
         if site.channel.sensor != Kind::Gyro {
@@ -91,48 +91,5 @@ impl Effect for ReferenceSign {
         let rows = starts_s.iter().map(|start_s| start_s.round() + 1.0);
         let of_rows = rows.flat_map(|row| SIGNS.map(move |signs| 8.0 * row + f64::from(signs)));
         of_rates.chain(of_rows).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// [s] between two attitudes of a quotient.
-    const STEP_S: f64 = 1e-4;
-
-    #[test]
-    fn the_true_rate_is_that_of_the_true_attitude() {
-        let told = |t_s: f64| UnitQuaternion::from_euler_angles(0.4 * t_s, 0.7 - 0.3 * t_s, 1.1 * t_s);
-        let rate_b = |q_nb: &dyn Fn(f64) -> UnitQuaternion<f64>| {
-            let (before, after) = (q_nb(1.0 - STEP_S), q_nb(1.0 + STEP_S));
-            (before.inverse() * after).scaled_axis() / (2.0 * STEP_S)
-        };
-        let (force_n, field_n_ut) = (Vector3::new(0.3, -0.2, -9.8), Vector3::new(17.0, -4.0, 20.0));
-        let feel = |rate_b: Vector3<f64>, q_nb: UnitQuaternion<f64>| Feel {
-            t_s: 1.0,
-            rate_b,
-            rate_dot_b: Vector3::zeros(),
-            force_b: q_nb.inverse() * force_n,
-            field_b_ut: q_nb.inverse() * field_n_ut,
-            temperature_c: 20.0,
-            temperature_rate: 0.0,
-            q_nb,
-            position_n: Vector3::zeros(),
-        };
-        for bits in SIGNS {
-            let signs = signs(bits);
-            let flipped = |t_s: f64| {
-                let told = told(t_s);
-                let vector = told.vector().component_mul(&signs);
-                UnitQuaternion::from_quaternion(Quaternion::from_parts(told.scalar(), vector))
-            };
-            let found = truly(&feel(rate_b(&told), told(1.0)), signs, Vector3::zeros());
-            let expected = feel(rate_b(&flipped), flipped(1.0));
-            // The quotient's own error: a third derivative times the square of its step.
-            assert!((found.rate_b - expected.rate_b).norm() < 1e-7, "{bits}");
-            assert!((found.force_b - expected.force_b).norm() < 1e-12, "{bits}");
-            assert!((found.field_b_ut - expected.field_b_ut).norm() < 1e-12, "{bits}");
-        }
     }
 }

@@ -15,6 +15,8 @@ use super::unit::Channel;
 type Delay<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 /// [physical unit] added, from what is felt and the channel's own input.
 type Term<'a> = Box<dyn Fn(&Feel, f64) -> f64 + 'a>;
+/// [physical unit] added, from what is felt.
+type Felt<'a> = Box<dyn Fn(&Feel) -> f64 + 'a>;
 /// Changes the series of readings; told the nominal instants [s].
 type Stage<'a> = Box<dyn Fn(&[f64], &mut [f64]) + 'a>;
 
@@ -31,6 +33,7 @@ pub struct Chain<'a> {
     pub high_pass_s: Option<f64>,
     delays: Vec<Delay<'a>>,
     terms: Vec<Term<'a>>,
+    gross: Vec<Felt<'a>>,
     stages: Vec<Stage<'a>>,
 }
 
@@ -44,6 +47,7 @@ impl<'a> Chain<'a> {
             high_pass_s: None,
             delays: Vec::new(),
             terms: Vec::new(),
+            gross: Vec::new(),
             stages: Vec::new(),
         }
     }
@@ -57,6 +61,11 @@ impl<'a> Chain<'a> {
     /// on the sensor, and not behind its filter, is filtered to first order.
     pub fn add(&mut self, term: impl Fn(&Feel, f64) -> f64 + 'a) {
         self.terms.push(Box::new(term));
+    }
+
+    /// Adds what may be as large as the reading itself: it is taken through the channel's low-pass to third order.
+    pub fn add_gross(&mut self, term: impl Fn(&Feel) -> f64 + 'a) {
+        self.gross.push(Box::new(term));
     }
 
     /// Changes the finished readings, given the nominal instants.
@@ -81,6 +90,20 @@ impl<'a> Chain<'a> {
 
     pub(super) fn is_additive(&self) -> bool {
         !self.terms.is_empty()
+    }
+
+    /// What is gross of a reading through a low-pass of `tau_s`, given what is felt so long [s] before. The exponential's mean
+    /// by two of its instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
+    pub(super) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
+        if self.gross.is_empty() {
+            return 0.0;
+        }
+        let at = |ago_s: f64| -> f64 {
+            let feel = felt(ago_s);
+            self.gross.iter().map(|term| term(&feel)).sum()
+        };
+        let root = core::f64::consts::SQRT_2;
+        0.25 * ((2.0 + root) * at((2.0 - root) * tau_s) + (2.0 - root) * at((2.0 + root) * tau_s))
     }
 
     pub(super) fn added(&self, feel: &Feel, input: f64) -> f64 {
