@@ -89,6 +89,10 @@ pub struct Filter {
     rejected_s: [f32; 2],
     /// [s] for how long the field has been disturbed without a break.
     disturbed_s: f32,
+    /// The window before was one of rest.
+    rested: bool,
+    /// [s] for how long the bias that rest shows has been rejected without a break.
+    bias_rejected_s: f32,
 }
 
 impl Filter {
@@ -109,6 +113,8 @@ impl Filter {
             silent_s: 0.0,
             rejected_s: [0.0; 2],
             disturbed_s: 0.0,
+            rested: false,
+            bias_rejected_s: 0.0,
             params,
         }
     }
@@ -198,6 +204,9 @@ impl Filter {
             variance += square(params.saturated_rate_sd * covered_s);
         }
         self.window.turn(&mean, &gyro_b, covered_s, gap_s, variance);
+        if rotation {
+            self.window.gyro_variance += step.angle_variance;
+        }
         after
     }
 
@@ -225,6 +234,8 @@ impl Filter {
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
         let window = core::mem::take(&mut self.window);
         let means = window.means(&self.params, lift_off);
+        // The first window of a rest still holds how the motion ended.
+        let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
         if !self.aligned {
             self.covariance.predict(&self.params, &window, &means);
             outcome.aligned = self.align(&means, UNKNOWN);
@@ -236,7 +247,7 @@ impl Filter {
         self.velocity_n += means.velocity_change_n;
         self.covariance.predict(&self.params, &window, &means);
         let mut correction = Correction::new(self.params.gate);
-        if means.rest {
+        if rests {
             self.compare_rest(&means, &mut correction);
         }
         let velocity = means.vertical.then(|| self.compare_velocity(&means, &mut correction));
@@ -251,14 +262,20 @@ impl Filter {
         outcome.aligned = self.recover(&means, bounded, [velocity, field]);
     }
 
-    /// At rest the gyros measure their own bias and the Earth's rate.
+    /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
+    /// whatever was believed before.
     fn compare_rest(&mut self, means: &Means, correction: &mut Correction) {
         let earth_b = self.q_nb.inverse_transform_vector(&self.params.earth_rate_n);
-        let variance = square(self.params.rest.bias_sd);
+        let variance = square(self.params.rest.bias_sd) + means.rate_variance;
+        if self.bias_rejected_s >= self.params.recovery_s {
+            self.bias_rejected_s = 0.0;
+            self.covariance.forget_bias(self.params.bias_sd);
+        }
+        let mut accepted = true;
         for axis in 0..3 {
             let measured = means.rate_b[axis] - earth_b[axis];
             let rows = [(BIAS + axis, 1.0)];
-            correction.compare(
+            accepted &= correction.compare(
                 &mut self.covariance,
                 Quantity::Bias,
                 self.bias_b[axis],
@@ -267,6 +284,11 @@ impl Filter {
                 variance,
             );
         }
+        self.bias_rejected_s = if accepted {
+            0.0
+        } else {
+            self.bias_rejected_s + means.duration_s
+        };
     }
 
     /// The velocity is bounded: zero is measured of it.

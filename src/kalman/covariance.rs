@@ -200,6 +200,13 @@ impl Covariance {
         self.align(&Matrix3::from_diagonal_element(unknown));
     }
 
+    /// Bias known to `sd` [rad/s] only.
+    pub(super) fn forget_bias(&mut self, sd: f32) {
+        for index in BIAS..GYRO_MATRIX {
+            self.forget(index, sd * sd);
+        }
+    }
+
     /// Velocity known to `sd` [m/s] only.
     pub(super) fn forget_velocity(&mut self, sd: f32) {
         for index in VELOCITY..STATES {

@@ -298,3 +298,58 @@ fn slot_times_and_delays_are_taken_off() {
     assert!(run(0.015) < 0.1, "{}", run(0.015));
     assert!(run(0.0) > 1.0, "{}", run(0.0));
 }
+
+/// [rad/s] what the gyros of the next tests say of no rate at all.
+const GYRO_BIAS_B: Vector3<f32> = Vector3::new(0.1 * DEG, -0.05 * DEG, 0.08 * DEG);
+
+fn biased(step: &mut Step) {
+    step.rate_b += GYRO_BIAS_B;
+    step.angle_b += GYRO_BIAS_B * STEP_S;
+}
+
+#[test]
+fn a_rest_that_begins_with_the_end_of_a_motion_teaches_no_wrong_bias() {
+    let mut world = World::new(tilted(), params());
+    world.fly(5.0, Vector3::new(0.3, -0.2, 0.1), |_, step| biased(step));
+    // Easing to a stop, a window long and within the bounds of rest.
+    for index in 0..50 {
+        let rate_b = Vector3::new(0.0, 0.0, 0.9 * DEG * (1.0 - index as f32 * STEP_S));
+        world.fly(STEP_S, rate_b, |_, step| biased(step));
+    }
+    world.fly(6.0, Vector3::zeros(), |_, step| biased(step));
+    let off_b = world.filter.bias_b - GYRO_BIAS_B;
+    assert!(off_b.norm() < 0.02 * DEG, "{:?} deg/s", off_b / DEG);
+}
+
+#[test]
+fn a_bias_that_every_rest_contradicts_is_given_up() {
+    let mut world = World::new(tilted(), params());
+    world.fly(5.0, Vector3::zeros(), |_, step| biased(step));
+    // As an upset in memory leaves it.
+    world.filter.bias_b += Vector3::new(1.0 * DEG, 0.0, 0.0);
+    world.fly(world.filter.params.recovery_s + 2.0, Vector3::zeros(), |_, step| {
+        biased(step)
+    });
+    let off_b = world.filter.bias_b - GYRO_BIAS_B;
+    assert!(off_b.norm() < 0.02 * DEG, "{:?} deg/s", off_b / DEG);
+}
+
+#[test]
+fn a_few_noisy_samples_are_no_exact_bias() {
+    let sd_after = |noise: f32| {
+        let mut world = World::new(tilted(), params());
+        world.fly(4.0, Vector3::zeros(), |_, step| {
+            step.angle_variance = square(noise * STEP_S);
+        });
+        ComplexField::sqrt(world.filter.bias_covariance_b().trace() / 3.0)
+    };
+    // Fifty samples a window, three windows after the first.
+    let noise = 1.0 * DEG;
+    let expected = noise / ComplexField::sqrt(150.0_f32);
+    assert!(
+        (sd_after(noise) / expected - 1.0).abs() < 0.1,
+        "{} {expected}",
+        sd_after(noise)
+    );
+    assert!(sd_after(0.0) < 0.01 * DEG);
+}

@@ -21,6 +21,8 @@ pub struct Window {
     pub mean_drive: SMatrix<f32, 3, DRIVERS>,
     /// [rad^2] white variance of the attitude about each axis.
     pub angle_variance: f32,
+    /// [rad^2] of it, the noise of the gyros' samples.
+    pub gyro_variance: f32,
     covered_s: f32,
     angle_b: Vector3<f32>,
     rate_square: f32,
@@ -109,6 +111,8 @@ pub struct Means {
     pub duration_s: f32,
     /// [rad/s] mean of the gyros, in b.
     pub rate_b: Vector3<f32>,
+    /// [rad^2/s^2] variance of each of its components, by the noise of the gyros' samples.
+    pub rate_variance: f32,
     /// The unit was at rest.
     pub rest: bool,
     /// [m/s2] mean specific force, in n.
@@ -223,6 +227,7 @@ impl Window {
         Means {
             duration_s: self.duration_s,
             rate_b,
+            rate_variance: self.gyro_variance / square(covered_s),
             rest,
             acc_n,
             near_one_g,
