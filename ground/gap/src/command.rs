@@ -156,12 +156,9 @@ pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
 /// When the case cannot be judged or the file not written.
 pub fn write_withheld(case: &Path, effects: &[String]) -> Result<(), GapError> {
     let subject = Subject::open(case)?;
-    let pages = effects
-        .iter()
-        .filter_map(|name| twin::effect::by_name(name))
-        .map(|effect| effect.page());
-    let left_out: Vec<String> = pages
-        .flat_map(|page| page.siblings.iter().chain([&page.name]).map(|name| (*name).to_owned()))
+    let left_out: Vec<String> = (effects.iter())
+        .flat_map(|name| twin::effect::kin(name))
+        .map(str::to_owned)
         .collect();
     let diagnosis = diagnose(&subject, &left_out, &|_, _| ());
     let verdict = Verdict::new(&subject, &diagnosis, String::new());

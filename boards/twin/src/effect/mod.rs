@@ -155,6 +155,17 @@ pub const LIBRARY: &[&dyn Effect] = &[
     &shock::Shock,
 ];
 
+/// An effect and all that are mistaken for it or it for them: to withhold it from the library, withhold these.
+pub fn kin(name: &str) -> Vec<&'static str> {
+    let pages = LIBRARY.iter().map(|effect| effect.page());
+    let is_kin = |page: &&Page| {
+        page.name == name
+            || page.siblings.contains(&name)
+            || by_name(name).is_some_and(|effect| effect.page().siblings.contains(&page.name))
+    };
+    pages.filter(is_kin).map(|page| page.name).collect()
+}
+
 /// The effect of that name.
 pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
     LIBRARY.iter().copied().find(|effect| effect.page().name == name)

@@ -70,7 +70,7 @@ pub struct Page {
     pub source: &'static str,
     /// What brings it out.
     pub excited_by: &'static str,
-    /// Names it is mistaken for: to withhold it from the library, withhold these too.
+    /// Names it is mistaken for. One page of the two need say so ([`super::kin`]).
     pub siblings: &'static [&'static str],
     /// What to do to be sure.
     pub confirm_by: &'static str,

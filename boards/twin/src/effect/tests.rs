@@ -138,6 +138,15 @@ fn jacobian(twin: &Twin, active: &Active) -> DMatrix<f64> {
 }
 
 #[test]
+fn what_is_mistaken_for_another_is_its_kin_whichever_page_says_so() {
+    for (one, other) in [("plate-rotation", "plate-flexing"), ("plate-flexing", "plate-rotation")] {
+        assert!(kin(one).contains(&other) && kin(one).contains(&one), "{:?}", kin(one));
+    }
+    assert!(!kin("plate-rotation").contains(&"hard-iron"));
+    assert!(kin("no such effect").is_empty());
+}
+
+#[test]
 fn every_page_is_written_and_its_siblings_exist() {
     for effect in LIBRARY {
         let page = effect.page();

@@ -10,7 +10,7 @@
 //! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
 //! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
 //! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
-//! it claims, no more and no less.
+//! it claims, and outliers the size, no more and no less: a law of outliers "anywhere in the range" would else stand for any.
 
 use nalgebra::{DMatrix, Vector1};
 
@@ -148,6 +148,11 @@ impl<'a> Sights<'a> {
         }));
         for channel in self.scattered {
             let view = &self.views[*channel];
+            labels.push(Label {
+                what: format!("{}: outliers have not the size that is claimed", view.name),
+                channel: Some(*channel),
+                is_claimed: true,
+            });
             labels.extend(waves(view.phase.len()).into_iter().map(|length| Label {
                 what: format!(
                     "{}: waves of {length} samples have not the energy that is claimed",
@@ -201,6 +206,7 @@ impl<'a> Sights<'a> {
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
         for channel in self.scattered {
+            sums.push(size_of_outliers(fitted.rest[*channel].as_slice()));
             sums.extend(octaves::energies(fitted.rest[*channel].as_slice()));
         }
         sums
@@ -210,6 +216,13 @@ impl<'a> Sights<'a> {
 /// Number of kinds in the views.
 fn kinds(views: &[View]) -> usize {
     views.iter().map(|view| view.kind + 1).max().unwrap_or(0)
+}
+
+/// Mean logarithm of what is far out; zero where nothing is.
+fn size_of_outliers(values: &[f64]) -> f64 {
+    let sizes = values.iter().map(|value| value.abs()).filter(|size| *size > FAR);
+    let (sum, count) = sizes.fold((0.0, 0.0), |(sum, count), size| (sum + size.ln(), count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// How long the waves are, in samples, of each of the [`octaves`] of so long a series.

@@ -205,7 +205,10 @@ fn an_attitude_with_a_wrong_sign_is_another_motion() {
         let truly = twin_of(emems(thesis_slot_s), Environment::laboratory(), &reversed);
         let (apart, whole) = compared("reference-sign", Locality::Unit, -f64::from(signs), &[], &truly);
         // A low-pass by two instants is wrong by (w tau)^4: a thousandth at 15 rad/s and 12 ms, which is where little moves.
-        assert!(whole > 100.0 && apart < 4e-4 * whole, "{signs}: {apart} of {whole} sigmas");
+        assert!(
+            whole > 100.0 && apart < 4e-4 * whole,
+            "{signs}: {apart} of {whole} sigmas"
+        );
     }
 }
 
