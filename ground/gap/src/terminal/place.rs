@@ -52,19 +52,15 @@ pub(super) fn line(text: &mut String, diagnosis: &Diagnosis) -> Result {
         .filter(|(name, _)| name != UNEXPLAINED)
         .cloned()
         .collect();
-    writeln!(
-        text,
-        "WHERE   {}; {}{}{}",
-        first(&place.channels, 4),
-        first(&octaves, 1),
-        Some(first(&explaining, 2))
-            .filter(|words| !words.is_empty())
-            .map_or(String::new(), |words| format!("; follows {words}")),
-        place
-            .passage
-            .as_ref()
-            .map_or(String::new(), |passage| format!("; {}", when(passage)))
-    )
+    let follows = Some(first(&explaining, 2)).filter(|words| !words.is_empty());
+    let parts = [
+        Some(first(&place.channels, 4)),
+        Some(first(&octaves, 1)),
+        follows.map(|words| format!("follows {words}")),
+        place.passage.as_ref().map(when),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().filter(|part| !part.is_empty()).collect();
+    writeln!(text, "WHERE   {}", parts.join("; "))
 }
 
 /// When it is there, in words.
