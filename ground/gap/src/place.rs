@@ -97,7 +97,8 @@ pub fn locate(problem: &Problem, quiet: &Model) -> Place {
             .iter()
             .zip(&excess)
             .filter(|(channel, _)| channel.group == group);
-        (group.to_owned(), own.map(|(_, excess)| excess).sum::<f64>())
+        // A sensor that is quieter than described takes nothing off its neighbour.
+        (group.to_owned(), own.map(|(_, excess)| excess.max(0.0)).sum::<f64>())
     });
     let mut energy = vec![0.0; problem.twin.starts_s().len()];
     for (frame, rest) in problem.frames.iter().zip(&quiet.fitted.rest) {
