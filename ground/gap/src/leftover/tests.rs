@@ -385,3 +385,29 @@ fn outliers_have_the_size_that_their_law_claims() {
     };
     assert!(p_with(None) > 0.05 && p_with(Some(9.0)) < 0.01);
 }
+
+#[test]
+fn an_effect_on_the_scatter_is_held_to_the_energy_that_it_claims() {
+    let swings = |residuals: &mut [DVector<f64>], seed: u64| {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut level = 0.0;
+        (residuals[0].iter_mut()).for_each(|value| {
+            let step: f64 = StandardNormal.sample(&mut random);
+            level = 0.9 * level + 0.4 * step;
+            *value += level;
+        });
+    };
+    let p_with = |there: bool| {
+        let (views, joint) = scene();
+        let mut residuals = noise(7);
+        if there {
+            swings(&mut residuals, 5);
+        }
+        let disturb = Disturb {
+            channels: &[0],
+            of: &swings,
+        };
+        judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb)).p
+    };
+    assert!(p_with(true) > 0.05 && p_with(false) < 0.01);
+}
