@@ -25,8 +25,8 @@ const UNKNOWN_PRIOR: f64 = 0.05;
 /// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
 /// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
 /// effect of marginal signal-to-noise ratio 8 has 32 before its prior odds.
-const DOUBTED: f64 = 20.0;
-const DOUBT_STEP: f64 = 4.0;
+const DOUBTED: f64 = 10.0;
+const DOUBT_STEP: f64 = 3.0;
 
 /// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
 /// from its law leaves a few parts in a hundred; another effect's law, which happens to be like it, leaves more.
@@ -127,7 +127,7 @@ pub fn promises(
     problem: &Problem,
     model: &Model,
     chosen: &[Chosen],
-    sigmas: &[f64],
+    louder: &[f64],
     causes: &mut [Cause],
 ) -> Vec<Promised> {
     if causes.len() != model.components.len() || chosen.len() != causes.len() {
@@ -148,7 +148,8 @@ pub fn promises(
             slopes: &problem.twin.jacobian(&actives, index),
             covariance: &chosen[index].covariance,
             after: &model.predicted,
-            sigmas,
+            sigmas: &problem.sigmas,
+            louder,
         })?;
         let confidence = promise.confidence();
         let believed = cause.probability;
