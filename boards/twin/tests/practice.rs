@@ -188,6 +188,7 @@ fn scatter(case: &Case, name: &str) -> Vec<(String, f64, f64, Vec<f64>)> {
             t_s: &case.twin.instants_s(channel),
             predicted: &explained[0],
             measured: &case.measured[channel],
+            step: 0.0,
         };
         let variants = effect.variants(case.twin.starts_s()).into_iter();
         let tried = variants.map(|variant| (variant, most_likely(effect, variant, &[view])));

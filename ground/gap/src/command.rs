@@ -172,7 +172,7 @@ pub fn write_withheld(case: &Path, effects: &[String]) -> Result<(), GapError> {
 /// When the case cannot be judged or a file not written.
 pub fn write_baselines(case: &Path, effects: Option<&[String]>) -> Result<(), GapError> {
     let subject = Subject::open(case)?;
-    let problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let library = Library::new(&problem, &[], &|_| ());
     for (name, named) in [
         ("largest-residual", baseline::largest_residual(&problem, &library)),

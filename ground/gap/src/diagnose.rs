@@ -75,7 +75,7 @@ pub struct Diagnosis {
 
 /// Diagnoses a case. `progress` is told what goes on and how far it is, 0 to 1.
 pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Diagnosis {
-    let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.accuracy);
+    let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let gap = root_mean_square(&problem);
     let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
     let search = |share| progress("search", share);
@@ -84,7 +84,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
-    let place = place::locate(&problem, &quiet);
+    let place = place::locate(&problem, &views, &quiet);
 
     let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
@@ -108,17 +108,18 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
         .map(|channel| problem.predict(channel, &[]))
         .collect();
+    let as_described = vec![1.0; problem.frames.len()];
     let without = Finished {
         start_s: subject.twin.starts_s(),
         sigmas: &problem.sigmas,
         before: &before,
         recalibrated: &quiet.predicted,
         after: &quiet.predicted,
-        sigmas_after: &problem.sigmas,
+        louder: &as_described,
     };
     let mut shrink = subject.held.judge(Finished {
         after: &explanation.model.predicted,
-        sigmas_after: &explanation.sigmas,
+        louder: &explanation.louder,
         ..without
     });
     let withdrawn = if !shrink.supports_the_effect() || explanation.is_patchwork() {
@@ -142,7 +143,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &problem,
         model,
         &found.chosen,
-        &explanation.sigmas,
+        &explanation.louder,
         &mut causes,
     );
     let belief = Belief::of(&left, explanation.energy(&quiet), &promises);
@@ -173,7 +174,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let finished = if is_named {
         Finished {
             after: &model.predicted,
-            sigmas_after: &explanation.sigmas,
+            louder: &explanation.louder,
             ..without
         }
     } else {
@@ -193,12 +194,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         correction,
         keys,
         promises,
-        louder: finished
-            .sigmas_after
-            .iter()
-            .zip(&problem.sigmas)
-            .map(|(after, before)| after / before)
-            .collect(),
+        louder: finished.louder.to_vec(),
         gap,
         gate,
         alternatives,
@@ -236,8 +232,8 @@ fn suspects(problem: &Problem, model: &Model) -> Vec<Suspect> {
 fn root_mean_square(problem: &Problem) -> f64 {
     let (mut energy, mut samples) = (0.0, 0);
     for (channel, frame) in problem.frames.iter().enumerate() {
-        let scale = frame.weight_sigma / problem.sigmas[channel];
-        energy += problem.residual(channel, &[]).norm_squared() * scale * scale;
+        let residual = problem.residual(channel, &[]);
+        energy += problem.in_sigmas(channel, &residual).norm_squared();
         samples += frame.series.rows.len();
     }
     (energy / samples.max(1) as f64).sqrt()

@@ -29,6 +29,9 @@ pub const SAID: f64 = 0.5;
 /// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
 const MOST_CAUSES: usize = 3;
 
+/// Part of the gain of all from which an effect counts among them.
+const LEAST_PART: f64 = 0.02;
+
 /// The effect on the scatter that changes nothing but its size.
 const LOUDER: &str = "noise-level";
 
@@ -48,8 +51,8 @@ pub struct Explanation {
     pub scatter: Option<Scatter>,
     /// The chosen effects on readings with everything else fitted.
     pub model: Model,
-    /// Standard deviation of a sample with the effect on the scatter, in the unit's channel order.
-    pub sigmas: Vec<f64>,
+    /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
+    pub louder: Vec<f64>,
     /// Different effects on readings that the search chose, refused ones included.
     sought: usize,
     /// Whether those that were refused explain more than those that were kept.
@@ -112,12 +115,7 @@ impl Explanation {
             refused,
             scatter,
             model,
-            sigmas: problem
-                .sigmas
-                .iter()
-                .zip(&louder)
-                .map(|(sigma, louder)| sigma * louder)
-                .collect(),
+            louder,
             sought,
             is_refused,
         }
@@ -138,11 +136,8 @@ impl Explanation {
     pub fn disturb<'a>(&'a self, problem: &'a Problem) -> Option<impl Fn(&mut [DVector<f64>], u64) + 'a> {
         let scatter = self.scatter.as_ref()?;
         (scatter.effect.page().name != LOUDER).then_some(move |residuals: &mut [DVector<f64>], seed: u64| {
-            let frames = problem.frames.iter();
-            let units: Vec<f64> = frames.map(|frame| frame.weight_sigma).collect();
-            let described = problem.sigmas.iter().zip(&self.sigmas);
-            (residuals.iter_mut().zip(described)).for_each(|(residual, (sigma, found))| *residual *= sigma / found);
-            scatter.disturb(problem, &self.model.predicted, &units, residuals, Noise::new(seed));
+            (residuals.iter_mut().zip(&self.louder)).for_each(|(residual, louder)| *residual /= *louder);
+            scatter.disturb(problem, &self.model.predicted, residuals, Noise::new(seed));
         })
     }
 
@@ -190,10 +185,13 @@ fn gains(chosen: &[Chosen]) -> f64 {
     chosen.iter().map(|chosen| chosen.gain).sum()
 }
 
-/// How many effects are chosen: packets lost at three instants are one.
+/// How many effects are chosen that count: packets lost at three instants are one, and what brings a fiftieth of all is what the
+/// laws of the others leave.
 fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
+    let least = LEAST_PART * gains(chosen);
     let names: std::collections::BTreeSet<&str> = chosen
         .iter()
+        .filter(|chosen| chosen.gain >= least)
         .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
         .collect();
     names.len()
@@ -224,12 +222,12 @@ fn wandering(problem: &Problem, quiet: &Model, withheld: &[String]) -> Option<Sc
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.
 fn louder(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
-    let energies = model.energies();
     let factor = |channel: usize| {
         let samples = problem.frames[channel].series.rows.len().max(1) as f64;
         let is_in = scatter.channels.contains(&channel);
         if is_in {
-            (energies[channel] / samples).sqrt().clamp(0.1, 1000.0)
+            let rest = problem.in_sigmas(channel, &model.fitted.rest[channel]);
+            (rest.norm_squared() / samples).sqrt().clamp(0.1, 1000.0)
         } else {
             1.0
         }

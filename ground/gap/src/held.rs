@@ -51,16 +51,16 @@ impl fmt::Debug for Held {
 pub struct Finished<'a> {
     /// [s] start of each row.
     pub start_s: &'a [f64],
-    /// Standard deviation of a sample as the nominal twin has it, one a channel.
-    pub sigmas: &'a [f64],
+    /// Standard deviation of a sample as the nominal twin has it.
+    pub sigmas: &'a [Vec<f64>],
     /// By the nominal twin.
     pub before: &'a [Vec<f64>],
     /// With the calibration refitted, no effect.
     pub recalibrated: &'a [Vec<f64>],
     /// With effect and calibration fitted.
     pub after: &'a [Vec<f64>],
-    /// Standard deviation of a sample with a noise-type effect in, one a channel.
-    pub sigmas_after: &'a [f64],
+    /// How much more a sample scatters with a noise-type effect in, one a channel.
+    pub louder: &'a [f64],
 }
 
 /// One channel's gap.
@@ -130,14 +130,10 @@ impl Sums {
         }
     }
 
-    fn percent(self) -> f64 {
+    /// `None` where there is no gap to shrink: below a hundredth of a sigma of excess the quotient is noise over noise.
+    fn percent(self) -> Option<f64> {
         let (before, after) = (self.gap(self.before), self.gap(self.after));
-        // Below a hundredth of a sigma of excess the quotient is noise over noise.
-        if before - 1.0 > 0.01 {
-            100.0 * (before - after) / (before - 1.0)
-        } else {
-            0.0
-        }
+        (before - 1.0 > 0.01).then(|| 100.0 * (before - after) / (before - 1.0))
     }
 }
 
@@ -178,7 +174,7 @@ impl Held {
         let mut blocks = vec![Sums::default(); ((last_s - first_s) / BLOCK_S) as usize + 1];
         let mut channels = Vec::new();
         for (index, series) in self.channels.iter().enumerate() {
-            let (sigma, sigma_after) = (finished.sigmas[index], finished.sigmas_after[index]);
+            let louder = finished.louder[index];
             let mut sums = Sums::default();
             let mut rms = [0.0; 2];
             for (row, value) in series.rows.iter().zip(&series.values) {
@@ -187,11 +183,12 @@ impl Held {
                 if errors.iter().any(|error| !error.is_finite()) {
                     continue;
                 }
+                let sigma = finished.sigmas[index][row];
                 let one = Sums {
                     samples: 1.0,
                     before: (errors[0] / sigma).powi(2),
                     recalibrated: (errors[1] / sigma).powi(2),
-                    after: (errors[2] / sigma_after).powi(2),
+                    after: (errors[2] / sigma / louder).powi(2),
                 };
                 sums.add(one);
                 blocks[((finished.start_s[row] - first_s) / BLOCK_S) as usize].add(one);
@@ -215,7 +212,7 @@ impl Held {
             before: total.gap(total.before),
             recalibrated: total.gap(total.recalibrated),
             after: total.gap(total.after),
-            percent: total.percent(),
+            percent: total.percent().unwrap_or(0.0),
             interval_percent,
             beyond_recalibration,
             channels,
@@ -235,13 +232,17 @@ fn bootstrap(blocks: &[Sums]) -> ([f64; 2], [f64; 2]) {
         for _ in 0..blocks.len() {
             sums.add(blocks[pick.sample(&mut random)]);
         }
-        percents.push(sums.percent());
+        // An effect that comes and goes is in some blocks only; a draw of others says nothing of how far it shrinks.
+        percents.extend(sums.percent());
         beyond.push(sums.gap(sums.recalibrated) - sums.gap(sums.after));
     }
     (central_95(percents), central_95(beyond))
 }
 
 fn central_95(mut values: Vec<f64>) -> [f64; 2] {
+    if values.is_empty() {
+        return [0.0; 2];
+    }
     values.sort_by(f64::total_cmp);
     let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
     [at(0.025), at(0.975)]
@@ -269,11 +270,11 @@ mod tests {
         let level = |value: f64| vec![vec![value; ROWS]];
         Held::new(vec![series]).judge(Finished {
             start_s: &start_s,
-            sigmas: &[1.0],
+            sigmas: &level(1.0),
             before: &level(before),
             recalibrated: &level(recalibrated),
             after: &level(after),
-            sigmas_after: &[1.0],
+            louder: &[1.0],
         })
     }
 

@@ -14,12 +14,14 @@ use crate::joint::{Fitted, Joint};
 
 mod aspects;
 mod common;
+mod instrument;
 mod shapes;
 mod simulated;
 mod spectrum;
 mod strength;
 use aspects::Sights;
-use simulated::simulate;
+pub use instrument::Instrument;
+pub(crate) use simulated::simulate;
 pub use simulated::{Clock, Disturb};
 pub use strength::Suspect;
 
@@ -59,6 +61,10 @@ pub struct View {
     pub felt: DVector<f64>,
     /// The clock of its part, where that is its own.
     pub clock: Option<Clock>,
+    /// What its reference errs by, where that is not exact.
+    pub instrument: Option<Instrument>,
+    /// Whether that is more than it scatters by itself.
+    pub is_limited: bool,
     /// For each quantity of [`LEVELLED`], in which of [`LEVELS`] equally filled levels each sample stands.
     pub levels: Vec<Vec<u8>>,
 }

@@ -91,8 +91,13 @@ impl Library {
             .channels
             .iter()
             .any(|channel| channel.sensor == Kind::Gyro && channel.bits.is_none());
-        let is_offered =
-            |name: &str| withheld.iter().all(|withheld| withheld != name) && (of_light || name != "gyro-sine-response");
+        // Rows that bring their own time leave a hole when they are lost, and nothing late.
+        let is_counted = unit.cycle_s.is_some();
+        let is_offered = |name: &str| {
+            withheld.iter().all(|withheld| withheld != name)
+                && (of_light || name != "gyro-sine-response")
+                && (is_counted || name != "packet-loss")
+        };
         let offered: Vec<_> = LIBRARY
             .iter()
             .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))

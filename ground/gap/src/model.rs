@@ -5,7 +5,8 @@ use nalgebra::DVector;
 use crate::{
     joint::{Fitted, Joint},
     library::{Entries, Library},
-    problem::{Component, Problem, calibration},
+    open::calibration,
+    problem::{Component, Problem},
 };
 
 /// Effects with everything else refitted around them.
@@ -66,7 +67,7 @@ impl Model {
 /// Readings of one channel at every row.
 fn readings(problem: &Problem, components: &[Component], fitted: &Fitted, channel: usize) -> Vec<f64> {
     let mut readings = problem.predict(channel, components);
-    let columns = calibration(problem.twin, channel);
+    let columns = calibration(problem.twin, problem.instrument, channel);
     let calibration = columns
         .iter()
         .zip(fitted.nuisance[channel].iter())

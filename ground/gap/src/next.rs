@@ -9,12 +9,12 @@ use nalgebra::DVector;
 use twin::{
     effect::{Active, Cause, by_name},
     motion::{Motion, RateTable, RotationTest, Still, Tumble},
-    predict::{Accuracy, Scene, Twin},
+    predict::{Scene, Twin},
 };
 
 use crate::{
     case::Subject, confusion::Pair, diagnose::Diagnosis, log::Series, problem::Problem, products::Products,
-    windows::Fit,
+    reference::Reference, windows::Fit,
 };
 
 /// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
@@ -148,7 +148,8 @@ fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f6
     let fit = Fit {
         channels: vec![all; channels],
     };
-    let problem = Problem::new(&twin, &fit, &Accuracy::default());
+    let exact = Reference::default();
+    let problem = Problem::new(&twin, &fit, &exact);
     let mut products = Products::default();
     let mut sigmas = Vec::new();
     let mut add = |cause: &Cause| -> Vec<usize> {

@@ -13,12 +13,12 @@ pub mod passage;
 pub mod regimes;
 
 use nalgebra::DVector;
-use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use self::{cells::Cell, octaves::Octave, passage::Passage};
 use crate::{
-    joint::{Fitted, Joint},
+    joint::Fitted,
+    leftover::{View, simulate},
     model::Model,
     problem::Problem,
 };
@@ -62,11 +62,15 @@ pub(crate) struct Sums {
 }
 
 /// Where the gap of the fit windows is.
-pub fn locate(problem: &Problem, quiet: &Model) -> Place {
+pub fn locate(problem: &Problem, views: &[View], quiet: &Model) -> Place {
     let unit = problem.twin.unit();
     let layout = cells::Layout::new(problem);
-    let scales: Vec<f64> = (problem.frames.iter().zip(&problem.sigmas))
-        .map(|(frame, sigma)| frame.weight_sigma / sigma)
+    let scales: Vec<f64> = (problem.frames.iter().enumerate())
+        .map(|(channel, frame)| {
+            let samples = frame.series.rows.len();
+            let ones = DVector::from_element(samples, 1.0);
+            problem.in_sigmas(channel, &ones).norm() / (samples.max(1) as f64).sqrt()
+        })
         .collect();
     let sums = |fitted: &Fitted| Sums {
         channels: (fitted.rest.iter().zip(&fitted.nuisance))
@@ -84,7 +88,15 @@ pub fn locate(problem: &Problem, quiet: &Model) -> Place {
     let count = (DRAWS / samples.max(1)).clamp(LEAST_SIMULATIONS, SIMULATIONS);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Sums> = (0..count)
-        .map(|_| sums(&quiet.joint.fit(&simulate(&quiet.joint, &mut random))))
+        .map(|_| {
+            sums(&quiet.joint.fit(&simulate(
+                views,
+                &quiet.joint,
+                &quiet.fitted.parameters,
+                None,
+                &mut random,
+            )))
+        })
         .collect();
     let mean = |of: &dyn Fn(&Sums) -> f64| simulated.iter().map(of).sum::<f64>() / count as f64;
     let excess: Vec<f64> = (observed.channels.iter().enumerate())
@@ -138,17 +150,6 @@ fn median_step_s(starts_s: &[f64]) -> f64 {
     let mut steps: Vec<f64> = starts_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
-}
-
-/// What the model's calibration and noise would have left in the log.
-fn simulate(joint: &Joint, random: &mut Xoshiro256PlusPlus) -> Vec<DVector<f64>> {
-    let mut channel = |columns: &crate::joint::Columns| {
-        let mut draw = |size: usize| DVector::from_fn(size, |_, _| StandardNormal.sample(random));
-        let open: DVector<f64> = draw(columns.nuisance.ncols());
-        let noise = draw(columns.nuisance.nrows());
-        noise + &columns.nuisance * open
-    };
-    joint.columns().map(&mut channel).collect()
 }
 
 /// Excesses as shares of what is above zero: what is below is noise about none.

@@ -4,80 +4,27 @@
 //! on. What the twin predicts is compared at the rows that are there and that the reference saw.
 //!
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
-//! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is.
+//! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
+//! errors are [`crate::reference`]'s and make some samples worth less than others.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
     effect::Active,
-    predict::{Accuracy, Channel, Column, Kind, Twin},
+    predict::{Column, Kind, Twin},
 };
 
 use crate::{
     gram::Normal,
     joint::Columns,
     log::Series,
+    open::calibration,
+    reference::Reference,
     windows::{Fit, Span},
 };
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
 /// in it.
 pub const REFERENCE_CORRELATION_S: f64 = 1.0;
-
-/// [s] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
-const GYRO_PERIOD_S: f64 = 1.0 / 256.0;
-
-/// [s] between a thermometer's, by its own clock (TMP102, SBOS397).
-const THERMOMETER_PERIOD_S: f64 = 0.25;
-
-/// [s] between the conversions of a channel's part by its own clock; 0 where it has none that is known of. A reading is up
-/// to half of it older or younger than described, and that evenly, so a stated sigma is a period over the root of 12.
-pub fn conversion_period_s(channel: &Channel) -> f64 {
-    let stated = channel.instant_sigma_s.map(|sigma_s| sigma_s * 12f64.sqrt());
-    stated.unwrap_or(match channel.sensor {
-        Kind::Gyro => GYRO_PERIOD_S,
-        Kind::Thermometer => THERMOMETER_PERIOD_S,
-        Kind::Accelerometer | Kind::Magnetometer => 0.0,
-    })
-}
-
-/// [s] how well the instant of a channel is known: as its description says, or as its part lets anyone know it. A
-/// thermometer is described as read at once, and is up to a whole period older.
-pub fn instant_sigma_s(channel: &Channel) -> f64 {
-    let spread = match (channel.sensor, channel.instant_sigma_s) {
-        (Kind::Thermometer, None) => 3f64.sqrt(),
-        _ => 12f64.sqrt(),
-    };
-    conversion_period_s(channel) / spread
-}
-
-/// What the calibration leaves open in one channel: its own, and the instant at which it is read. Where the description says
-/// that its part has a clock of its own, this instant drifts too.
-pub fn calibration(twin: &Twin, index: usize) -> Vec<Column> {
-    let mut columns = twin.calibration(index);
-    let channel = &twin.unit().channels[index];
-    let sigma = instant_sigma_s(channel);
-    if sigma <= 0.0 {
-        return columns;
-    }
-    let slope = twin.by_instant(index);
-    let starts_s = twin.starts_s();
-    let (first, last) = (starts_s.first().unwrap_or(&0.0), starts_s.last().unwrap_or(&0.0));
-    let (middle, half) = (0.5 * (last + first), (0.5 * (last - first)).max(f64::MIN_POSITIVE));
-    let drifting = || {
-        slope
-            .iter()
-            .zip(starts_s)
-            .map(|(slope, t_s)| slope * (t_s - middle) / half)
-    };
-    let drift = channel.instant_sigma_s.map(|_| ("instant_drift", drifting().collect()));
-    let shapes = [("instant", slope.clone())].into_iter().chain(drift);
-    columns.extend(shapes.map(|(name, values)| Column {
-        name: format!("{name}_{}", channel.name),
-        sigma,
-        entries: vec![(index, values)],
-    }));
-    columns
-}
 
 /// An effect in a model: what, how large, and for effects that come and go, when.
 #[derive(Clone, Debug)]
@@ -93,8 +40,10 @@ pub struct Component {
 pub struct Frame {
     /// Its samples.
     pub series: Series,
-    /// Physical units a unit of noise in the fit.
-    pub weight_sigma: f64,
+    /// Physical units a unit of noise in the fit, sample by sample.
+    pub weights: DVector<f64>,
+    /// The sensor's own noise over that, as described.
+    pub own: DVector<f64>,
     /// What the calibration leaves open, in units of noise for one prior sigma.
     pub nuisance: DMatrix<f64>,
     /// Names and prior sigmas of those columns.
@@ -124,7 +73,7 @@ impl Frame {
 
     /// Weighs its samples anew: the noise is `factor` times what it was taken for.
     pub fn reweigh(&mut self, factor: f64) {
-        self.weight_sigma *= factor;
+        self.weights *= factor;
         self.nuisance /= factor;
         let open = self.nuisance.ncols();
         self.factor = Cholesky::new(DMatrix::identity(open, open) + self.nuisance.tr_mul(&self.nuisance));
@@ -142,15 +91,19 @@ pub struct Problem<'a> {
     pub twin: &'a Twin,
     /// In the unit's channel order.
     pub frames: Vec<Frame>,
-    /// Standard deviation of a sample as the nominal twin has it, reference included, in the unit's channel order.
-    pub sigmas: Vec<f64>,
+    /// Standard deviation of a sample as the nominal twin has it, reference included, channel by channel at every row of the
+    /// log.
+    pub sigmas: Vec<Vec<f64>>,
     /// What the reference leaves open, common to several channels.
     pub reference: Vec<Column>,
+    /// What told the truth.
+    pub instrument: &'a Reference,
 }
 
 impl<'a> Problem<'a> {
     /// Sets it up.
-    pub fn new(twin: &'a Twin, fit: &Fit, accuracy: &Accuracy) -> Self {
+    pub fn new(twin: &'a Twin, fit: &Fit, instrument: &'a Reference) -> Self {
+        let accuracy = &instrument.accuracy;
         let starts_s = twin.starts_s();
         let steps = starts_s.len().saturating_sub(1).max(1) as f64;
         let rate_hz = steps / (starts_s.last().unwrap_or(&1.0) - starts_s.first().unwrap_or(&0.0)).max(f64::EPSILON);
@@ -158,26 +111,33 @@ impl<'a> Problem<'a> {
         let mut sigmas = Vec::new();
         let mut frames = Vec::new();
         for (index, (channel, series)) in twin.unit().channels.iter().zip(&fit.channels).enumerate() {
-            let reference = match channel.sensor {
+            let slow = match channel.sensor {
                 Kind::Accelerometer => twin.environment().gravity * accuracy.attitude_sigma_rad,
                 Kind::Magnetometer => accuracy
                     .field_sigma_ut
                     .hypot(twin.environment().field_n_ut.norm() * accuracy.attitude_sigma_rad),
-                Kind::Gyro | Kind::Thermometer => 0.0,
+                Kind::Gyro => accuracy.attitude_sigma_rad / REFERENCE_CORRELATION_S,
+                Kind::Thermometer => 0.0,
             };
-            sigmas.push(channel.sigma().hypot(reference));
-            let weight_sigma = channel.sigma().hypot(reference * alike.sqrt());
-            let columns = calibration(twin, index);
+            let fast = |row: usize| channel.sigma().hypot(instrument.fast_sigma(index, row));
+            sigmas.push((0..starts_s.len()).map(|row| fast(row).hypot(slow)).collect());
+            let rows = series
+                .rows
+                .iter()
+                .map(|row| fast(*row as usize).hypot(slow * alike.sqrt()));
+            let weights = DVector::from_iterator(series.rows.len(), rows);
+            let columns = calibration(twin, instrument, index);
             let nuisance = DMatrix::from_fn(series.rows.len(), columns.len(), |row, column| {
                 let column = &columns[column];
-                column.entries[0].1[series.rows[row] as usize] * column.sigma / weight_sigma
+                column.entries[0].1[series.rows[row] as usize] * column.sigma / weights[row]
             });
             let open = nuisance.ncols();
             frames.push(Frame {
                 quiet_energy: 0.0,
                 factor: Cholesky::new(DMatrix::identity(open, open) + nuisance.tr_mul(&nuisance)),
                 series: series.clone(),
-                weight_sigma,
+                own: weights.map(|weight| channel.sigma() / weight),
+                weights,
                 nuisance,
                 nuisance_names: columns.into_iter().map(|column| (column.name, column.sigma)).collect(),
             });
@@ -187,9 +147,34 @@ impl<'a> Problem<'a> {
             frames,
             sigmas,
             reference: twin.field_columns(accuracy),
+            instrument,
         };
         problem.settle();
         problem
+    }
+
+    /// The unit's own noise over what it scatters with the fast errors of the reference in, of a channel at a row.
+    pub fn own_part(&self, channel: usize, row: usize) -> f64 {
+        let own = self.twin.unit().channels[channel].sigma();
+        let fast = self.instrument.fast_sigma(channel, row);
+        if fast > 0.0 { own / own.hypot(fast) } else { 1.0 }
+    }
+
+    /// Whether the reference errs more than a channel scatters by itself: how that scatters then says nothing.
+    pub fn is_limited(&self, channel: usize) -> bool {
+        let own = self.twin.unit().channels[channel].sigma();
+        let sigmas = &self.sigmas[channel];
+        let mean = sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len().max(1) as f64;
+        mean > 2.0 * own * own
+    }
+
+    /// Residuals in units of noise as they are in standard deviations of a sample: what is alike over many samples counts for
+    /// less in the fit than it scatters.
+    pub fn in_sigmas(&self, channel: usize, residuals: &DVector<f64>) -> DVector<f64> {
+        let frame = &self.frames[channel];
+        let samples = residuals.iter().zip(frame.weights.iter()).zip(&frame.series.rows);
+        let standard = samples.map(|((rest, weight), row)| rest * weight / self.sigmas[channel][*row as usize]);
+        DVector::from_iterator(residuals.len(), standard)
     }
 
     /// Weighs channels anew by these factors of their noise.
@@ -237,8 +222,13 @@ impl<'a> Problem<'a> {
     pub fn residual(&self, channel: usize, model: &[Component]) -> DVector<f64> {
         let predicted = self.predict(channel, model);
         let frame = &self.frames[channel];
-        let pairs = frame.series.rows.iter().zip(&frame.series.values);
-        let errors = pairs.map(|(row, value)| (value - predicted[*row as usize]) / frame.weight_sigma);
+        let samples = frame
+            .series
+            .rows
+            .iter()
+            .zip(&frame.series.values)
+            .zip(frame.weights.iter());
+        let errors = samples.map(|((row, value), weight)| (value - predicted[*row as usize]) / weight);
         DVector::from_iterator(frame.series.rows.len(), errors)
     }
 
@@ -261,8 +251,8 @@ impl<'a> Problem<'a> {
     pub fn contribution(&self, model: &[Component], of: usize) -> Vec<(usize, DVector<f64>)> {
         let fitted = |(channel, added): (usize, Vec<f64>)| {
             let frame = &self.frames[channel];
-            let rows = frame.series.rows.iter();
-            let values = rows.map(|row| added[*row as usize] / frame.weight_sigma);
+            let rows = frame.series.rows.iter().zip(frame.weights.iter());
+            let values = rows.map(|(row, weight)| added[*row as usize] / weight);
             (channel, DVector::from_iterator(frame.series.rows.len(), values))
         };
         self.added(model, of).into_iter().map(fitted).collect()
@@ -271,7 +261,7 @@ impl<'a> Problem<'a> {
     /// What a channel's calibration still leaves open once it is fitted, in physical units at every row of the log: a row of
     /// the matrix for each direction, for one standard deviation.
     pub fn still_open(&self, channel: usize) -> DMatrix<f64> {
-        let columns = calibration(self.twin, channel);
+        let columns = calibration(self.twin, self.instrument, channel);
         let mut open = DMatrix::from_fn(columns.len(), self.twin.starts_s().len(), |column, row| {
             columns[column].entries[0].1[row] * columns[column].sigma
         });
@@ -292,10 +282,10 @@ impl<'a> Problem<'a> {
         let starts_s = self.twin.starts_s();
         let at = |(channel, values): &(usize, Vec<f64>)| {
             let frame = &self.frames[*channel];
-            let of_row = frame.series.rows.iter().map(|row| {
+            let of_row = frame.series.rows.iter().zip(frame.weights.iter()).map(|(row, weight)| {
                 let row = *row as usize;
                 let is_on = span.is_none_or(|span| span.contains(starts_s[row]));
-                if is_on { values[row] / frame.weight_sigma } else { 0.0 }
+                if is_on { values[row] / weight } else { 0.0 }
             });
             (*channel, DVector::from_iterator(frame.series.rows.len(), of_row))
         };

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Feel, Kind};
 
 use crate::{
-    leftover::{Clock, LEVELS, View},
-    problem::{Frame, Problem, conversion_period_s},
+    leftover::{Clock, Instrument, LEVELS, View},
+    open::conversion_period_s,
+    problem::{Frame, Problem},
 };
 
 /// Quantities of the motion: rate, force and field in b, temperature.
@@ -62,12 +63,14 @@ pub fn views(problem: &Problem) -> Vec<View> {
                 states[(frame.series.rows[row] as usize, column)]
             }),
             turned: DMatrix::from_fn(frame.series.rows.len(), 3, |row, axis| {
-                felt_b(row).cross(&channel.axis_b)[axis] / frame.weight_sigma
+                felt_b(row).cross(&channel.axis_b)[axis] / frame.weights[row]
             }),
             felt: DVector::from_fn(frame.series.rows.len(), |row, _| {
-                felt_b(row).dot(&channel.axis_b) / frame.weight_sigma
+                felt_b(row).dot(&channel.axis_b) / frame.weights[row]
             }),
             clock: clock(problem, index),
+            instrument: instrument(problem, index),
+            is_limited: problem.is_limited(index),
             levels: vec![
                 at(&|row| own[row]),
                 at(&|row| feels[row].rate_b.norm()),
@@ -79,18 +82,30 @@ pub fn views(problem: &Problem) -> Vec<View> {
     problem.frames.iter().enumerate().map(view).collect()
 }
 
+/// What the reference errs by in a channel at the fitted samples.
+fn instrument(problem: &Problem, index: usize) -> Option<Instrument> {
+    let (record, step_s) = problem.instrument.record(index)?;
+    let rows = || problem.frames[index].series.rows.iter().map(|row| *row as usize);
+    Some(Instrument {
+        own: rows().map(|row| problem.own_part(index, row)).collect(),
+        record,
+        places: rows().map(|row| problem.twin.starts_s()[row] / step_s).collect(),
+    })
+}
+
 /// The clock of a channel's part at the fitted samples.
 fn clock(problem: &Problem, index: usize) -> Option<Clock> {
     let (twin, frame) = (problem.twin, &problem.frames[index]);
     let period_s = conversion_period_s(&twin.unit().channels[index]);
-    let at_rows = |values: &[f64], scale: f64| -> Vec<f64> {
+    let at_rows = |values: &[f64]| -> Vec<f64> {
         let rows = frame.series.rows.iter();
-        rows.map(|row| values[*row as usize] * scale).collect()
+        rows.map(|row| values[*row as usize]).collect()
     };
+    let slopes = at_rows(&twin.by_instant(index)).into_iter().zip(frame.weights.iter());
     (period_s > 0.0).then(|| Clock {
         period_s,
-        instants_s: at_rows(&twin.instants_s(index), 1.0),
-        slopes: at_rows(&twin.by_instant(index), 1.0 / frame.weight_sigma),
+        instants_s: at_rows(&twin.instants_s(index)),
+        slopes: slopes.map(|(slope, weight)| slope / weight).collect(),
     })
 }
 

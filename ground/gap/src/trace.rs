@@ -47,7 +47,7 @@ pub fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
                 .map(|(row, value)| {
                     (
                         twin.starts_s()[*row as usize],
-                        (value - predicted[*row as usize]) / problem.sigmas[*channel],
+                        (value - predicted[*row as usize]) / problem.sigmas[*channel][*row as usize],
                     )
                 })
                 .collect()
@@ -65,10 +65,10 @@ pub fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
 pub fn cells(problem: &Problem, views: &[View]) -> Vec<(String, Vec<f64>)> {
     let cell = |(channel, view): (usize, &View)| {
         let mut sums = vec![(0.0, 0.0); STRETCHES];
-        let scale = problem.frames[channel].weight_sigma / problem.sigmas[channel];
-        for (phase, value) in view.phase.iter().zip(problem.residual(channel, &[]).iter()) {
+        let standard = problem.in_sigmas(channel, &problem.residual(channel, &[]));
+        for (phase, value) in view.phase.iter().zip(standard.iter()) {
             let sum = &mut sums[((phase * STRETCHES as f64) as usize).min(STRETCHES - 1)];
-            *sum = (sum.0 + (value * scale).powi(2), sum.1 + 1.0);
+            *sum = (sum.0 + value * value, sum.1 + 1.0);
         }
         (
             view.name.clone(),

@@ -82,7 +82,7 @@ mod warm_up;
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{Nature, Page, Scope, Symbol};
 pub use site::Site;
-pub use spread::{View, most_likely};
+pub use spread::{View, logged_step, most_likely};
 
 use crate::part::signal::Noise;
 use crate::predict::{Chain, UnitDescription};

@@ -19,6 +19,21 @@ pub struct View<'a> {
     pub predicted: &'a [f64],
     /// [physical unit] logged; NaN for no sample.
     pub measured: &'a [f64],
+    /// [physical unit] between two values that were logged, at least: [`logged_step`].
+    pub step: f64,
+}
+
+/// [physical unit] least distance between two values in a log, 0 if all are alike. A file of physical units does not say that
+/// a part rounds, but shows it.
+pub fn logged_step(measured: &[f64]) -> f64 {
+    let mut values: Vec<f64> = measured.iter().copied().filter(|value| value.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let steps = values
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0);
+    let least = steps.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
 }
 
 /// Part of sigma that a log without rounding resolves.
@@ -32,7 +47,7 @@ impl View<'_> {
         if self.channel.bits.is_some() {
             self.channel.lsb
         } else {
-            RESOLVED * self.channel.sigma()
+            self.step.max(RESOLVED * self.channel.sigma())
         }
     }
 

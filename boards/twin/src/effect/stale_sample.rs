@@ -23,6 +23,9 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
+/// [sigma] within which a reading is of what is measured.
+const FRESH: f64 = 8.0;
+
 impl Effect for StaleSample {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -35,11 +38,13 @@ impl Effect for StaleSample {
             let sigma = view.channel.sigma();
             let sample = |(k, residual): (usize, f64)| {
                 let fresh = view.normal(residual, sigma);
-                let Some(before) = k.checked_sub(1).map(|k| view.measured[k]) else {
-                    return fresh;
-                };
-                let repeated = (view.measured[k] - before).abs() < 0.5 * view.resolution();
-                mixed(p, fresh, if repeated { 0.0 } else { f64::NEG_INFINITY })
+                let repeats =
+                    |k: usize| k > 0 && (view.measured[k] - view.measured[k - 1]).abs() < 0.5 * view.resolution();
+                let first = (0..=k).rev().find(|k| !repeats(*k)).unwrap_or(0);
+                // What was no reading of the sensor when it was fresh is none when it is sent again.
+                let was_read = (view.measured[first] - view.predicted[first]).abs() < FRESH * sigma;
+                let stale = if first < k && was_read { 0.0 } else { f64::NEG_INFINITY };
+                mixed(p, fresh, stale)
             };
             view.residuals().map(sample).sum()
         };

@@ -19,6 +19,9 @@ const DRIFT_TERMS: usize = 8;
 /// [s] step of the difference quotient by the instant: motions change over tenths of a second.
 const INSTANT_STEP_S: f64 = 1e-4;
 
+/// [s] of the second: rounding costs it the square.
+const BEND_STEP_S: f64 = 2e-3;
+
 /// How well the reference and the field are known, one sigma each; zero for exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
@@ -98,16 +101,26 @@ impl Twin {
 
     /// Derivative of one channel's readings by the instant at which it is read.
     pub fn by_instant(&self, index: usize) -> Vec<f64> {
-        let channel = &self.unit.channels[index];
-        let read_at = |later_s: f64| {
-            let mut chain = super::Chain::of(channel);
-            chain.read_late(move |_| later_s);
-            self.inputs(&chain, channel.tau_s(), &self.instants_s(index))
-        };
-        let pairs = read_at(INSTANT_STEP_S).into_iter().zip(read_at(-INSTANT_STEP_S));
+        let pairs = (self.read_at(index, INSTANT_STEP_S).into_iter()).zip(self.read_at(index, -INSTANT_STEP_S));
         pairs
             .map(|(later, earlier)| (later - earlier) / (2.0 * INSTANT_STEP_S))
             .collect()
+    }
+
+    /// Second derivative of one channel's readings by the instant at which it is read.
+    pub fn bend(&self, index: usize) -> Vec<f64> {
+        let [later, now, earlier] = [BEND_STEP_S, 0.0, -BEND_STEP_S].map(|later_s| self.read_at(index, later_s));
+        let triples = later.into_iter().zip(now).zip(earlier);
+        triples
+            .map(|((later, now), earlier)| (later - 2.0 * now + earlier) / (BEND_STEP_S * BEND_STEP_S))
+            .collect()
+    }
+
+    fn read_at(&self, index: usize, later_s: f64) -> Vec<f64> {
+        let channel = &self.unit.channels[index];
+        let mut chain = super::Chain::of(channel);
+        chain.read_late(move |_| later_s);
+        self.inputs(&chain, channel.tau_s(), &self.instants_s(index))
     }
 
     /// What this channel would feel along another axis, without its bias.

@@ -18,6 +18,7 @@ use crate::{
     gross::{Gross, put_right},
     held::Held,
     log::{Column, Log, Masked, Stream},
+    reference::{Reference, finer, used},
     windows::{Fit, Span},
 };
 
@@ -31,10 +32,6 @@ const LEAST_SEEN: f64 = 0.9;
 /// Rows that are kept at most: 40 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
 const MOST_ROWS: usize = 12_000;
 
-/// [Hz] corners to which a reference that is not exact is smoothed, of attitude and position: a hand moves below them, and
-/// above them an optical system's noise, differentiated once or twice, is more than the unit's own.
-const REFERENCE_HZ: [f64; 2] = [25.0, 12.0];
-
 /// [s] beside a gap of such a reference where it still bends towards what is not known.
 const BESIDE_GAP_S: f64 = 0.5;
 
@@ -45,7 +42,7 @@ pub struct Subject {
     /// The twin along the log.
     pub twin: Twin,
     /// How well the reference knows.
-    pub accuracy: Accuracy,
+    pub reference: Reference,
     /// What may be fitted.
     pub fit: Fit,
     /// What only judges.
@@ -78,8 +75,8 @@ impl Subject {
         let mut log = opened.log(&columns, unit.cycle_s)?;
         let name = opened.text.motion.clone().unwrap_or_default();
         let file = opened.path(&name);
-        let mut motion = Recorded::open(&file)?;
-        let (from_s, to_s) = motion.span_s();
+        let record = Recorded::open(&file)?;
+        let (from_s, to_s) = record.span_s();
         log = within_windows(log, &opened);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
@@ -92,28 +89,45 @@ impl Subject {
             return Err(CaseError::key(&file, "t_s", problem));
         }
         let mut lost_s = vec![(f64::NEG_INFINITY, from_s)];
-        lost_s.extend(motion.lost_s());
+        lost_s.extend(record.lost_s());
         lost_s.push((to_s, f64::INFINITY));
-        if opened.text.reference.attitude_sigma_rad > 0.0 {
+        let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
+        if !is_exact {
             lost_s
                 .iter_mut()
                 .for_each(|(from_s, to_s)| (*from_s, *to_s) = (*from_s - BESIDE_GAP_S, *to_s + BESIDE_GAP_S));
-            motion = motion.smoothed(REFERENCE_HZ[0], REFERENCE_HZ[1]);
         }
         let unseen = drop_unseen(&mut log, &lost_s, &unit);
         let (fit, held) = opened.windows.part(&log);
         check_windows(&opened, &fit, &held)?;
-        let step_s = motion.step_s();
-        let scene = Scene::new(&motion, &environment, from_s, to_s, step_s);
         let Log {
             start_s,
             masked,
             stream,
             ..
         } = log;
+        let step_s = record.step_s();
+        let along = |motion: &Recorded, starts_s: &[f64]| {
+            let scene = Scene::new(motion, &environment, from_s, to_s, step_s);
+            Twin::new(unit.clone(), environment, scene, starts_s.to_vec())
+        };
+        let stated = accuracy(&opened);
+        let (twin, reference) = if is_exact {
+            (along(&record, &start_s)?, Reference::stated(stated))
+        } else {
+            let (used, finer) = (used(&record), finer(&record));
+            let even: Vec<f64> = (0..MOST_ROWS)
+                .map(|row| from_s + row as f64 * step_s)
+                .filter(|t_s| *t_s < to_s)
+                .collect();
+            let twin = along(&used, &start_s)?;
+            let dense = [along(&used, &even)?, along(&finer, &even)?];
+            let reference = Reference::seen(stated, [&twin, &along(&finer, &start_s)?], [&dense[0], &dense[1]]);
+            (twin, reference)
+        };
         Ok(Subject {
-            twin: Twin::new(unit, environment, scene, start_s)?,
-            accuracy: accuracy(&opened),
+            twin,
+            reference,
             opened,
             fit,
             held,
@@ -158,7 +172,7 @@ impl Subject {
         let starts_s = (0..used.len()).map(|row| row as f64).collect();
         Ok(Subject {
             twin: Twin::new(unit, environment, Scene::table(&used), starts_s)?,
-            accuracy: accuracy(&opened),
+            reference: Reference::stated(accuracy(&opened)),
             opened,
             fit,
             held,

@@ -116,10 +116,10 @@ impl Held {
 /// What a perfect twin would have measured: its own predictions with its own noise, where samples are.
 fn perfect(measured: &[Vec<f64>], finished: &Finished) -> Vec<Vec<f64>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    let mut noisy = |(measured, (before, sigma)): (&Vec<f64>, (&Vec<f64>, &f64))| -> Vec<f64> {
-        let samples = measured.iter().zip(before);
+    let mut noisy = |(measured, (before, sigmas)): (&Vec<f64>, (&Vec<f64>, &Vec<f64>))| -> Vec<f64> {
+        let samples = measured.iter().zip(before).zip(sigmas);
         samples
-            .map(|(measured, before)| {
+            .map(|((measured, before), sigma)| {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 // A hole stays one.
                 if measured.is_finite() {

@@ -24,8 +24,10 @@ pub struct Claimed<'a> {
     pub covariance: &'a DMatrix<f64>,
     /// Predictions of every row with everything in, channel by channel.
     pub after: &'a [Vec<f64>],
-    /// Standard deviation of a sample, one a channel.
-    pub sigmas: &'a [f64],
+    /// Standard deviation of a sample at every row, channel by channel.
+    pub sigmas: &'a [Vec<f64>],
+    /// How much more a sample scatters than that, one a channel.
+    pub louder: &'a [f64],
 }
 
 /// An effect's strength on the held-out windows over that on the fit windows.
@@ -62,17 +64,18 @@ impl Held {
         let (mut energy, mut along) = (0.0, 0.0);
         let mut by_parameter = DVector::zeros(claimed.slopes.len());
         for ((channel, added), open) in claimed.added.iter().zip(claimed.open) {
-            let (series, sigma) = (&self.channels[*channel], claimed.sigmas[*channel]);
+            let series = &self.channels[*channel];
+            let sigma = |row: usize| claimed.sigmas[*channel][row] * claimed.louder[*channel];
             let after = &claimed.after[*channel];
             let samples = series.rows.iter().map(|row| *row as usize).zip(&series.values);
             let seen: Vec<(usize, f64)> = samples
-                .map(|(row, value)| (row, (value - after[row]) / sigma))
+                .map(|(row, value)| (row, (value - after[row]) / sigma(row)))
                 .filter(|(row, rest)| rest.is_finite() && added[*row].is_finite())
                 .collect();
-            let own = DVector::from_iterator(seen.len(), seen.iter().map(|(row, _)| added[*row] / sigma));
+            let own = DVector::from_iterator(seen.len(), seen.iter().map(|(row, _)| added[*row] / sigma(*row)));
             let rest = DVector::from_iterator(seen.len(), seen.iter().map(|(_, rest)| *rest));
             let nuisance = DMatrix::from_fn(seen.len(), open.nrows(), |at, column| {
-                open[(column, seen[at].0)] / sigma
+                open[(column, seen[at].0)] / sigma(seen[at].0)
             });
             // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
             let imitated = nuisance.tr_mul(&own);
@@ -86,7 +89,9 @@ impl Held {
                     continue;
                 };
                 let pairs = apart.iter().zip(&seen);
-                *sum += pairs.map(|(apart, (row, _))| apart * values[*row] / sigma).sum::<f64>();
+                *sum += pairs
+                    .map(|(apart, (row, _))| apart * values[*row] / sigma(*row))
+                    .sum::<f64>();
             }
         }
         (energy > 0.0).then(|| Promise {
@@ -132,7 +137,8 @@ mod tests {
             slopes: &slopes,
             covariance: &DMatrix::from_element(1, 1, fitted_sigma * fitted_sigma),
             after: &after,
-            sigmas: &[0.1],
+            sigmas: &[vec![0.1; SAMPLES]],
+            louder: &[1.0],
         };
         held.promise(claimed).expect("it adds something")
     }

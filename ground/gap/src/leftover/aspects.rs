@@ -51,6 +51,10 @@ const OF_CHANNEL: [&str; 9] = [
     "a calibration beyond its sigmas",
 ];
 
+/// Those of [`OF_CHANNEL`] that look at nothing but how a sample scatters. Where the reference errs more than the sensor
+/// scatters, and is itself known to a third, they would find the reference.
+const OF_SCATTER: [usize; 4] = [0, 4, 5, 7];
+
 /// Of them all, levels included.
 const EACH: usize = OF_CHANNEL.len() + LEVELLED.len();
 
@@ -189,10 +193,13 @@ impl<'a> Sights<'a> {
                 fitted.nuisance[index].norm_squared(),
             ];
             own.extend(view.levels.iter().map(|levels| between_levels(levels, values)));
+            if view.is_limited {
+                OF_SCATTER.iter().for_each(|at| own[*at] = 0.0);
+            }
             (together[view.kind].iter_mut().zip(&own)).for_each(|(all, own)| *all += own);
             sums.extend(own);
             common[view.kind] += &binned * view.axis_b.transpose();
-            for (phase, value) in view.phase.iter().zip(values) {
+            for (phase, value) in view.phase.iter().zip(values).filter(|_| !view.is_limited) {
                 stretches[view.kind][place(*phase, STRETCHES)] += value * value;
             }
         }

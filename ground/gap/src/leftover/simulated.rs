@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
-use super::View;
+use super::{View, instrument::Played};
 use crate::joint::Joint;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
@@ -57,6 +57,8 @@ pub fn simulate(
     let spread = ChiSquared::new(TAILS);
     // A Student variable of n degrees has variance n / (n - 2).
     let unit = (TAILS - 2.0).sqrt();
+    let is_seen = views.iter().any(|view| view.instrument.is_some());
+    let played = is_seen.then(|| Played::draw(random));
     let mut residuals: Vec<DVector<f64>> = Vec::new();
     for columns in joint.columns() {
         residuals.push(DVector::from_fn(columns.nuisance.nrows(), |_, _| {
@@ -71,6 +73,9 @@ pub fn simulate(
     }
     for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
         let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
+        if let Some((instrument, played)) = view.instrument.as_ref().zip(played.as_ref()) {
+            (residual.iter_mut().enumerate()).for_each(|(sample, own)| *own = instrument.err(sample, *own, played));
+        }
         residual.gemv(1.0, &columns.nuisance, &open, 1.0);
         residual.gemv(1.0, &columns.effects, parameters, 1.0);
         if let Some(clock) = &view.clock {

@@ -25,6 +25,8 @@ fn scene() -> (Vec<View>, Joint) {
         }),
         felt: DVector::from_fn(SAMPLES, |row, _| (row as f64 * 0.07 + channel as f64).sin()),
         clock: None,
+        instrument: None,
+        is_limited: false,
         levels: vec![(0..SAMPLES).map(|row| (row % LEVELS) as u8).collect(); LEVELLED.len()],
     };
     let columns = Columns {

@@ -118,6 +118,7 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
                 t_s: &t_s[channel],
                 predicted: &predicted[channel],
                 measured: &measured[channel],
+                step: 0.0,
             };
             channels.iter().map(view).collect()
         }
@@ -185,6 +186,7 @@ fn digits_garbled_here_and_there_are_no_stuck_bit() {
         t_s: &t_s,
         predicted: &predicted[channel],
         measured: &measured,
+        step: 0.0,
     };
     let gain = |name: &str| {
         let effect = by_name(name).unwrap();
@@ -231,6 +233,7 @@ fn what_shakes_several_sensors_is_as_strong_as_it_is_wherever_its_frequency_lies
                 t_s: &t_s[channel],
                 predicted: &predicted[channel],
                 measured: &measured[channel],
+                step: 0.0,
             })
             .collect();
         let settled_hz = effect.settled(&views).unwrap();
@@ -245,4 +248,38 @@ fn what_shakes_several_sensors_is_as_strong_as_it_is_wherever_its_frequency_lies
         // would cost a third.
         assert!((mean / 0.5 - 0.95).abs() < 0.05, "{bins}: {mean}");
     }
+}
+
+#[test]
+fn values_that_a_file_rounds_repeat_by_chance_and_are_not_stale() {
+    let twin = twin(DENSE);
+    let channel = twin.unit().channel("m3x").unwrap();
+    let predicted = vec![vec![10.0; twin.starts_s().len()]; twin.unit().channels.len()];
+    let mut described = twin.unit().channels[channel].clone();
+    described.bits = None;
+    // A tenth of sigma: every thirtieth value is that before it.
+    let rounded_to = 0.1 * described.sigma();
+    let measured: Vec<f64> = (noisy(&twin, &predicted, 5)[channel].iter())
+        .map(|value| (value / rounded_to).round() * rounded_to)
+        .collect();
+    let step = logged_step(&measured);
+    assert!((step - rounded_to).abs() < 1e-9, "{step}");
+    let t_s = twin.instants_s(channel);
+    let gain = |measured: &[f64], step: f64| {
+        let view = View {
+            channel: &described,
+            t_s: &t_s,
+            predicted: &predicted[channel],
+            measured,
+            step,
+        };
+        most_likely(by_name("stale-sample").unwrap(), 0.0, &[view]).1
+    };
+    let chance = gain(&measured, step);
+    assert!(chance < 3.0, "{chance}");
+    assert!(gain(&measured, 0.0) > 30.0, "the step is what tells");
+    let stale: Vec<f64> = (0..measured.len())
+        .map(|k| measured[k - usize::from(k % 10 == 1)])
+        .collect();
+    assert!(gain(&stale, step) > 30.0);
 }

@@ -1,0 +1,95 @@
+//! The errors of a reference from sample to sample, drawn anew.
+//!
+//! In: of a channel, a record of such errors, an octave too fast and of unit variance. Out: an error at any sample, likewise of
+//! unit variance. The record is played slower: at half speed it is the octave below, which is most of what is left in the
+//! reference; at a quarter the next, with half the variance, and so on ([`OCTAVES`]). It keeps the tails that markers lost and
+//! found again give, and played from the same place in every channel what channels have in common. Where it starts is drawn.
+
+use std::rc::Rc;
+
+use rand_distr::{Distribution, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Octaves below the record's own.
+const OCTAVES: i32 = 6;
+
+/// What a channel needs for it.
+#[derive(Clone, Debug)]
+pub struct Instrument {
+    /// The channel's own noise over all that it scatters, at each sample.
+    pub own: Vec<f64>,
+    /// The record.
+    pub record: Rc<[f64]>,
+    /// Place of each sample in the record, were it played as fast as it is.
+    pub places: Vec<f64>,
+}
+
+/// Where in the record each octave starts, as a part of its length, and with which sign.
+#[derive(Clone, Debug)]
+pub struct Played {
+    starts: Vec<(f64, f64)>,
+}
+
+impl Played {
+    /// Draws.
+    pub fn draw(random: &mut Xoshiro256PlusPlus) -> Self {
+        let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
+        let starts = (0..OCTAVES)
+            .map(|_| (between(0.0, 1.0), between(-1.0, 1.0).signum()))
+            .collect();
+        Self { starts }
+    }
+}
+
+impl Instrument {
+    /// What a sample is off, in standard deviations of it, given its sensor's own.
+    pub fn err(&self, sample: usize, own: f64, played: &Played) -> f64 {
+        let part = self.own[sample];
+        part * own + (1.0 - part * part).max(0.0).sqrt() * self.error(sample, played)
+    }
+
+    /// One standard deviation of error of the reference, more or less, at a sample.
+    fn error(&self, sample: usize, played: &Played) -> f64 {
+        let length = self.record.len() as f64;
+        let octaves = (1i32..).zip(&played.starts);
+        let (sum, variance) = octaves.fold((0.0, 0.0), |(sum, variance), (octave, (start, sign))| {
+            let place = (start * length + self.places[sample] * 0.5f64.powi(octave)).rem_euclid(length);
+            let (below, part) = (place as usize % self.record.len(), place.fract());
+            let above = (below + 1) % self.record.len();
+            let value = self.record[below] * (1.0 - part) + self.record[above] * part;
+            let own = 0.5f64.powi(octave);
+            (sum + sign * own.sqrt() * value, variance + own)
+        });
+        sum / variance.sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    use super::*;
+
+    #[test]
+    fn it_is_of_unit_variance_and_an_octave_slower_than_the_record() {
+        let record: Rc<[f64]> = (0..4000).map(|k| 2f64.sqrt() * (f64::from(k) * 1.3).sin()).collect();
+        let instrument = Instrument {
+            own: vec![0.0; 4000],
+            record: Rc::clone(&record),
+            places: (0..4000).map(f64::from).collect(),
+        };
+        let played = Played::draw(&mut Xoshiro256PlusPlus::seed_from_u64(3));
+        let errors: Vec<f64> = (0..4000).map(|sample| instrument.error(sample, &played)).collect();
+        let mean_of = |of: &dyn Fn(usize) -> f64| (0..3999).map(of).sum::<f64>() / 3999.0;
+        let energy = mean_of(&|k| errors[k] * errors[k]);
+        // Between samples of a wave of 1.3 rad a step a straight line loses a fifth of its energy.
+        assert!((0.7..1.1).contains(&energy), "{energy}");
+        let alike = |values: &[f64]| mean_of(&|k| values[k] * values[k + 1]) / mean_of(&|k| values[k] * values[k]);
+        assert!(
+            alike(&record) < 0.3 && alike(&errors) > 0.6,
+            "{} {}",
+            alike(&record),
+            alike(&errors)
+        );
+    }
+}
