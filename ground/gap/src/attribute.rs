@@ -6,13 +6,22 @@
 //! A screen of all hypotheses costs matrices only ([`crate::evidence`]); the best few are then fitted by Gauss-Newton, because a
 //! latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its evidence, after
 //! the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against all rivals in its
-//! place, and dropped if the rest can do without it.
+//! place, and dropped if the rest can do without it. An effect that comes and goes is screened with the stretch of time in
+//! which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of another if it has to be on
+//! throughout.
 
+mod passing;
+mod rival;
 mod variant;
 
 use nalgebra::{DMatrix, DVector};
 
-use self::variant::{bounded, sharpened};
+pub use self::rival::Rival;
+use self::{
+    passing::{always, bounded, fitted, passing, stretches},
+    rival::compare,
+    variant::sharpened,
+};
 use crate::{
     library::Library,
     problem::{Component, Problem},
@@ -24,9 +33,6 @@ const MARGIN: f64 = 3.0;
 
 /// Candidates of a screen that are fitted exactly.
 const CANDIDATES: usize = 4;
-
-/// [nats] behind the chosen effect from which a rival is not worth an exact fit.
-const FAR: f64 = 50.0;
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
@@ -45,8 +51,8 @@ pub struct Chosen {
     pub covariance: DMatrix<f64>,
     /// [nats] over the model without it, prior odds included.
     pub gain: f64,
-    /// Hypotheses that could stand in its place, itself first, with their gain in nats; best first.
-    pub rivals: Vec<(usize, f64)>,
+    /// Hypotheses that could stand in its place, itself among them; best first.
+    pub rivals: Vec<Rival>,
 }
 
 /// What a log speaks for.
@@ -74,33 +80,48 @@ impl Attribution {
 pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64)) -> Attribution {
     let mut set: Vec<usize> = Vec::new();
     let mut best = refine(problem, library, &set, &[]);
+    let nothing = best.log_evidence;
     let mut scores = renewed_scores(problem, library, &set, &best);
     let mut alone = Vec::new();
     for round in 0..MOST_EFFECTS {
         progress(round as f64 / MOST_EFFECTS as f64);
         let base = estimate_of(library, &scores, &set);
         let mut gains = gains(library, &scores, &set, base);
+        let stretches = stretches(problem, library, &set, &best, nothing, &mut gains);
         if round < DISCRETE_ROUNDS {
             add_discrete(problem, library, &set, &best, &mut gains);
         }
         if round == 0 {
             alone = gains.clone();
         }
-        let mut found: Option<(f64, Vec<usize>, Refined)> = None;
+        let is_contested = stretches.iter().any(Option::is_some);
+        let mut found: Option<(f64, Vec<usize>)> = None;
         for candidate in leading(&gains, CANDIDATES) {
             let mut larger = set.clone();
             larger.push(candidate);
-            let refined = refine(problem, library, &larger, &best.thetas);
+            let refined = fitted(
+                problem,
+                library,
+                &larger,
+                &best.thetas,
+                stretches[candidate],
+                is_contested,
+            );
             let gain = refined.log_evidence - best.log_evidence + library.hypotheses[candidate].log_prior;
-            if is_physical(library, &larger, &refined) && found.as_ref().is_none_or(|(most, ..)| gain > *most) {
-                found = Some((gain, larger, refined));
+            if is_physical(library, &larger, &refined) && found.as_ref().is_none_or(|(most, _)| gain > *most) {
+                found = Some((gain, larger));
             }
         }
         match found {
-            Some((gain, larger, refined)) if gain > MARGIN => {
-                (set, best) = (larger, refined);
+            Some((gain, larger)) if gain > MARGIN => {
+                let span = larger.last().and_then(|added| stretches[*added]);
+                best = match span {
+                    Some(span) => passing(problem, library, &larger, &best.thetas, span),
+                    None => refine(problem, library, &larger, &best.thetas),
+                };
+                set = larger;
                 best = sharpened(problem, library, &set, best);
-                (set, best) = bounded(problem, library, set, best);
+                best = bounded(problem, library, &set, best);
                 (set, best) = prune(problem, library, set, best);
                 scores = renewed_scores(problem, library, &set, &best);
             }
@@ -109,7 +130,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     }
     let mut chosen = Vec::new();
     for at in 0..set.len() {
-        chosen.push(compare(problem, library, &scores, &set, &best, at));
+        chosen.push(compare(problem, library, &scores, &set, &best, nothing, at));
     }
     // A rival that does better in the place of a chosen one takes it; the comparison is then made anew.
     for _ in 0..MOST_EFFECTS {
@@ -117,27 +138,23 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
             chosen
                 .rivals
                 .first()
-                .is_some_and(|(rival, gain)| *rival != set[*at] && *gain > chosen.gain)
+                .is_some_and(|rival| rival.hypothesis != set[*at] && rival.gain > chosen.gain)
         });
-        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0].0)) else {
+        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0])) else {
             break;
         };
-        set[at] = winner;
-        let start: Vec<DVector<f64>> = set
-            .iter()
-            .enumerate()
-            .map(|(i, h)| {
-                if i == at {
-                    DVector::zeros(library.hypotheses[*h].parameters.len())
-                } else {
-                    best.thetas[i].clone()
-                }
-            })
-            .collect();
-        best = refine(problem, library, &set, &start);
+        always(problem, library, set.remove(at));
+        set.push(winner.hypothesis);
+        let mut start = best.thetas.clone();
+        start.remove(at);
+        best = match winner.span {
+            Some(span) => passing(problem, library, &set, &start, span),
+            None => refine(problem, library, &set, &start),
+        };
+        best = sharpened(problem, library, &set, best);
         scores = renewed_scores(problem, library, &set, &best);
         chosen = (0..set.len())
-            .map(|at| compare(problem, library, &scores, &set, &best, at))
+            .map(|at| compare(problem, library, &scores, &set, &best, nothing, at))
             .collect();
     }
     chosen.sort_by(|one, other| other.gain.total_cmp(&one.gain));
@@ -260,7 +277,7 @@ fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refin
 }
 
 /// Drops members the others can do without.
-fn prune(problem: &Problem, library: &Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
+fn prune(problem: &Problem, library: &mut Library, set: Vec<usize>, best: Refined) -> (Vec<usize>, Refined) {
     let (mut set, mut best) = (set, best);
     let mut at = 0;
     while at < set.len() && set.len() > 1 {
@@ -269,6 +286,7 @@ fn prune(problem: &Problem, library: &Library, set: Vec<usize>, best: Refined) -
         thetas.remove(at);
         let refined = refine(problem, library, &smaller, &thetas);
         if best.log_evidence - refined.log_evidence + library.hypotheses[dropped].log_prior < 0.0 {
+            always(problem, library, dropped);
             (set, best) = (smaller, refined);
             at = 0;
         } else {
@@ -276,47 +294,4 @@ fn prune(problem: &Problem, library: &Library, set: Vec<usize>, best: Refined) -
         }
     }
     (set, best)
-}
-
-/// One member against all that could stand in its place.
-fn compare(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], best: &Refined, at: usize) -> Chosen {
-    let (mut others, mut thetas) = (set.to_vec(), best.thetas.clone());
-    let own = others.remove(at);
-    thetas.remove(at);
-    let without = refine(problem, library, &others, &thetas);
-    let base = estimate_of(library, scores, &others);
-    let mut rivals = vec![(
-        own,
-        best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior,
-    )];
-    let mut linear = gains(library, scores, &others, base);
-    linear[own] = f64::NEG_INFINITY;
-    let own_gain = rivals[0].1;
-    for rival in leading(&linear, CANDIDATES) {
-        if linear[rival] < own_gain - FAR {
-            rivals.push((rival, linear[rival]));
-            continue;
-        }
-        let mut tried = others.clone();
-        tried.push(rival);
-        let refined = refine(problem, library, &tried, &thetas);
-        if is_physical(library, &tried, &refined) {
-            let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
-            rivals.push((rival, gain));
-        }
-    }
-    rivals.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let from = library.reference
-        + set[..at]
-            .iter()
-            .map(|h| library.hypotheses[*h].parameters.len())
-            .sum::<usize>();
-    let width = best.thetas[at].len();
-    Chosen {
-        hypothesis: own,
-        theta: best.thetas[at].clone(),
-        covariance: best.estimate.covariance.view((from, from), (width, width)).into_owned(),
-        gain: best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior,
-        rivals,
-    }
 }

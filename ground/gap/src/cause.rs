@@ -6,7 +6,7 @@
 use twin::effect::{Page, Parameter};
 
 use crate::{
-    attribute::{Attribution, Chosen},
+    attribute::{Attribution, Chosen, Rival},
     case::Subject,
     evidence::probabilities,
     library::Library,
@@ -204,13 +204,13 @@ pub fn share_out(causes: &mut [Cause]) {
 }
 
 /// Probabilities of the effects among rivals, places added up; what is missing from one is "nothing".
-pub fn by_effect(library: &Library, rivals: &[(usize, f64)]) -> Vec<(&'static str, f64)> {
-    let mut gains: Vec<f64> = rivals.iter().map(|(_, gain)| *gain).collect();
+pub fn by_effect(library: &Library, rivals: &[Rival]) -> Vec<(&'static str, f64)> {
+    let mut gains: Vec<f64> = rivals.iter().map(|rival| rival.gain).collect();
     gains.push(0.0);
     let shares = probabilities(&gains, &vec![0.0; gains.len()], TEMPERATURE);
     let mut sums: Vec<(&'static str, f64)> = Vec::new();
-    for ((hypothesis, _), share) in rivals.iter().zip(shares) {
-        let name = library.hypotheses[*hypothesis].effect();
+    for (rival, share) in rivals.iter().zip(shares) {
+        let name = library.hypotheses[rival.hypothesis].effect();
         match sums.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += share,
             None => sums.push((name, share)),

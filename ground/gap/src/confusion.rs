@@ -51,10 +51,10 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
         let own = library.hypotheses[chosen.hypothesis].effect();
         let likely = by_effect(library, &chosen.rivals);
         let mut set = vec![own];
-        for (rival, _) in &chosen.rivals {
-            let name = library.hypotheses[*rival].effect();
+        for rival in chosen.rivals.iter().map(|rival| rival.hypothesis) {
+            let name = library.hypotheses[rival].effect();
             let is_likely = likely.iter().any(|(known, share)| *known == name && *share > POSSIBLE);
-            let is_near = nats_apart(library, chosen, *rival).is_some_and(|nats| nats < APART);
+            let is_near = nats_apart(library, chosen, rival).is_some_and(|nats| nats < APART);
             if !set.contains(&name) && (is_likely || is_near) {
                 set.push(name);
             }
@@ -73,8 +73,8 @@ pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
         chosen
             .rivals
             .iter()
-            .find(|(rival, _)| library.hypotheses[*rival].effect() != own)
-            .map(|(rival, gain)| (*rival, chosen.gain - gain))
+            .find(|rival| library.hypotheses[rival.hypothesis].effect() != own)
+            .map(|rival| (rival.hypothesis, chosen.gain - rival.gain))
     };
     let pairs = found
         .chosen

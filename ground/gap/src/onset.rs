@@ -1,22 +1,23 @@
 //! When an effect is on: a magnet that is brought and taken away, a heater that is switched on.
 //!
-//! In: an effect found over the whole fit, its slopes, and the residual without it. Out: the stretch of time in which it
-//! explains most, if that is much better than always. All stretches between [`EDGES`] instants are compared by their evidence
+//! In: an effect's slopes, and the residual without it. Out: the stretch of time in which it explains most, if that is much
+//! better than always, and by how much. All stretches between [`EDGES`] instants are compared by their evidence
 //! (a generalised likelihood ratio, Willsky and Jones 1976, with the prior's price); having compared them costs the logarithm
 //! of their number. A stretch that reaches an end of the fit is open there. Only effects whose cause
 //! [passes](twin::effect::Page::passes) have stretches.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::{
-    evidence::Screen,
-    library::Entries,
-    problem::{Component, Problem},
-    windows::Span,
-};
+use crate::{evidence::Screen, library::Entries, problem::Problem, windows::Span};
 
 /// Instants at which an effect may begin or end.
 const EDGES: usize = 41;
+
+/// Part of what a stretch explains that each half of it must.
+const LEAST_HALF: f64 = 0.1;
+
+/// Steps into which the distance to the next of them is parted, again and again, when the best two are known.
+const FINE: i32 = 8;
 
 /// [nats] a stretch must gain over always, beyond the price of having looked.
 const MARGIN: f64 = 10.0;
@@ -28,8 +29,29 @@ struct Piece {
     open: Vec<DMatrix<f64>>,
 }
 
-/// The stretch of time in which the effect with these `slopes` is on; `None` for always. `others` is the model without it.
-pub fn stretch(problem: &Problem, others: &[Component], slopes: &[Entries], sigmas: &[f64]) -> Option<Span> {
+impl Piece {
+    fn none(problem: &Problem, touched: &[usize], width: usize) -> Self {
+        let open = |channel: &usize| DMatrix::zeros(problem.frames[*channel].nuisance.ncols(), width);
+        Piece {
+            information: DMatrix::zeros(width, width),
+            score: DVector::zeros(width),
+            open: touched.iter().map(open).collect(),
+        }
+    }
+
+    fn add(&mut self, other: &Piece) {
+        self.information += &other.information;
+        self.score += &other.score;
+        self.open
+            .iter_mut()
+            .zip(&other.open)
+            .for_each(|(sum, open)| *sum += open);
+    }
+}
+
+/// The stretch of time in which the effect with these `slopes` is on, and the nats it gains over always, the price of having
+/// looked taken off; `None` for always. `rest` is the residual of every channel without it.
+pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(Span, f64)> {
     let starts_s = problem.twin.starts_s();
     let rows = problem
         .frames
@@ -39,7 +61,6 @@ pub fn stretch(problem: &Problem, others: &[Component], slopes: &[Entries], sigm
     let (from_s, to_s) = rows.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t| {
         (from.min(t), to.max(t))
     });
-    let edge = |index: usize| from_s + (to_s - from_s) * index as f64 / (EDGES - 1) as f64;
     let touched: Vec<usize> = (0..problem.frames.len())
         .filter(|channel| {
             slopes
@@ -47,39 +68,32 @@ pub fn stretch(problem: &Problem, others: &[Component], slopes: &[Entries], sigm
                 .any(|entries| entries.iter().any(|(index, _)| index == channel))
         })
         .collect();
-    let residuals: Vec<DVector<f64>> = touched
-        .iter()
-        .map(|channel| problem.residual(*channel, others))
-        .collect();
+    let residuals: Vec<&DVector<f64>> = touched.iter().map(|channel| &rest[*channel]).collect();
     let open_residuals: Vec<DVector<f64>> = touched
         .iter()
         .zip(&residuals)
         .map(|(channel, residual)| problem.frames[*channel].open_part(residual))
         .collect();
-    let pieces: Vec<Piece> = (0..EDGES - 1)
-        .map(|index| {
-            piece(
-                problem,
-                &touched,
-                &residuals,
-                slopes,
-                Span {
-                    from: edge(index),
-                    to: edge(index + 1),
-                },
-            )
-        })
-        .collect();
-    let evidence = |from: usize, to: usize| -> f64 {
-        let mut screen = Screen::zeros(sigmas.to_vec());
-        let mut open: Vec<DMatrix<f64>> = pieces[from].open.iter().map(|open| open * 0.0).collect();
-        for piece in &pieces[from..to] {
-            screen.information += &piece.information;
-            screen.score += &piece.score;
-            open.iter_mut().zip(&piece.open).for_each(|(sum, open)| *sum += open);
+    let sums = |edges: &[f64]| -> Vec<Piece> {
+        let mut sums = vec![Piece::none(problem, &touched, slopes.len())];
+        for pair in edges.windows(2) {
+            let span = Span {
+                from: pair[0],
+                to: pair[1],
+            };
+            let mut sum = piece(problem, &touched, &residuals, slopes, span);
+            sum.add(&sums[sums.len() - 1]);
+            sums.push(sum);
         }
-        for (open, residual) in open.iter().zip(&open_residuals) {
-            screen.information -= open.tr_mul(open);
+        sums
+    };
+    let evidence = |from: &Piece, to: &Piece| -> f64 {
+        let mut screen = Screen::zeros(sigmas.to_vec());
+        screen.information = &to.information - &from.information;
+        screen.score = &to.score - &from.score;
+        for ((to, from), residual) in to.open.iter().zip(&from.open).zip(&open_residuals) {
+            let open = to - from;
+            screen.information -= open.tr_mul(&open);
             screen.score -= open.tr_mul(residual);
         }
         let all: Vec<usize> = (0..sigmas.len()).collect();
@@ -87,20 +101,57 @@ pub fn stretch(problem: &Problem, others: &[Component], slopes: &[Entries], sigm
             .estimate(&all)
             .map_or(f64::NEG_INFINITY, |estimate| estimate.log_evidence)
     };
-    let always = evidence(0, EDGES - 1);
-    let stretches = (0..EDGES - 1).flat_map(|from| (from + 1..EDGES).map(move |to| (from, to)));
+    let best = |edges: &[f64], is_tried: &dyn Fn(f64, f64) -> bool| -> Option<(f64, (f64, f64))> {
+        let sums = sums(edges);
+        let pairs = (0..edges.len()).flat_map(|from| (from + 1..edges.len()).map(move |to| (from, to)));
+        let tried = pairs.filter(|(from, to)| is_tried(edges[*from], edges[*to]));
+        let judged = tried.map(|(from, to)| (evidence(&sums[from], &sums[to]), (edges[from], edges[to])));
+        let always = evidence(&sums[0], &sums[edges.len() - 1]);
+        let (most, span) = judged.max_by(|one, other| one.0.total_cmp(&other.0))?;
+        Some((most - always, span))
+    };
+    let step_s = (to_s - from_s) / (EDGES - 1) as f64;
+    let coarse: Vec<f64> = (0..EDGES).map(|index| from_s + step_s * index as f64).collect();
+    let last_s = coarse[EDGES - 1];
     let price = ((EDGES * (EDGES - 1) / 2) as f64).ln();
-    let (gain, (from, to)) = stretches
-        .map(|(from, to)| (evidence(from, to) - always, (from, to)))
-        .max_by(|one, other| one.0.total_cmp(&other.0))?;
-    let is_worth_it = gain > MARGIN + price && (from, to) != (0, EDGES - 1);
-    is_worth_it.then(|| Span {
-        from: if from == 0 { f64::NEG_INFINITY } else { edge(from) },
-        to: if to == EDGES - 1 { f64::INFINITY } else { edge(to) },
-    })
+    let (gain, (on_s, off_s)) = best(&coarse, &|_, _| true)?;
+    if gain <= MARGIN + price || (on_s == from_s && off_s == last_s) {
+        return None;
+    }
+    // Each edge nearer and nearer, down to a sample: one sample on the wrong side of a large step is an outlier.
+    let sample_s = (last_s - from_s) / problem.twin.starts_s().len().max(1) as f64;
+    let (mut most, mut on_s, mut off_s, mut step_s) = (gain, on_s, off_s, step_s);
+    while step_s > sample_s {
+        let is_near = |from: f64, to: f64| (from - on_s).abs() <= step_s && (to - off_s).abs() <= step_s;
+        let inner = [on_s, off_s]
+            .into_iter()
+            .filter(|edge_s| *edge_s != from_s && *edge_s != last_s);
+        let around =
+            |edge_s: f64| (-FINE..=FINE).map(move |index| edge_s + step_s * f64::from(index) / f64::from(FINE));
+        let mut fine: Vec<f64> = inner.flat_map(around).chain([from_s, last_s]).collect();
+        fine.retain(|edge_s| (from_s..=last_s).contains(edge_s));
+        fine.sort_by(f64::total_cmp);
+        fine.dedup();
+        let Some((finer, span)) = best(&fine, &is_near).filter(|(finer, _)| *finer >= most) else {
+            break;
+        };
+        (most, (on_s, off_s)) = (finer, span);
+        step_s /= f64::from(FINE);
+    }
+    // One damaged sample is not something that was there for a while.
+    let halves = sums(&[on_s, 0.5 * (on_s + off_s), off_s]);
+    let whole = evidence(&halves[0], &halves[2]);
+    if evidence(&halves[0], &halves[1]).min(evidence(&halves[1], &halves[2])) < LEAST_HALF * whole {
+        return None;
+    }
+    let span = Span {
+        from: if on_s == from_s { f64::NEG_INFINITY } else { on_s },
+        to: if off_s == last_s { f64::INFINITY } else { off_s },
+    };
+    Some((span, most - price))
 }
 
-fn piece(problem: &Problem, touched: &[usize], residuals: &[DVector<f64>], slopes: &[Entries], span: Span) -> Piece {
+fn piece(problem: &Problem, touched: &[usize], residuals: &[&DVector<f64>], slopes: &[Entries], span: Span) -> Piece {
     let starts_s = problem.twin.starts_s();
     let width = slopes.len();
     let mut piece = Piece {

@@ -1,16 +1,15 @@
-//! What of the effect added last is no parameter of the fit: its onset, or a limit or corner, moved to where it explains most,
-//! and the stretch after which it is gone.
+//! What of an effect is no parameter of the fit: its onset, or a limit or corner, moved to where it explains most.
 //!
 //! In: a set of hypotheses, refined. Out: the same set refined with another value, whose columns the library then has, or as
 //! it was.
 
 use twin::effect::onsets;
 
+use super::passing::renew;
 use crate::{
     library::{Hypothesis, Library},
-    onset,
     problem::Problem,
-    refine::{Refined, model_of, refine},
+    refine::{Refined, refine},
 };
 
 /// Times the distance between values tried is halved: an onset in a log of ten minutes to a cycle, a limit to a part in
@@ -19,44 +18,6 @@ const HALVINGS: usize = 10;
 
 /// [nats] that make another value a better one.
 const SHARPER: f64 = 0.5;
-
-/// Gives the member added last the stretch of time in which it is on, if it is not always.
-pub(super) fn bounded(
-    problem: &Problem,
-    library: &mut Library,
-    set: Vec<usize>,
-    best: Refined,
-) -> (Vec<usize>, Refined) {
-    let Some(last) = set
-        .last()
-        .copied()
-        .filter(|last| !library.hypotheses[*last].places.is_empty())
-        .filter(|last| library.hypotheses[*last].cause.effect.page().passes)
-    else {
-        return (set, best);
-    };
-    let others = model_of(library, &set[..set.len() - 1], &best.thetas[..set.len() - 1]);
-    let own = &library.hypotheses[last];
-    let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
-    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
-    let Some(span) = onset::stretch(problem, &others, slopes, &sigmas) else {
-        return (set, best);
-    };
-    let model = model_of(library, &set, &best.thetas);
-    library.hypotheses[last].span = Some(span);
-    let mut model = model;
-    model[set.len() - 1].span = Some(span);
-    let renewed = problem.slopes(&model, set.len() - 1);
-    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
-        library.products.renew(problem, place, column);
-    }
-    let refined = refine(problem, library, &set, &best.thetas);
-    if refined.log_evidence > best.log_evidence {
-        return (set, refined);
-    }
-    library.hypotheses[last].span = None;
-    (set, best)
-}
 
 /// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step
 /// that is seconds off, or a limit that is a percent off, leaves more than most effects make.
@@ -105,10 +66,6 @@ fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
 fn at_variant(problem: &Problem, library: &mut Library, set: &[usize], best: &Refined, variant: f64) -> Refined {
     let last = set[set.len() - 1];
     library.hypotheses[last].cause.variant = variant;
-    let model = model_of(library, set, &best.thetas);
-    let renewed = problem.slopes(&model, set.len() - 1);
-    for (place, column) in library.hypotheses[last].places.clone().into_iter().zip(renewed) {
-        library.products.renew(problem, place, column);
-    }
+    renew(problem, library, set, &best.thetas);
     refine(problem, library, set, &best.thetas)
 }

@@ -1,0 +1,144 @@
+//! Effects that come and go: the stretch of time in which one is on.
+//!
+//! In: a set of hypotheses, refined. Out: for each hypothesis whose cause [passes](twin::effect::Page::passes) the stretch in
+//! which it would explain most ([`onset`]), and sets refined with a member that is on in a stretch only.
+
+use nalgebra::DVector;
+
+use super::variant::sharpened;
+use crate::{
+    library::{Entries, Hypothesis, Library},
+    onset,
+    problem::Problem,
+    refine::{Refined, model_of, refine},
+    windows::Span,
+};
+
+/// Part of what a set explains that an effect must bring to be seen coming and going beside it: what another effect's law
+/// leaves over is not the same at all times either.
+const PASSING_PART: f64 = 0.1;
+
+/// For each hypothesis that comes and goes the stretch of time in which it explains most of what a set leaves, if it is not
+/// always there; its gain is then that of the stretch. One with variants has its onset among them.
+pub(super) fn stretches(
+    problem: &Problem,
+    library: &Library,
+    set: &[usize],
+    best: &Refined,
+    nothing: f64,
+    gains: &mut [f64],
+) -> Vec<Option<Span>> {
+    let model = model_of(library, set, &best.thetas);
+    let least = PASSING_PART * (best.log_evidence - nothing);
+    let rest: Vec<DVector<f64>> = (0..problem.frames.len())
+        .map(|channel| problem.residual(channel, &model))
+        .collect();
+    let starts_s = problem.twin.starts_s();
+    let stretch = |(hypothesis, gain): (&Hypothesis, &mut f64)| {
+        let effect = hypothesis.cause.effect;
+        if !gain.is_finite() || !effect.page().passes || effect.variants(starts_s).len() > 1 {
+            return None;
+        }
+        let places = hypothesis.places.iter();
+        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place).clone()).collect();
+        let sigmas: Vec<f64> = (hypothesis.parameters.iter())
+            .map(|parameter| parameter.prior_sigma)
+            .collect();
+        let (span, more) = onset::stretch(problem, &rest, &slopes, &sigmas)?;
+        (*gain + more > least).then(|| {
+            *gain += more;
+            span
+        })
+    };
+    library.hypotheses.iter().zip(gains).map(stretch).collect()
+}
+
+/// A set refined, its last member on in a stretch of time if it has one; else, where it `is_contested` by one that has, with
+/// the onset that suits it best. The library is left as it was.
+pub(super) fn fitted(
+    problem: &Problem,
+    library: &mut Library,
+    set: &[usize],
+    start: &[DVector<f64>],
+    span: Option<Span>,
+    is_contested: bool,
+) -> Refined {
+    match (span, set.last()) {
+        (Some(span), Some(last)) => {
+            let refined = passing(problem, library, set, start, span);
+            always(problem, library, *last);
+            refined
+        }
+        (None, Some(last)) if is_contested => {
+            let variant = library.hypotheses[*last].cause.variant;
+            let refined = sharpened(problem, library, set, refine(problem, library, set, start));
+            if library.hypotheses[*last].cause.variant != variant {
+                library.hypotheses[*last].cause.variant = variant;
+                always(problem, library, *last);
+            }
+            refined
+        }
+        _ => refine(problem, library, set, start),
+    }
+}
+
+/// A set with its last member on in a stretch of time only, refined. The library has its columns for that stretch from then
+/// on; [`always`] gives it back those it had.
+pub(super) fn passing(
+    problem: &Problem,
+    library: &mut Library,
+    set: &[usize],
+    start: &[DVector<f64>],
+    span: Span,
+) -> Refined {
+    let last = set[set.len() - 1];
+    library.hypotheses[last].span = Some(span);
+    let mut thetas = start.to_vec();
+    thetas.resize_with(set.len(), || DVector::zeros(library.hypotheses[last].parameters.len()));
+    renew(problem, library, set, &thetas);
+    refine(problem, library, set, start)
+}
+
+/// Gives the member added last, whose onset is a variant, the end that it may have.
+pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], best: Refined) -> Refined {
+    let Some((last, others)) = set.split_last() else {
+        return best;
+    };
+    let own = &library.hypotheses[*last];
+    if own.places.is_empty() || own.span.is_some() || !own.cause.effect.page().passes {
+        return best;
+    }
+    let model = model_of(library, others, &best.thetas[..others.len()]);
+    let rest: Vec<DVector<f64>> = (0..problem.frames.len())
+        .map(|channel| problem.residual(channel, &model))
+        .collect();
+    let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
+    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
+    let Some((span, _)) = onset::stretch(problem, &rest, slopes, &sigmas) else {
+        return best;
+    };
+    let refined = passing(problem, library, set, &best.thetas, span);
+    if refined.log_evidence > best.log_evidence {
+        return refined;
+    }
+    library.hypotheses[*last].span = None;
+    renew(problem, library, set, &best.thetas);
+    best
+}
+
+/// Takes the stretch of time from a hypothesis again.
+pub(super) fn always(problem: &Problem, library: &mut Library, hypothesis: usize) {
+    library.hypotheses[hypothesis].span = None;
+    let zero = DVector::zeros(library.hypotheses[hypothesis].parameters.len());
+    renew(problem, library, &[hypothesis], &[zero]);
+}
+
+/// Makes the columns of the last member of a set anew.
+pub(super) fn renew(problem: &Problem, library: &mut Library, set: &[usize], thetas: &[DVector<f64>]) {
+    let model = model_of(library, set, thetas);
+    let renewed = problem.slopes(&model, set.len() - 1);
+    let places = library.hypotheses[set[set.len() - 1]].places.clone();
+    for (place, column) in places.into_iter().zip(renewed) {
+        library.products.renew(problem, place, column);
+    }
+}

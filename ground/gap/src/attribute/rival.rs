@@ -1,0 +1,84 @@
+//! A chosen effect against all that could stand in its place.
+//!
+//! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
+
+use super::{CANDIDATES, Chosen, estimate_of, fitted, gains, is_physical, leading, stretches};
+use crate::{
+    library::Library,
+    problem::Problem,
+    refine::{Refined, refine},
+    windows::Span,
+};
+
+/// [nats] behind the chosen effect from which a rival is not worth an exact fit.
+const FAR: f64 = 50.0;
+
+/// A hypothesis that could stand in the place of a chosen one.
+#[derive(Clone, Copy, Debug)]
+pub struct Rival {
+    /// Its index.
+    pub hypothesis: usize,
+    /// [nats] over the model with neither, prior odds included.
+    pub gain: f64,
+    /// When it would be on; `None` for always.
+    pub span: Option<Span>,
+}
+
+/// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
+pub(super) fn compare(
+    problem: &Problem,
+    library: &mut Library,
+    scores: &[f64],
+    set: &[usize],
+    best: &Refined,
+    nothing: f64,
+    at: usize,
+) -> Chosen {
+    let (mut others, mut thetas) = (set.to_vec(), best.thetas.clone());
+    let own = others.remove(at);
+    thetas.remove(at);
+    let without = refine(problem, library, &others, &thetas);
+    let base = estimate_of(library, scores, &others);
+    let own_gain = best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior;
+    let mut rivals = vec![Rival {
+        hypothesis: own,
+        gain: own_gain,
+        span: library.hypotheses[own].span,
+    }];
+    let mut linear = gains(library, scores, &others, base);
+    linear[own] = f64::NEG_INFINITY;
+    let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
+    let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
+    for rival in leading(&linear, CANDIDATES) {
+        let with_gain = |gain: f64| Rival {
+            hypothesis: rival,
+            gain,
+            span: stretches[rival],
+        };
+        if linear[rival] < own_gain - FAR {
+            rivals.push(with_gain(linear[rival]));
+            continue;
+        }
+        let mut tried = others.clone();
+        tried.push(rival);
+        let refined = fitted(problem, library, &tried, &thetas, stretches[rival], is_contested);
+        if is_physical(library, &tried, &refined) {
+            let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
+            rivals.push(with_gain(gain));
+        }
+    }
+    rivals.sort_by(|one, other| other.gain.total_cmp(&one.gain));
+    let from = library.reference
+        + set[..at]
+            .iter()
+            .map(|h| library.hypotheses[*h].parameters.len())
+            .sum::<usize>();
+    let width = best.thetas[at].len();
+    Chosen {
+        hypothesis: own,
+        theta: best.thetas[at].clone(),
+        covariance: best.estimate.covariance.view((from, from), (width, width)).into_owned(),
+        gain: own_gain,
+        rivals,
+    }
+}

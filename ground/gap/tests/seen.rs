@@ -1,0 +1,139 @@
+//! A unit that is moved by hand before an optical system: a reference that errs more than the unit, and a magnet that is brought
+//! and taken away.
+
+use std::{fmt::Write, fs};
+
+use gap::{
+    case::Subject,
+    diagnose::{Diagnosis, diagnose},
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+/// [s] of the log.
+const SECONDS: usize = 120;
+
+/// [Hz] of the log, and of the record.
+const RATE_HZ: [usize; 2] = [25, 100];
+
+/// [rad/s] white noise of a gyro, and [uT] of a magnetometer.
+const NOISE: [f64; 2] = [0.003, 0.3];
+
+/// [rad] noise of the optical system: from sample to sample it turns into rates of 0.03 rad/s, ten times a gyro's noise.
+const OPTICS_RAD: f64 = 2e-4;
+
+/// [uT] field in n.
+const FIELD: [f64; 3] = [17.0, 0.3, 41.0];
+
+const CASE: &str = r#"format = "gap-case/1"
+name = "seen"
+kind = "csv"
+unit = "unit.toml"
+measured = "measured.csv"
+motion = "motion.csv"
+[environment]
+latitude_deg = 0.0
+field_n_ut = [17.0, 0.3, 41.0]
+field_sigma_ut = 0.1
+[reference]
+attitude_sigma_rad = 0.0005
+[windows]
+fit = [[0.0, 20.0], [40.0, 60.0], [80.0, 100.0]]
+hold = [[20.0, 40.0], [60.0, 80.0], [100.0, 120.0]]
+"#;
+
+fn attitude(t_s: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(
+        0.8 * (1.9 * t_s).sin(),
+        0.9 * (1.3 * t_s).sin(),
+        1.5 * (0.7 * t_s).sin() + 0.1 * t_s,
+    )
+}
+
+/// A unit with a magnet of `iron_b` [uT] at its magnetometers from 45 s to 90 s.
+fn diagnosed(iron_b: Vector3<f64>) -> Diagnosis {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut unit = "name = \"three gyros and three magnetometers\"\n".to_owned();
+    let axes = ["1.0, 0.0, 0.0", "0.0, 1.0, 0.0", "0.0, 0.0, 1.0"];
+    for (sensor, letter, noise) in [("gyro", 'g', NOISE[0]), ("magnetometer", 'm', NOISE[1])] {
+        for (axis, name) in axes.iter().zip(["x", "y", "z"]) {
+            let _ = write!(
+                unit,
+                "[[channel]]\nname = \"{letter}{name}\"\nsensor = \"{sensor}\"\ngroup = \"unit\"\naxis_b = [{axis}]\nlsb = 1.0\n\
+                 noise_sigma = {noise}\nbias_sigma = {}\nscale_sigma = 0.002\naxis_sigma_rad = 0.002\nrange = [-200.0, 200.0]\n",
+                0.3 * noise
+            );
+        }
+    }
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(23);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut motion = "t_s,qw,qx,qy,qz\n".to_owned();
+    for k in 0..=RATE_HZ[1] * SECONDS {
+        let t_s = k as f64 / RATE_HZ[1] as f64;
+        let off = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| OPTICS_RAD * normal()));
+        let q = attitude(t_s) * off;
+        let _ = writeln!(motion, "{t_s:.2},{:.9},{:.9},{:.9},{:.9}", q.w, q.i, q.j, q.k);
+    }
+    let mut measured = "t_s,gx,gy,gz,mx,my,mz\n".to_owned();
+    for k in 0..SECONDS * RATE_HZ[0] {
+        let t_s = k as f64 / RATE_HZ[0] as f64;
+        let q = attitude(t_s);
+        let rate_b = (attitude(t_s - 5e-5).inverse() * attitude(t_s + 5e-5)).scaled_axis() / 1e-4;
+        let iron_b = if (45.0..90.0).contains(&t_s) {
+            iron_b
+        } else {
+            Vector3::zeros()
+        };
+        let field_b = q.inverse() * Vector3::from(FIELD) + iron_b;
+        let _ = write!(measured, "{t_s:.2}");
+        for (value, noise) in rate_b
+            .iter()
+            .map(|rate| (rate, NOISE[0]))
+            .chain(field_b.iter().map(|field| (field, NOISE[1])))
+        {
+            let _ = write!(measured, ",{:.6}", value + noise * normal());
+        }
+        measured.push('\n');
+    }
+    for (name, text) in [
+        ("case.toml", CASE),
+        ("unit.toml", &unit),
+        ("motion.csv", &motion),
+        ("measured.csv", &measured),
+    ] {
+        fs::write(folder.path().join(name), text).expect("a file");
+    }
+    diagnose(&Subject::open(folder.path()).expect("opens"), &[], &|_, _| {})
+}
+
+#[test]
+fn a_reference_that_errs_more_than_the_unit_is_no_gap() {
+    let diagnosis = diagnosed(Vector3::zeros());
+    // Were the record taken for exact, it would be 2.8.
+    assert!((0.7..1.3).contains(&diagnosis.gap), "{}", diagnosis.gap);
+    assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
+    assert!(diagnosis.none_of_these < 0.5, "{:?}", diagnosis.leftover.aspects);
+}
+
+#[test]
+fn a_magnet_that_is_brought_and_taken_away_is_named_with_its_time() {
+    let iron_b = Vector3::new(5.0, -3.0, 20.0);
+    let diagnosis = diagnosed(iron_b);
+    let cause = diagnosis.causes.first().expect("a cause");
+    assert_eq!(cause.effect, "hard-iron");
+    for (sized, truth) in cause.parameters.iter().zip(iron_b.iter()) {
+        assert!((sized.value - truth).abs() < 4.0 * sized.sigma, "{sized:?} {truth}");
+    }
+    let seconds: Vec<f64> = cause
+        .when
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    assert!(
+        (seconds[0] - 45.0).abs() < 0.5 && (seconds[1] - 90.0).abs() < 0.5,
+        "{}",
+        cause.when
+    );
+    assert!(diagnosis.shrink.interval_percent[0] > 90.0, "{:?}", diagnosis.shrink);
+}
