@@ -215,6 +215,11 @@ pub trait Effect: Sync {
         None
     }
 
+    /// How many times its prior sigma a parameter is sought in, of a variant whose sizes are of another order.
+    fn reach(&self, _variant: f64) -> f64 {
+        1.0
+    }
+
     /// Whether values between the variants are possible too: the variants are then a grid to begin from.
     fn has_values_between(&self) -> bool {
         false

@@ -139,7 +139,7 @@ pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f6
     let signs: &[f64] = if symbol.signed { &[1.0, -1.0] } else { &[1.0] };
     let mut best = (0.0, 0.0);
     for sign in signs {
-        let at = |size: f64| sign * size * symbol.prior_sigma;
+        let at = |size: f64| sign * size * symbol.prior_sigma * effect.reach(variant);
         let tried: Vec<f64> = SIZES.iter().map(|&size| likelihood(at(size))).collect();
         let top = (0..SIZES.len())
             .max_by(|&i, &j| tried[i].total_cmp(&tried[j]))

@@ -3,12 +3,16 @@
 //! The residual, in blocks, is transformed; in a bin with a line of amplitude `a` sigma the power, exponential with mean 1
 //! without it, has the mean v = 1 + n a^2/4 (Whittle). The frequency is unknown: the likelihood is averaged over all bins.
 //!
+//! What shakes with a motor's wear, or is folded about by a slow log, is no line of a hundredth of a hertz. It is a sine all the
+//! same, of any phase at any sample ([`WANDERS`]): most often near its largest, never beyond, which neither louder noise
+//! nor blows are. It is on half of the time, more or less, and stands far above the noise.
+//!
 //! A line stands above its neighbours. What is slow has them too, whatever it is: each bin is taken over the level of the bins
 //! around it (their median), and bins of few cycles a block are not looked at.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
 
-use super::spread::View;
+use super::spread::{View, mixed};
 use super::{Effect, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -31,6 +35,21 @@ const FINE: usize = 8;
 
 /// Median over mean of an exponential variable.
 const MEDIAN: f64 = core::f64::consts::LN_2;
+
+/// The variant of a sine whose frequency is any at any time.
+const WANDERS: f64 = -1.0;
+
+/// Sigmas that such a sine reaches at least, and what sizes are sought in multiples of.
+const LEAST: f64 = 5.0;
+const FAR: f64 = 10.0;
+
+/// ln of the density at `z` sigma of a sine of amplitude `a` sigma and any phase, with noise: `1/(pi sqrt(a^2 - z^2))` rounded off
+/// over a sigma at its ends, and by that a little too low everywhere.
+fn of_any_phase(z: f64, a: f64) -> f64 {
+    let z = z.abs();
+    let inside = z.min(a);
+    -PI.ln() - 0.5 * (a * a - inside * inside + 2.0 * a).ln() - 0.5 * (z - inside).powi(2)
+}
 
 /// The power of a line over the level of the powers around it, or over that of white noise if this is higher.
 fn above_level(power: f64, mut around: Vec<f64>) -> f64 {
@@ -140,6 +159,9 @@ impl Effect for Vibration {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        if variant == WANDERS {
+            return views.iter().map(|view| wandering(theta[0], view)).sum();
+        }
         let of = |view: &View| -> f64 {
             let blocks = Block::all(view);
             if variant > 0.0 {
@@ -165,10 +187,13 @@ impl Effect for Vibration {
             let any_hz = 0.5 / step_s(view) * noise.stream(1).uniform(0);
             let frequency_hz = if variant > 0.0 { variant } else { any_hz };
             let amplitude = theta[0] * view.channel.sigma();
-            let samples = view.measured.iter().zip(view.t_s);
-            samples
-                .map(|(measured, t_s)| measured + amplitude * (TAU * frequency_hz * t_s + phase).sin())
-                .collect()
+            let own = noise.stream(2 + number as u64);
+            let at = |(k, t_s): (usize, &f64)| match variant == WANDERS {
+                true => (TAU * own.uniform(2 * k as u64)).sin() * own.uniform(2 * k as u64 + 1).round(),
+                false => (TAU * frequency_hz * t_s + phase).sin(),
+            };
+            let samples = view.measured.iter().zip(view.t_s.iter().enumerate().map(at));
+            samples.map(|(measured, at)| measured + amplitude * at).collect()
         };
         views.iter().enumerate().map(humming).collect()
     }
@@ -195,13 +220,42 @@ impl Effect for Vibration {
 
     /// Any frequency: the likelihood averages over them, unless the variant says which [Hz]. To inject, 0 is a drawn one.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
-        vec![0.0]
+        vec![0.0, WANDERS]
     }
+
+    fn reach(&self, variant: f64) -> f64 {
+        if variant == WANDERS { FAR } else { 1.0 }
+    }
+}
+
+/// ln likelihood of a channel half of whose samples are off by a sine of amplitude `a` sigma and any phase.
+fn wandering(a: f64, view: &View) -> f64 {
+    if a < LEAST {
+        return view.nominal();
+    }
+    let sigma = view.channel.sigma();
+    let sample = |(_, residual): (usize, f64)| {
+        let shaken = of_any_phase(residual / sigma, a) + (view.resolution() / sigma).ln();
+        mixed(0.5, view.normal(residual, sigma), shaken)
+    };
+    view.residuals().map(sample).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_density_of_a_sine_of_any_phase_is_one_and_rather_less() {
+        for a in [5.0, 20.0, 60.0] {
+            const STEP: f64 = 1e-3;
+            let half = ((a + 8.0) / STEP) as usize;
+            let whole: f64 = (0..half)
+                .map(|k| 2.0 * STEP * of_any_phase(k as f64 * STEP, a).exp())
+                .sum();
+            assert!((0.85..1.0).contains(&whole), "{a}: {whole}");
+        }
+    }
 
     #[test]
     fn a_line_stands_above_its_neighbours_and_a_drift_does_not() {

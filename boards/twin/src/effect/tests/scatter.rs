@@ -283,3 +283,43 @@ fn values_that_a_file_rounds_repeat_by_chance_and_are_not_stale() {
         .collect();
     assert!(gain(&stale, step) > 30.0);
 }
+
+#[test]
+fn what_shakes_at_any_frequency_for_a_while_is_neither_blows_nor_noise() {
+    let twin = twin(DENSE);
+    let predicted = twin.predict(&[]);
+    let channels: Vec<usize> = ["a1x", "a1y", "a1z"]
+        .map(|name| twin.unit().channel(name).unwrap())
+        .into();
+    let mut measured = noisy(&twin, &predicted, 5);
+    let rows = twin.starts_s().len();
+    for &channel in &channels {
+        let size = 12.0 * twin.unit().channels[channel].sigma();
+        // A motor that wears: its phase runs away within seconds.
+        for k in rows / 4..3 * rows / 4 {
+            measured[channel][k] += size * (1.9 * k as f64 + 40.0 * (0.01 * k as f64).sin()).sin();
+        }
+    }
+    let measured = logged(&twin, &measured);
+    let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
+    let views: Vec<View> = (channels.iter())
+        .map(|&channel| View {
+            channel: &twin.unit().channels[channel],
+            t_s: &t_s[channel],
+            predicted: &predicted[channel],
+            measured: &measured[channel],
+            step: 0.0,
+        })
+        .collect();
+    let gain = |name: &str| {
+        let effect = by_name(name).unwrap();
+        let variants = effect.variants(twin.starts_s()).into_iter();
+        variants
+            .map(|variant| most_likely(effect, variant, &views).1)
+            .fold(0.0, f64::max)
+    };
+    let vibration = gain("vibration");
+    for other in ["shock", "noise-level", "packet-corruption"] {
+        assert!(vibration > gain(other) + 100.0, "{other}: {} {vibration}", gain(other));
+    }
+}
