@@ -14,10 +14,29 @@ use crate::{
 /// Quantities of the motion: rate, force and field in b, temperature.
 const QUANTITIES: usize = 10;
 
+/// [standard deviations of the reference's errors] to which what the unit does is rounded before residuals are sorted by it. At
+/// rest a reference sees nothing but its errors, and these are minus the residual: a factor of -1 in every sensor.
+const PLAIN: f64 = 10.0;
+
 /// The views of every channel.
 pub fn views(problem: &Problem) -> Vec<View> {
     let twin = problem.twin;
-    let feels = twin.feels(0);
+    let kinds = [Kind::Gyro, Kind::Accelerometer, Kind::Magnetometer, Kind::Thermometer];
+    let steps = kinds.map(|kind| PLAIN * reference_sigma(problem, kind));
+    let plain = |kind: Kind, value: f64| {
+        let own = kinds.iter().position(|own| *own == kind);
+        let step = own.map_or(0.0, |own| steps[own]);
+        if step > 0.0 {
+            (value / step).round() * step
+        } else {
+            value
+        }
+    };
+    let mut feels = twin.feels(0);
+    for feel in &mut feels {
+        feel.rate_b.apply(|value| *value = plain(Kind::Gyro, *value));
+        feel.force_b.apply(|value| *value = plain(Kind::Accelerometer, *value));
+    }
     let states = standardised(&feels);
     let starts_s = twin.starts_s();
     let fitted = problem
@@ -72,7 +91,7 @@ pub fn views(problem: &Problem) -> Vec<View> {
             instrument: instrument(problem, index),
             is_limited: problem.is_limited(index),
             levels: vec![
-                at(&|row| own[row]),
+                at(&|row| plain(channel.sensor, own[row])),
                 at(&|row| feels[row].rate_b.norm()),
                 at(&|row| feels[row].force_b.norm()),
                 at(&|row| feels[row].temperature_c),
@@ -80,6 +99,23 @@ pub fn views(problem: &Problem) -> Vec<View> {
         }
     };
     problem.frames.iter().enumerate().map(view).collect()
+}
+
+/// [physical unit] root mean square of what the reference errs by from sample to sample, in the sensors of a kind.
+fn reference_sigma(problem: &Problem, kind: Kind) -> f64 {
+    let rows = problem.twin.starts_s().len();
+    let channels = problem.twin.unit().channels.iter().enumerate();
+    let of_kind: Vec<usize> = (channels.filter(|(_, channel)| channel.sensor == kind))
+        .map(|(index, _)| index)
+        .collect();
+    let square = |row: usize| -> f64 {
+        let channels = of_kind.iter();
+        channels
+            .map(|index| problem.instrument.fast_sigma(*index, row).powi(2))
+            .sum()
+    };
+    let sum: f64 = (0..rows).map(square).sum();
+    (sum / (rows * of_kind.len()).max(1) as f64).sqrt()
 }
 
 /// What the reference errs by in a channel at the fitted samples.

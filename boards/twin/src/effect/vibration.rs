@@ -43,6 +43,11 @@ const WANDERS: f64 = -1.0;
 const LEAST: f64 = 5.0;
 const FAR: f64 = 10.0;
 
+/// Part of the samples that must be this many sigma off: of a sine that is on for a quarter of the time. What is off for seconds is
+/// no shaking.
+const LONG: f64 = 0.15;
+const OFF: f64 = 3.0;
+
 /// ln of the density at `z` sigma of a sine of amplitude `a` sigma and any phase, with noise: `1/(pi sqrt(a^2 - z^2))` rounded off
 /// over a sigma at its ends, and by that a little too low everywhere.
 fn of_any_phase(z: f64, a: f64) -> f64 {
@@ -234,6 +239,12 @@ fn wandering(a: f64, view: &View) -> f64 {
         return view.nominal();
     }
     let sigma = view.channel.sigma();
+    let (off, all) = view.residuals().fold((0.0, 0.0), |(off, all), (_, residual)| {
+        (off + f64::from(u8::from(residual.abs() > OFF * sigma)), all + 1.0)
+    });
+    if off < LONG * all {
+        return view.nominal();
+    }
     let sample = |(_, residual): (usize, f64)| {
         let shaken = of_any_phase(residual / sigma, a) + (view.resolution() / sigma).ln();
         mixed(0.5, view.normal(residual, sigma), shaken)
