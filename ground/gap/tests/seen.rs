@@ -43,11 +43,14 @@ fit = [[0.0, 20.0], [40.0, 60.0], [80.0, 100.0]]
 hold = [[20.0, 40.0], [60.0, 80.0], [100.0, 120.0]]
 "#;
 
+/// At rest for the first and the last fifteen seconds, where the record holds nothing but its errors.
 fn attitude(t_s: f64) -> UnitQuaternion<f64> {
+    let rise = |x: f64| x.clamp(0.0, 1.0).powi(3) * (10.0 - 15.0 * x.clamp(0.0, 1.0) + 6.0 * x.clamp(0.0, 1.0).powi(2));
+    let moved = rise((t_s - 15.0) / 5.0) * rise((SECONDS as f64 - 15.0 - t_s) / 5.0);
     UnitQuaternion::from_euler_angles(
-        0.8 * (1.9 * t_s).sin(),
-        0.9 * (1.3 * t_s).sin(),
-        1.5 * (0.7 * t_s).sin() + 0.1 * t_s,
+        moved * 0.8 * (1.9 * t_s).sin(),
+        moved * 0.9 * (1.3 * t_s).sin(),
+        moved * (1.5 * (0.7 * t_s).sin() + 0.1 * t_s),
     )
 }
 

@@ -296,9 +296,8 @@ fn what_shakes_at_any_frequency_for_a_while_is_neither_blows_nor_noise() {
     for &channel in &channels {
         let size = 12.0 * twin.unit().channels[channel].sigma();
         // A motor that wears: its phase runs away within seconds.
-        for k in rows / 4..3 * rows / 4 {
-            measured[channel][k] += size * (1.9 * k as f64 + 40.0 * (0.01 * k as f64).sin()).sin();
-        }
+        let shaken = measured[channel].iter_mut().enumerate().skip(rows / 4).take(rows / 2);
+        shaken.for_each(|(k, value)| *value += size * (1.9 * k as f64 + 40.0 * (0.01 * k as f64).sin()).sin());
     }
     let measured = logged(&twin, &measured);
     let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
