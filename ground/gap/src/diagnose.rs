@@ -84,7 +84,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
-    let place = place::locate(&problem, &views, &quiet);
+    let mut place = place::locate(&problem, &views, &quiet);
 
     let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
@@ -168,6 +168,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.dedup_by_key(|(name, _)| *name);
 
     let is_named = !causes.is_empty();
+    if is_named && model.components.iter().any(|component| component.span.is_some()) {
+        // The cause says when, and sharper: what the calibration takes up of it blurs its edges.
+        place.passage = None;
+    }
     let correction = is_named
         .then(|| Correction::of(&subject.twin, &model.components))
         .flatten();
