@@ -17,7 +17,7 @@ use crate::{
     leftover::{self, Leftover, Suspect},
     library::Library,
     model::Model,
-    place::{self, Place},
+    place::{self, Place, passage::Passage},
     problem::Problem,
     sight,
     trace::{Trace, cells, traces},
@@ -168,9 +168,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.dedup_by_key(|(name, _)| *name);
 
     let is_named = !causes.is_empty();
-    if is_named && model.components.iter().any(|component| component.span.is_some()) {
-        // The cause says when, and sharper: what the calibration takes up of it blurs its edges.
-        place.passage = None;
+    if let Some(span) = model
+        .components
+        .iter()
+        .find_map(|component| component.span.filter(|_| is_named))
+    {
+        // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
+        place.passage = Some(Passage::of(&problem, span));
     }
     let correction = is_named
         .then(|| Correction::of(&subject.twin, &model.components))

@@ -138,5 +138,11 @@ fn a_magnet_that_is_brought_and_taken_away_is_named_with_its_time() {
         "{}",
         cause.when
     );
+    let onset = diagnosis
+        .place
+        .passage
+        .and_then(|passage| passage.onset)
+        .expect("an onset");
+    assert!(onset.interval_s[0] <= 45.04 && 45.0 <= onset.interval_s[1], "{onset:?}");
     assert!(diagnosis.shrink.interval_percent[0] > 90.0, "{:?}", diagnosis.shrink);
 }

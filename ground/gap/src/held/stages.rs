@@ -56,6 +56,9 @@ const RECALIBRATED: usize = 1;
 const AFTER: usize = 2;
 const FLOOR: usize = 3;
 
+/// The first of [`ESTIMATED`] that is an attitude.
+const FIRST_ATTITUDE: usize = 3;
+
 /// Names and units of the estimated stages.
 const ESTIMATED: [(&str, &str); 5] = [
     ("force", "m/s2"),
@@ -94,44 +97,53 @@ impl Held {
             measured.clone(),
             without(finished.recalibrated),
             without(finished.after),
-            perfect(&measured, &finished),
+            perfect(&measured, &finished, &|channel, row| finished.sigmas[channel][row]),
         ]
         .iter()
         .map(|readings| estimation.track(readings, &nominal))
         .collect();
+        // Vectors are compared with what the reference says, and its errors are in the floor; a filter is not fed with them.
+        let own = |channel: usize, _: usize| twin.unit().channels[channel].sigma();
+        let undisturbed = estimation.track(&perfect(&measured, &finished, &own), &nominal);
         tracks.extend(corrected.map(|responses| estimation.track(&measured, responses)));
         let reference = estimation.reference();
         let starts_s: Vec<f64> = estimation.rows().iter().map(|row| twin.starts_s()[*row]).collect();
         let stage = |(at, (name, unit)): (usize, &(&'static str, &'static str))| {
-            let errors: Vec<Vec<Option<f64>>> = tracks
-                .iter()
-                .map(|track| errors(track, at, &truth, &reference))
-                .collect();
+            let of = |(number, track): (usize, &Track)| {
+                let is_fed = number == FLOOR && at >= FIRST_ATTITUDE;
+                errors(if is_fed { &undisturbed } else { track }, at, &truth, &reference)
+            };
+            let errors: Vec<Vec<Option<f64>>> = tracks.iter().enumerate().map(of).collect();
             judge(name, unit, &errors, &starts_s)
         };
         ESTIMATED.iter().enumerate().filter_map(stage).collect()
     }
 }
 
-/// What a perfect twin would have measured: its own predictions with its own noise, where samples are.
-fn perfect(measured: &[Vec<f64>], finished: &Finished) -> Vec<Vec<f64>> {
+/// What a perfect twin would have measured: its own predictions with noise of these sigmas, of a channel at a row, where samples
+/// are.
+fn perfect(measured: &[Vec<f64>], finished: &Finished, sigma: &dyn Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    let mut noisy = |(measured, (before, sigmas)): (&Vec<f64>, (&Vec<f64>, &Vec<f64>))| -> Vec<f64> {
-        let samples = measured.iter().zip(before).zip(sigmas);
+    let mut noisy = |(channel, (measured, before)): (usize, (&Vec<f64>, &Vec<f64>))| -> Vec<f64> {
+        let samples = measured.iter().zip(before).enumerate();
         samples
-            .map(|((measured, before), sigma)| {
+            .map(|(row, (measured, before))| {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 // A hole stays one.
                 if measured.is_finite() {
-                    before + sigma * noise
+                    before + sigma(channel, row) * noise
                 } else {
                     f64::NAN
                 }
             })
             .collect()
     };
-    let channels = measured.iter().zip(finished.before.iter().zip(finished.sigmas));
-    channels.map(&mut noisy).collect()
+    measured
+        .iter()
+        .zip(finished.before)
+        .enumerate()
+        .map(&mut noisy)
+        .collect()
 }
 
 /// Squared errors of one stage at every row.

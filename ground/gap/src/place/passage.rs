@@ -10,7 +10,7 @@
 
 use nalgebra::DVector;
 
-use crate::problem::Problem;
+use crate::{problem::Problem, windows::Span};
 
 /// Stretches that the fit windows are cut into.
 const STRETCHES: usize = 60;
@@ -34,6 +34,26 @@ pub struct Passage {
     pub onset: Option<Instant>,
     /// [s] when it ends; `None` where it is there to the end.
     pub end: Option<Instant>,
+}
+
+impl Passage {
+    /// Of a named cause: each edge lies between the last fitted sample on its one side and the first on its other.
+    pub fn of(problem: &Problem, span: Span) -> Self {
+        let starts_s = problem.twin.starts_s();
+        let rows = super::cells::fitted_rows(problem);
+        let edge = |t_s: f64| {
+            let next = rows.partition_point(|row| starts_s[*row] < t_s);
+            let at = |index: usize| rows.get(index).map_or(t_s, |row| starts_s[*row]);
+            t_s.is_finite().then(|| Instant {
+                t_s,
+                interval_s: [at(next.saturating_sub(1)), at(next)],
+            })
+        };
+        Passage {
+            onset: edge(span.from),
+            end: edge(span.to),
+        }
+    }
 }
 
 /// An instant with its 95 % interval.
