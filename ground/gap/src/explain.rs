@@ -143,10 +143,15 @@ impl Explanation {
 
     /// Energy that it takes off what calibration and noise leave, in squares of noise.
     pub fn energy(&self, quiet: &Model) -> f64 {
+        // In channels that scatter more than described an effect on readings explained what it gained over that scatter.
+        let by_readings = |scatter: &Scatter| {
+            self.energy_without(quiet, &scatter.channels)
+                .max(2.0 * gains(&self.found.chosen))
+        };
         match &self.scatter {
             // Louder noise takes in whatever is there: that it does is no sign of its law.
-            Some(scatter) if scatter.effect.page().name == LOUDER => self.energy_without(quiet, &scatter.channels),
-            Some(scatter) => self.energy_without(quiet, &scatter.channels) + 2.0 * scatter.gain,
+            Some(scatter) if scatter.effect.page().name == LOUDER => by_readings(scatter),
+            Some(scatter) => by_readings(scatter) + 2.0 * scatter.gain,
             None => self.energy_without(quiet, &[]),
         }
     }

@@ -19,7 +19,7 @@ mod shapes;
 mod simulated;
 mod spectrum;
 mod strength;
-use aspects::Sights;
+use aspects::{Label, Sights};
 pub use instrument::Instrument;
 pub(crate) use simulated::simulate;
 pub use simulated::{Clock, Disturb};
@@ -156,14 +156,22 @@ pub fn judge(
     let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
     let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
     let observed = roots(&observed);
-    let spreads: Vec<(f64, f64)> = (0..observed.len())
-        .map(|at| moments(simulated.iter().map(|run| run[at])))
-        .collect();
     let labels = sights.labels();
+    let spread = |(at, label): (usize, &Label)| {
+        let values = simulated.iter().map(|run| run[at]);
+        let is_there = |value: &f64| !label.may_be_none || *value > 0.0;
+        moments(values.filter(is_there))
+    };
+    let spreads: Vec<(f64, f64)> = labels.iter().enumerate().map(spread).collect();
     let sizes = |run: &[f64]| -> Vec<f64> {
         (run.iter().zip(&spreads).zip(&labels))
             .map(|((value, (mean, spread)), label)| {
-                let size = if *mean > FITTED { (value - mean) / spread } else { 0.0 };
+                let is_none = label.may_be_none && *value == 0.0;
+                let size = if *mean > FITTED && *spread > 0.0 && !is_none {
+                    (value - mean) / spread
+                } else {
+                    0.0
+                };
                 if label.is_claimed { size.abs() } else { size }
             })
             .collect()

@@ -67,6 +67,8 @@ pub struct Label {
     pub channel: Option<usize>,
     /// Whether a named effect claims as much: then less speaks against it too.
     pub is_claimed: bool,
+    /// Whether it is a mean over what may not be there at all, and then is zero.
+    pub may_be_none: bool,
 }
 
 /// The views made ready for sums.
@@ -132,6 +134,7 @@ impl<'a> Sights<'a> {
                 what,
                 channel: Some(index),
                 is_claimed: false,
+                may_be_none: false,
             }));
         }
         let mut of_all = Vec::new();
@@ -149,6 +152,7 @@ impl<'a> Sights<'a> {
             what,
             channel: None,
             is_claimed: false,
+            may_be_none: false,
         }));
         for channel in self.scattered {
             let view = &self.views[*channel];
@@ -156,6 +160,7 @@ impl<'a> Sights<'a> {
                 what: format!("{}: outliers have not the size that is claimed", view.name),
                 channel: Some(*channel),
                 is_claimed: true,
+                may_be_none: true,
             });
             labels.extend(waves(view.phase.len()).into_iter().map(|length| Label {
                 what: format!(
@@ -164,6 +169,7 @@ impl<'a> Sights<'a> {
                 ),
                 channel: Some(*channel),
                 is_claimed: true,
+                may_be_none: false,
             }));
         }
         labels

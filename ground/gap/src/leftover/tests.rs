@@ -1,5 +1,7 @@
 //! Residuals with and without something in them.
 
+mod scatter;
+
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
 use super::*;
@@ -356,60 +358,4 @@ fn a_wrong_law_is_found_by_the_steps_between_levels() {
     });
     assert!(left.p < 0.01, "{left:?}");
     assert!(left.aspects[0].what.contains("steps with"), "{:?}", left.aspects);
-}
-
-/// A law of outliers anywhere in the range would else stand for any samples that are a little off.
-#[test]
-fn outliers_have_the_size_that_their_law_claims() {
-    let anywhere = |residuals: &mut [DVector<f64>], seed: u64| {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let (Ok(size), Ok(once)) = (Uniform::new(-2000.0, 2000.0), Uniform::new(0.0, 100.0)) else {
-            return;
-        };
-        (residuals[0].iter_mut()).for_each(|value| {
-            if once.sample(&mut random) < 1.0 {
-                *value += size.sample(&mut random);
-            }
-        });
-    };
-    let p_with = |size: Option<f64>| {
-        let (views, joint) = scene();
-        let mut residuals = noise(7);
-        match size {
-            Some(size) => (0..6).for_each(|k| residuals[0][100 * k + 37] += size),
-            None => anywhere(&mut residuals, 5),
-        }
-        let disturb = Disturb {
-            channels: &[0],
-            of: &anywhere,
-        };
-        judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb)).p
-    };
-    assert!(p_with(None) > 0.05 && p_with(Some(9.0)) < 0.01);
-}
-
-#[test]
-fn an_effect_on_the_scatter_is_held_to_the_energy_that_it_claims() {
-    let swings = |residuals: &mut [DVector<f64>], seed: u64| {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut level = 0.0;
-        (residuals[0].iter_mut()).for_each(|value| {
-            let step: f64 = StandardNormal.sample(&mut random);
-            level = 0.9 * level + 0.4 * step;
-            *value += level;
-        });
-    };
-    let p_with = |there: bool| {
-        let (views, joint) = scene();
-        let mut residuals = noise(7);
-        if there {
-            swings(&mut residuals, 5);
-        }
-        let disturb = Disturb {
-            channels: &[0],
-            of: &swings,
-        };
-        judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb)).p
-    };
-    assert!(p_with(true) > 0.05 && p_with(false) < 0.01);
 }
