@@ -170,3 +170,25 @@ fn the_slope_by_the_instant_is_that_of_a_twin_that_reads_later() {
         );
     }
 }
+
+#[test]
+fn the_bend_is_what_the_slope_by_the_instant_leaves() {
+    let later_s = 0.02;
+    let mut late = emems(thesis_slot_s);
+    late.channels.iter_mut().for_each(|channel| channel.slot_s += later_s);
+    let (now, late) = (twin(emems(thesis_slot_s)), twin(late));
+    for name in ["g2", "a1x", "m3z"] {
+        let index = now.unit().channel(name).unwrap();
+        let readings = now.channel(index, &[]);
+        let straight: Vec<f64> = (readings.iter().zip(now.by_instant(index)))
+            .map(|(reading, slope)| reading + slope * later_s)
+            .collect();
+        let bent: Vec<f64> = (straight.iter().zip(now.bend(index)))
+            .map(|(reading, bend)| reading + 0.5 * bend * later_s * later_s)
+            .collect();
+        let late = late.channel(index, &[]);
+        let (straight, bent) = (furthest(&straight, &late), furthest(&bent, &late));
+        // What is left is the third derivative's part: a motion of tenths of a second has a tenth of it.
+        assert!(bent < 0.2 * straight, "{name}: {bent} {straight}");
+    }
+}
