@@ -33,7 +33,7 @@ const DOUBT_STEP: f64 = 3.0;
 const UNLIKE: f64 = 0.05;
 
 /// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
-const REMAINDER: f64 = 0.005;
+pub const REMAINDER: f64 = 0.005;
 
 /// What is left over, and how much that says against names.
 pub struct Belief {

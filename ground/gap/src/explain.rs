@@ -11,6 +11,7 @@ use twin::part::signal::Noise;
 
 use crate::{
     attribute::{Attribution, Chosen, attribute},
+    belief::REMAINDER,
     cause::probability_of_any,
     contribution,
     library::Library,
@@ -108,7 +109,9 @@ impl Explanation {
         reweigh(problem, library, &back);
         let model = Model::around(problem, library, found.model(library));
         if scatter.is_some() && !wanders {
-            scatter = best_scatter(problem, &model, withheld);
+            // What a large effect's law leaves looks like scatter, and would be held to what that claims.
+            scatter = best_scatter(problem, &model, withheld)
+                .filter(|scatter| scatter.gain > REMAINDER * gains(&found.chosen));
         }
         Self {
             found,
