@@ -18,9 +18,8 @@ use nalgebra::{DMatrix, DVector};
 
 pub use self::rival::Rival;
 use self::{
-    passing::{always, bounded, fitted, passing, stretches},
+    passing::{always, bounded, fitted, stretches, taken},
     rival::compare,
-    variant::sharpened,
 };
 use crate::{
     library::Library,
@@ -78,6 +77,12 @@ impl Attribution {
 
 /// Searches.
 pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64)) -> Attribution {
+    // A search before this one may have left stretches of time behind.
+    for hypothesis in 0..library.hypotheses.len() {
+        if library.hypotheses[hypothesis].span.is_some() {
+            always(problem, library, hypothesis);
+        }
+    }
     let mut set: Vec<usize> = Vec::new();
     let mut best = refine(problem, library, &set, &[]);
     let nothing = best.log_evidence;
@@ -115,12 +120,8 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         match found {
             Some((gain, larger)) if gain > MARGIN => {
                 let span = larger.last().and_then(|added| stretches[*added]);
-                best = match span {
-                    Some(span) => passing(problem, library, &larger, &best.thetas, span),
-                    None => refine(problem, library, &larger, &best.thetas),
-                };
+                best = taken(problem, library, &larger, &best.thetas, span);
                 set = larger;
-                best = sharpened(problem, library, &set, best);
                 best = bounded(problem, library, &set, best);
                 (set, best) = prune(problem, library, set, best);
                 scores = renewed_scores(problem, library, &set, &best);
@@ -147,11 +148,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         set.push(winner.hypothesis);
         let mut start = best.thetas.clone();
         start.remove(at);
-        best = match winner.span {
-            Some(span) => passing(problem, library, &set, &start, span),
-            None => refine(problem, library, &set, &start),
-        };
-        best = sharpened(problem, library, &set, best);
+        best = taken(problem, library, &set, &start, winner.span);
         scores = renewed_scores(problem, library, &set, &best);
         chosen = (0..set.len())
             .map(|at| compare(problem, library, &scores, &set, &best, nothing, at))

@@ -112,6 +112,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let without = Finished {
         start_s: subject.twin.starts_s(),
         sigmas: &problem.sigmas,
+        steady: &problem.steady,
         before: &before,
         recalibrated: &quiet.predicted,
         after: &quiet.predicted,
@@ -168,11 +169,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.dedup_by_key(|(name, _)| *name);
 
     let is_named = !causes.is_empty();
-    if let Some(span) = model
-        .components
-        .iter()
-        .find_map(|component| component.span.filter(|_| is_named))
-    {
+    if is_named && let Some(span) = model.components.iter().find_map(|component| component.span) {
         // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
         place.passage = Some(Passage::of(&problem, span));
     }

@@ -53,6 +53,8 @@ pub struct Finished<'a> {
     pub start_s: &'a [f64],
     /// Standard deviation of a sample as the nominal twin has it.
     pub sigmas: &'a [Vec<f64>],
+    /// The same without the errors that the reference makes from sample to sample, one a channel: what a filter is fed with.
+    pub steady: &'a [f64],
     /// By the nominal twin.
     pub before: &'a [Vec<f64>],
     /// With the calibration refitted, no effect.
@@ -271,6 +273,7 @@ mod tests {
         Held::new(vec![series]).judge(Finished {
             start_s: &start_s,
             sigmas: &level(1.0),
+            steady: &[1.0],
             before: &level(before),
             recalibrated: &level(recalibrated),
             after: &level(after),

@@ -94,6 +94,8 @@ pub struct Problem<'a> {
     /// Standard deviation of a sample as the nominal twin has it, reference included, channel by channel at every row of the
     /// log.
     pub sigmas: Vec<Vec<f64>>,
+    /// The same without the errors that the reference makes from sample to sample, one a channel.
+    pub steady: Vec<f64>,
     /// What the reference leaves open, common to several channels.
     pub reference: Vec<Column>,
     /// What told the truth.
@@ -108,7 +110,7 @@ impl<'a> Problem<'a> {
         let steps = starts_s.len().saturating_sub(1).max(1) as f64;
         let rate_hz = steps / (starts_s.last().unwrap_or(&1.0) - starts_s.first().unwrap_or(&0.0)).max(f64::EPSILON);
         let alike = (2.0 * REFERENCE_CORRELATION_S * rate_hz).max(1.0);
-        let mut sigmas = Vec::new();
+        let (mut sigmas, mut steady) = (Vec::new(), Vec::new());
         let mut frames = Vec::new();
         for (index, (channel, series)) in twin.unit().channels.iter().zip(&fit.channels).enumerate() {
             let slow = match channel.sensor {
@@ -120,6 +122,7 @@ impl<'a> Problem<'a> {
                 Kind::Thermometer => 0.0,
             };
             let fast = |row: usize| channel.sigma().hypot(instrument.fast_sigma(index, row));
+            steady.push(channel.sigma().hypot(slow));
             sigmas.push((0..starts_s.len()).map(|row| fast(row).hypot(slow)).collect());
             let rows = series
                 .rows
@@ -146,6 +149,7 @@ impl<'a> Problem<'a> {
             twin,
             frames,
             sigmas,
+            steady,
             reference: twin.field_columns(accuracy),
             instrument,
         };

@@ -36,8 +36,7 @@ pub struct Scatter {
 
 impl Scatter {
     /// What it makes of noise: takes the residuals of a log that scatters as described, a vector a channel, and leaves those
-    /// of one with the effect in their place. They count in `unit_of` the channel [physical units]; `predicted` holds every
-    /// row.
+    /// of one with the effect in their place. They are in units of noise; `predicted` holds every row.
     pub fn disturb(&self, problem: &Problem, predicted: &[Vec<f64>], residuals: &mut [DVector<f64>], noise: Noise) {
         let twin = problem.twin;
         let unit = twin.unit();
@@ -177,12 +176,15 @@ pub fn scatters(problem: &Problem, predicted: &[Vec<f64>], withheld: &[String]) 
     let near: Vec<Vec<f64>> = (measured.iter().zip(predicted).enumerate())
         .map(|(channel, (measured, predicted))| {
             let mut near = predicted.clone();
-            let own = unit.channels[channel].sigma();
-            rows_of(channel)
-                .filter(|row| problem.sigmas[channel][*row] > own)
-                .for_each(|row| {
-                    near[row] = measured[row] - own / problem.sigmas[channel][row] * (measured[row] - predicted[row]);
-                });
+            let (own, is_limited) = (unit.channels[channel].sigma(), problem.is_limited(channel));
+            // What errs slowly is no scatter, unless there is more of it.
+            let part = |row: usize| match is_limited {
+                true => own / problem.sigmas[channel][row],
+                false => problem.own_part(channel, row),
+            };
+            rows_of(channel).filter(|row| part(*row) < 1.0).for_each(|row| {
+                near[row] = measured[row] - part(row) * (measured[row] - predicted[row]);
+            });
             near
         })
         .collect();

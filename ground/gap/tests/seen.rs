@@ -6,6 +6,8 @@ use std::{fmt::Write, fs};
 use gap::{
     case::Subject,
     diagnose::{Diagnosis, diagnose},
+    problem::Problem,
+    scatter::scatters,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -56,6 +58,11 @@ fn attitude(t_s: f64) -> UnitQuaternion<f64> {
 
 /// A unit with a magnet of `iron_b` [uT] at its magnetometers from 45 s to 90 s.
 fn diagnosed(iron_b: Vector3<f64>) -> Diagnosis {
+    diagnose(&seen(CASE, iron_b, 1.0), &[], &|_, _| {})
+}
+
+/// That unit in a case of this text; its first magnetometer is `louder` than described.
+fn seen(case: &str, iron_b: Vector3<f64>, louder: f64) -> Subject {
     let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros and three magnetometers\"\n".to_owned();
     let axes = ["1.0, 0.0, 0.0", "0.0, 1.0, 0.0", "0.0, 0.0, 1.0"];
@@ -90,24 +97,21 @@ fn diagnosed(iron_b: Vector3<f64>) -> Diagnosis {
         };
         let field_b = q.inverse() * Vector3::from(FIELD) + iron_b;
         let _ = write!(measured, "{t_s:.2}");
-        for (value, noise) in rate_b
-            .iter()
-            .map(|rate| (rate, NOISE[0]))
-            .chain(field_b.iter().map(|field| (field, NOISE[1])))
-        {
+        let noises = [NOISE[0], NOISE[0], NOISE[0], louder * NOISE[1], NOISE[1], NOISE[1]];
+        for (value, noise) in rate_b.iter().chain(field_b.iter()).zip(noises) {
             let _ = write!(measured, ",{:.6}", value + noise * normal());
         }
         measured.push('\n');
     }
     for (name, text) in [
-        ("case.toml", CASE),
+        ("case.toml", case),
         ("unit.toml", &unit),
         ("motion.csv", &motion),
         ("measured.csv", &measured),
     ] {
         fs::write(folder.path().join(name), text).expect("a file");
     }
-    diagnose(&Subject::open(folder.path()).expect("opens"), &[], &|_, _| {})
+    Subject::open(folder.path()).expect("opens")
 }
 
 #[test]
@@ -117,6 +121,21 @@ fn a_reference_that_errs_more_than_the_unit_is_no_gap() {
     assert!((0.7..1.3).contains(&diagnosis.gap), "{}", diagnosis.gap);
     assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
     assert!(diagnosis.none_of_these < 0.5, "{:?}", diagnosis.leftover.aspects);
+}
+
+#[test]
+fn what_the_reference_leaves_open_slowly_hides_no_noise() {
+    let case = CASE.replace("field_sigma_ut = 0.1", "field_sigma_ut = 0.25");
+    let subject = seen(&case, Vector3::zeros(), 1.25);
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let predicted: Vec<Vec<f64>> = (0..6).map(|channel| problem.predict(channel, &[])).collect();
+    let found = scatters(&problem, &predicted, &[]);
+    let loud = found.first().expect("an effect on the scatter");
+    assert_eq!(
+        (loud.effect.page().name, loud.channels.as_slice()),
+        ("noise-level", [3].as_slice())
+    );
+    assert!((loud.thetas[0][0] - 0.25).abs() < 0.05, "{:?}", loud.thetas);
 }
 
 #[test]

@@ -36,11 +36,17 @@ impl Effect for StaleSample {
         let p = theta[0].clamp(0.0, 0.999);
         let of = |view: &View| -> f64 {
             let sigma = view.channel.sigma();
+            // For each sample where the value that it has was fresh.
+            let mut first = 0;
+            let firsts: Vec<usize> = (0..view.measured.len())
+                .map(|k| {
+                    let repeats = k > 0 && (view.measured[k] - view.measured[k - 1]).abs() < 0.5 * view.resolution();
+                    first = if repeats { first } else { k };
+                    first
+                })
+                .collect();
             let sample = |(k, residual): (usize, f64)| {
-                let fresh = view.normal(residual, sigma);
-                let repeats =
-                    |k: usize| k > 0 && (view.measured[k] - view.measured[k - 1]).abs() < 0.5 * view.resolution();
-                let first = (0..=k).rev().find(|k| !repeats(*k)).unwrap_or(0);
+                let (fresh, first) = (view.normal(residual, sigma), firsts[k]);
                 // What was no reading of the sensor when it was fresh is none when it is sent again.
                 let was_read = (view.measured[first] - view.predicted[first]).abs() < FRESH * sigma;
                 let stale = if first < k && was_read { 0.0 } else { f64::NEG_INFINITY };

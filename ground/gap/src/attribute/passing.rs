@@ -53,8 +53,24 @@ pub(super) fn stretches(
     library.hypotheses.iter().zip(gains).map(stretch).collect()
 }
 
-/// A set refined, its last member on in a stretch of time if it has one; else, where it `is_contested` by one that has, with
-/// the onset that suits it best. The library is left as it was.
+/// A set whose last member was added, refined: on in a stretch of time if it has one, with the onset that suits it best. The
+/// library has its columns from then on.
+pub(super) fn taken(
+    problem: &Problem,
+    library: &mut Library,
+    set: &[usize],
+    start: &[DVector<f64>],
+    span: Option<Span>,
+) -> Refined {
+    let refined = match span {
+        Some(span) => passing(problem, library, set, start, span),
+        None => refine(problem, library, set, start),
+    };
+    sharpened(problem, library, set, refined)
+}
+
+/// The same of one that is only tried, and sharpened only where it `is_contested` by one with a stretch. The library is left as
+/// it was.
 pub(super) fn fitted(
     problem: &Problem,
     library: &mut Library,
@@ -84,13 +100,7 @@ pub(super) fn fitted(
 
 /// A set with its last member on in a stretch of time only, refined. The library has its columns for that stretch from then
 /// on; [`always`] gives it back those it had.
-pub(super) fn passing(
-    problem: &Problem,
-    library: &mut Library,
-    set: &[usize],
-    start: &[DVector<f64>],
-    span: Span,
-) -> Refined {
+fn passing(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>], span: Span) -> Refined {
     let last = set[set.len() - 1];
     library.hypotheses[last].span = Some(span);
     let mut thetas = start.to_vec();

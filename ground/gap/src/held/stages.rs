@@ -102,9 +102,10 @@ impl Held {
         .iter()
         .map(|readings| estimation.track(readings, &nominal))
         .collect();
-        // Vectors are compared with what the reference says, and its errors are in the floor; a filter is not fed with them.
-        let own = |channel: usize, _: usize| twin.unit().channels[channel].sigma();
-        let undisturbed = estimation.track(&perfect(&measured, &finished, &own), &nominal);
+        // Vectors are compared with what the reference says at that instant, and its errors are in the floor; a filter is not
+        // fed with them.
+        let steady = |channel: usize, _: usize| finished.steady[channel];
+        let undisturbed = estimation.track(&perfect(&measured, &finished, &steady), &nominal);
         tracks.extend(corrected.map(|responses| estimation.track(&measured, responses)));
         let reference = estimation.reference();
         let starts_s: Vec<f64> = estimation.rows().iter().map(|row| twin.starts_s()[*row]).collect();

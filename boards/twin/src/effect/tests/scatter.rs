@@ -28,6 +28,24 @@ fn misfit(twin: &Twin, cause: &Cause, predicted: &[Vec<f64>], measured: &[Vec<f6
     0.5 * difference(twin, cause, predicted, measured).norm_squared()
 }
 
+/// Channels of logs that do not show a step.
+fn views<'a>(
+    twin: &'a Twin,
+    channels: &[usize],
+    t_s: &'a [Vec<f64>],
+    predicted: &'a [Vec<f64>],
+    measured: &'a [Vec<f64>],
+) -> Vec<View<'a>> {
+    let view = |&channel: &usize| View {
+        channel: &twin.unit().channels[channel],
+        t_s: &t_s[channel],
+        predicted: &predicted[channel],
+        measured: &measured[channel],
+        step: 0.0,
+    };
+    channels.iter().map(view).collect()
+}
+
 #[test]
 fn every_discrete_effect_is_told_from_its_other_variants() {
     let twin = twin(SPARSE);
@@ -106,22 +124,6 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
         .channels(twin.unit());
         let mut measured = noisy(&twin, &predicted, 5);
         let healthy = logged(&twin, &measured);
-        fn views<'a>(
-            twin: &'a Twin,
-            channels: &[usize],
-            t_s: &'a [Vec<f64>],
-            predicted: &'a [Vec<f64>],
-            measured: &'a [Vec<f64>],
-        ) -> Vec<View<'a>> {
-            let view = |&channel: &usize| View {
-                channel: &twin.unit().channels[channel],
-                t_s: &t_s[channel],
-                predicted: &predicted[channel],
-                measured: &measured[channel],
-                step: 0.0,
-            };
-            channels.iter().map(view).collect()
-        }
         let disturbed = effect.disturb(
             theta,
             inject,
@@ -227,15 +229,7 @@ fn what_shakes_several_sensors_is_as_strong_as_it_is_wherever_its_frequency_lies
                     .collect()
             })
             .collect();
-        let views: Vec<View> = (shaken.iter())
-            .map(|&channel| View {
-                channel: &twin.unit().channels[channel],
-                t_s: &t_s[channel],
-                predicted: &predicted[channel],
-                measured: &measured[channel],
-                step: 0.0,
-            })
-            .collect();
+        let views = views(&twin, &shaken, &t_s, &predicted, &measured);
         let settled_hz = effect.settled(&views).unwrap();
         // The grid on which it is sought, and noise.
         assert!(
@@ -301,15 +295,7 @@ fn what_shakes_at_any_frequency_for_a_while_is_neither_blows_nor_noise() {
     }
     let measured = logged(&twin, &measured);
     let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
-    let views: Vec<View> = (channels.iter())
-        .map(|&channel| View {
-            channel: &twin.unit().channels[channel],
-            t_s: &t_s[channel],
-            predicted: &predicted[channel],
-            measured: &measured[channel],
-            step: 0.0,
-        })
-        .collect();
+    let views = views(&twin, &channels, &t_s, &predicted, &measured);
     let gain = |name: &str| {
         let effect = by_name(name).unwrap();
         let variants = effect.variants(twin.starts_s()).into_iter();
