@@ -1,5 +1,7 @@
 //! Shocks: taps, stops, separation. All accelerometers, and the gyros with them, jump together for a few samples.
 
+use nalgebra::Vector3;
+
 use super::spread::{View, mixed};
 use super::{Effect, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
@@ -47,15 +49,20 @@ impl Effect for Shock {
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
-        let hit = |(number, view): (usize, &View)| {
-            let stream = noise.stream(1 + number as u64);
+        // A blow pushes and turns the unit as a whole: sensors of a kind feel parts of one vector.
+        let blow = |sensor: Kind, k: usize| {
+            let first = if sensor == Kind::Gyro { 4 } else { 1 };
+            Vector3::from_fn(|axis, _| noise.stream(first + axis as u64).normal(k as u64))
+        };
+        let hit = |view: &View| {
+            let channel = view.channel;
             let sample = |(k, measured): (usize, &f64)| match noise.uniform(k as u64) < theta[0] {
-                true => measured + variant * view.channel.sigma() * stream.normal(k as u64),
+                true => measured + variant * channel.sigma() * channel.axis_b.dot(&blow(channel.sensor, k)),
                 false => *measured,
             };
             view.measured.iter().enumerate().map(sample).collect()
         };
-        views.iter().enumerate().map(hit).collect()
+        views.iter().map(hit).collect()
     }
 
     /// How many times as far they scatter.
