@@ -25,7 +25,7 @@ pub use grid::{Grid, LowPass};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
 
-use crate::effect::{Active, Site, UnknownEffect};
+use crate::effect::{Active, Cause, Site, UnknownEffect};
 use crate::environment::Environment;
 
 /// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
@@ -101,6 +101,15 @@ impl Twin {
             .map(|index| twin.computed(index, &[]))
             .collect();
         Ok(twin)
+    }
+
+    /// The twin along what was truly felt, if an effect says that the truth instrument tells something else; what is open
+    /// about a unit is open along its true motion.
+    pub fn retold(&self, cause: &Cause) -> Option<Self> {
+        let truly = |feel: &Feel| cause.effect.retold(cause.variant, feel, &self.environment);
+        truly(&self.scene.feel(*self.starts_s.first()?))?;
+        let scene = self.scene.retold(|feel| truly(feel).unwrap_or(*feel));
+        Self::new(self.unit.clone(), self.environment, scene, self.starts_s.clone()).ok()
     }
 
     /// The unit.

@@ -79,13 +79,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let gap = root_mean_square(&problem);
     let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
     let search = |share| progress("search", share);
-    let found = attribute(&problem, &mut library, &search);
+    let mut found = attribute(&problem, &mut library, &search);
     let quiet = Model::around(&problem, &library, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
     let mut place = place::locate(&problem, &views, &quiet);
 
+    let chosen = found.chosen.iter().map(|chosen| chosen.hypothesis);
+    let causes: Vec<_> = chosen
+        .map(|hypothesis| library.hypotheses[hypothesis].cause.clone())
+        .collect();
+    if causes.iter().any(|cause| problem.retell(cause)) {
+        library.reopen(&problem);
+        found = attribute(&problem, &mut library, &search);
+    }
     let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
     let mut left = if explanation.is_empty() {

@@ -162,6 +162,14 @@ impl Library {
         library
     }
 
+    /// Takes what is open anew: the problem's motion is another.
+    pub fn reopen(&mut self, problem: &Problem) {
+        for (place, column) in problem.reference_columns().into_iter().enumerate() {
+            self.products.renew(problem, place, column);
+        }
+        self.products.reweigh(problem, &vec![1.0; problem.frames.len()]);
+    }
+
     /// Normal equations of some columns, given the scores of all.
     pub fn screen(&self, places: &[usize], scores: &[f64]) -> Screen {
         self.products.screen(places, scores, &self.prior_sigmas)

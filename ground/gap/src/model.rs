@@ -5,7 +5,6 @@ use nalgebra::DVector;
 use crate::{
     joint::{Fitted, Joint},
     library::{Entries, Library},
-    open::calibration,
     problem::{Component, Problem},
 };
 
@@ -67,7 +66,7 @@ impl Model {
 /// Readings of one channel at every row.
 fn readings(problem: &Problem, components: &[Component], fitted: &Fitted, channel: usize) -> Vec<f64> {
     let mut readings = problem.predict(channel, components);
-    let columns = calibration(problem.twin, problem.instrument, channel);
+    let columns = problem.open(channel);
     let calibration = columns
         .iter()
         .zip(fitted.nuisance[channel].iter())

@@ -9,7 +9,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
-    effect::Active,
+    effect::{Active, Cause},
     predict::{Column, Kind, Twin},
 };
 
@@ -75,6 +75,10 @@ impl Frame {
     pub fn reweigh(&mut self, factor: f64) {
         self.weights *= factor;
         self.nuisance /= factor;
+        self.factorise();
+    }
+
+    fn factorise(&mut self) {
         let open = self.nuisance.ncols();
         self.factor = Cholesky::new(DMatrix::identity(open, open) + self.nuisance.tr_mul(&self.nuisance));
     }
@@ -100,6 +104,8 @@ pub struct Problem<'a> {
     pub reference: Vec<Column>,
     /// What told the truth.
     pub instrument: &'a Reference,
+    /// The twin along what the unit truly did, where that is not what was told.
+    retold: Option<Twin>,
 }
 
 impl<'a> Problem<'a> {
@@ -129,20 +135,14 @@ impl<'a> Problem<'a> {
                 .iter()
                 .map(|row| fast(*row as usize).hypot(slow * alike.sqrt()));
             let weights = DVector::from_iterator(series.rows.len(), rows);
-            let columns = calibration(twin, instrument, index);
-            let nuisance = DMatrix::from_fn(series.rows.len(), columns.len(), |row, column| {
-                let column = &columns[column];
-                column.entries[0].1[series.rows[row] as usize] * column.sigma / weights[row]
-            });
-            let open = nuisance.ncols();
             frames.push(Frame {
                 quiet_energy: 0.0,
-                factor: Cholesky::new(DMatrix::identity(open, open) + nuisance.tr_mul(&nuisance)),
+                factor: None,
                 series: series.clone(),
                 own: weights.map(|weight| channel.sigma() / weight),
                 weights,
-                nuisance,
-                nuisance_names: columns.into_iter().map(|column| (column.name, column.sigma)).collect(),
+                nuisance: DMatrix::zeros(series.rows.len(), 0),
+                nuisance_names: Vec::new(),
             });
         }
         let mut problem = Problem {
@@ -150,11 +150,49 @@ impl<'a> Problem<'a> {
             frames,
             sigmas,
             steady,
-            reference: twin.field_columns(accuracy),
+            reference: Vec::new(),
             instrument,
+            retold: None,
         };
-        problem.settle();
+        problem.open_all();
         problem
+    }
+
+    /// The twin along what the unit truly did, as far as that is known.
+    pub fn true_twin(&self) -> &Twin {
+        self.retold.as_ref().unwrap_or(self.twin)
+    }
+
+    /// What is open of a channel.
+    pub fn open(&self, channel: usize) -> Vec<Column> {
+        calibration(self.true_twin(), self.instrument, channel)
+    }
+
+    /// Takes the motion for what it is with this cause: what the unit's calibration and the field leave open is open along
+    /// that. Whether the cause is one that says so.
+    pub fn retell(&mut self, cause: &Cause) -> bool {
+        let Some(retold) = self.twin.retold(cause) else {
+            return false;
+        };
+        self.retold = Some(retold);
+        self.open_all();
+        true
+    }
+
+    /// Makes the columns of what is open.
+    fn open_all(&mut self) {
+        for channel in 0..self.frames.len() {
+            let columns = self.open(channel);
+            let frame = &mut self.frames[channel];
+            frame.nuisance = DMatrix::from_fn(frame.series.rows.len(), columns.len(), |row, column| {
+                let column = &columns[column];
+                column.entries[0].1[frame.series.rows[row] as usize] * column.sigma / frame.weights[row]
+            });
+            frame.factorise();
+            frame.nuisance_names = columns.into_iter().map(|column| (column.name, column.sigma)).collect();
+        }
+        self.reference = self.true_twin().field_columns(&self.instrument.accuracy);
+        self.settle();
     }
 
     /// The unit's own noise over what it scatters with the fast errors of the reference in, of a channel at a row.
@@ -265,7 +303,7 @@ impl<'a> Problem<'a> {
     /// What a channel's calibration still leaves open once it is fitted, in physical units at every row of the log: a row of
     /// the matrix for each direction, for one standard deviation.
     pub fn still_open(&self, channel: usize) -> DMatrix<f64> {
-        let columns = calibration(self.twin, self.instrument, channel);
+        let columns = self.open(channel);
         let mut open = DMatrix::from_fn(columns.len(), self.twin.starts_s().len(), |column, row| {
             columns[column].entries[0].1[row] * columns[column].sigma
         });

@@ -32,7 +32,7 @@ pub fn views(problem: &Problem) -> Vec<View> {
             value
         }
     };
-    let mut feels = twin.feels(0);
+    let mut feels = problem.true_twin().feels(0);
     for feel in &mut feels {
         feel.rate_b.apply(|value| *value = plain(Kind::Gyro, *value));
         feel.force_b.apply(|value| *value = plain(Kind::Accelerometer, *value));
@@ -137,7 +137,9 @@ fn clock(problem: &Problem, index: usize) -> Option<Clock> {
         let rows = frame.series.rows.iter();
         rows.map(|row| values[*row as usize]).collect()
     };
-    let slopes = at_rows(&twin.by_instant(index)).into_iter().zip(frame.weights.iter());
+    let slopes = at_rows(&problem.true_twin().by_instant(index))
+        .into_iter()
+        .zip(frame.weights.iter());
     (period_s > 0.0).then(|| Clock {
         period_s,
         instants_s: at_rows(&twin.instants_s(index)),

@@ -56,13 +56,33 @@ fn attitude(t_s: f64) -> UnitQuaternion<f64> {
     )
 }
 
-/// A unit with a magnet of `iron_b` [uT] at its magnetometers from 45 s to 90 s.
-fn diagnosed(iron_b: Vector3<f64>) -> Diagnosis {
-    diagnose(&seen(CASE, iron_b, 1.0), &[], &|_, _| {})
+/// What is seen.
+struct Seen {
+    case: String,
+    /// [uT] of a magnet at the magnetometers from 45 s to 90 s.
+    iron_b: Vector3<f64>,
+    /// How much more the first magnetometer scatters than described.
+    louder: f64,
+    /// Whether the record has y the other way round.
+    is_reversed: bool,
 }
 
-/// That unit in a case of this text; its first magnetometer is `louder` than described.
-fn seen(case: &str, iron_b: Vector3<f64>, louder: f64) -> Subject {
+impl Default for Seen {
+    fn default() -> Self {
+        Seen {
+            case: CASE.to_owned(),
+            iron_b: Vector3::zeros(),
+            louder: 1.0,
+            is_reversed: false,
+        }
+    }
+}
+
+fn diagnosed(seen: &Seen) -> Diagnosis {
+    diagnose(&opened(seen), &[], &|_, _| {})
+}
+
+fn opened(seen: &Seen) -> Subject {
     let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros and three magnetometers\"\n".to_owned();
     let axes = ["1.0, 0.0, 0.0", "0.0, 1.0, 0.0", "0.0, 0.0, 1.0"];
@@ -83,7 +103,8 @@ fn seen(case: &str, iron_b: Vector3<f64>, louder: f64) -> Subject {
         let t_s = k as f64 / RATE_HZ[1] as f64;
         let off = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| OPTICS_RAD * normal()));
         let q = attitude(t_s) * off;
-        let _ = writeln!(motion, "{t_s:.2},{:.9},{:.9},{:.9},{:.9}", q.w, q.i, q.j, q.k);
+        let j = if seen.is_reversed { -q.j } else { q.j };
+        let _ = writeln!(motion, "{t_s:.2},{:.9},{:.9},{j:.9},{:.9}", q.w, q.i, q.k);
     }
     let mut measured = "t_s,gx,gy,gz,mx,my,mz\n".to_owned();
     for k in 0..SECONDS * RATE_HZ[0] {
@@ -91,20 +112,20 @@ fn seen(case: &str, iron_b: Vector3<f64>, louder: f64) -> Subject {
         let q = attitude(t_s);
         let rate_b = (attitude(t_s - 5e-5).inverse() * attitude(t_s + 5e-5)).scaled_axis() / 1e-4;
         let iron_b = if (45.0..90.0).contains(&t_s) {
-            iron_b
+            seen.iron_b
         } else {
             Vector3::zeros()
         };
         let field_b = q.inverse() * Vector3::from(FIELD) + iron_b;
         let _ = write!(measured, "{t_s:.2}");
-        let noises = [NOISE[0], NOISE[0], NOISE[0], louder * NOISE[1], NOISE[1], NOISE[1]];
+        let noises = [NOISE[0], NOISE[0], NOISE[0], seen.louder * NOISE[1], NOISE[1], NOISE[1]];
         for (value, noise) in rate_b.iter().chain(field_b.iter()).zip(noises) {
             let _ = write!(measured, ",{:.6}", value + noise * normal());
         }
         measured.push('\n');
     }
     for (name, text) in [
-        ("case.toml", case),
+        ("case.toml", seen.case.as_str()),
         ("unit.toml", &unit),
         ("motion.csv", &motion),
         ("measured.csv", &measured),
@@ -116,7 +137,7 @@ fn seen(case: &str, iron_b: Vector3<f64>, louder: f64) -> Subject {
 
 #[test]
 fn a_reference_that_errs_more_than_the_unit_is_no_gap() {
-    let diagnosis = diagnosed(Vector3::zeros());
+    let diagnosis = diagnosed(&Seen::default());
     // Were the record taken for exact, it would be 2.8.
     assert!((0.7..1.3).contains(&diagnosis.gap), "{}", diagnosis.gap);
     assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
@@ -125,8 +146,11 @@ fn a_reference_that_errs_more_than_the_unit_is_no_gap() {
 
 #[test]
 fn what_the_reference_leaves_open_slowly_hides_no_noise() {
-    let case = CASE.replace("field_sigma_ut = 0.1", "field_sigma_ut = 0.25");
-    let subject = seen(&case, Vector3::zeros(), 1.25);
+    let subject = opened(&Seen {
+        case: CASE.replace("field_sigma_ut = 0.1", "field_sigma_ut = 0.25"),
+        louder: 1.25,
+        ..Seen::default()
+    });
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let predicted: Vec<Vec<f64>> = (0..6).map(|channel| problem.predict(channel, &[])).collect();
     let found = scatters(&problem, &predicted, &[]);
@@ -141,7 +165,10 @@ fn what_the_reference_leaves_open_slowly_hides_no_noise() {
 #[test]
 fn a_magnet_that_is_brought_and_taken_away_is_named_with_its_time() {
     let iron_b = Vector3::new(5.0, -3.0, 20.0);
-    let diagnosis = diagnosed(iron_b);
+    let diagnosis = diagnosed(&Seen {
+        iron_b,
+        ..Seen::default()
+    });
     let cause = diagnosis.causes.first().expect("a cause");
     assert_eq!(cause.effect, "hard-iron");
     for (sized, truth) in cause.parameters.iter().zip(iron_b.iter()) {
@@ -164,4 +191,15 @@ fn a_magnet_that_is_brought_and_taken_away_is_named_with_its_time() {
         .expect("an onset");
     assert!(onset.interval_s[0] <= 45.04 && 45.0 <= onset.interval_s[1], "{onset:?}");
     assert!(diagnosis.shrink.interval_percent[0] > 90.0, "{:?}", diagnosis.shrink);
+}
+
+#[test]
+fn a_record_with_an_axis_reversed_is_named_and_the_rest_is_judged_along_the_true_motion() {
+    let diagnosis = diagnosed(&Seen {
+        is_reversed: true,
+        ..Seen::default()
+    });
+    let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect).collect();
+    assert_eq!(names, ["reference-sign"]);
+    assert!(diagnosis.none_of_these < 0.5, "{:?}", diagnosis.leftover.aspects);
 }

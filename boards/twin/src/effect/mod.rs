@@ -84,8 +84,9 @@ pub use page::{Nature, Page, Scope, Symbol};
 pub use site::Site;
 pub use spread::{View, logged_step, most_likely};
 
+use crate::environment::Environment;
 use crate::part::signal::Noise;
-use crate::predict::{Chain, UnitDescription};
+use crate::predict::{Chain, Feel, UnitDescription};
 
 /// All effects: gyros, accelerometers, magnetometers, reference and environment, timing, noise and bits.
 pub const LIBRARY: &[&dyn Effect] = &[
@@ -189,6 +190,11 @@ pub trait Effect: Sync {
     /// Changes the chain of one channel. `theta` is the block of parameters that holds for this channel, in the order of
     /// the page; zero is no effect. One that only changes the scatter leaves the chain alone.
     fn act<'a>(&self, _theta: &'a [f64], _variant: f64, _site: &Site<'a>, _chain: &mut Chain<'a>) {}
+
+    /// What the unit truly feels where the truth instrument tells another state; `None` of an effect that leaves that alone.
+    fn retold(&self, _variant: f64, _feel: &Feel, _environment: &Environment) -> Option<Feel> {
+        None
+    }
 
     /// ln probability of the logs of the channels of one block under this effect, for one that changes their scatter; the
     /// nominal one for the others. Where the block is a channel the logarithms of several channels add up, so that the set of

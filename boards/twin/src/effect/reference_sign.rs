@@ -8,6 +8,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Effect, Nature, Page, Scope, Site};
+use crate::environment::Environment;
 use crate::predict::{Chain, Feel, Kind};
 
 /// `reference-sign`.
@@ -80,6 +81,10 @@ impl Effect for ReferenceSign {
             true => axis_b.component_mul(&signs).dot(&feel.rate_b) - input,
             false => 0.0,
         });
+    }
+
+    fn retold(&self, variant: f64, feel: &Feel, environment: &Environment) -> Option<Feel> {
+        (variant < 0.0).then(|| truly(feel, signs(-variant as u32), environment.earth_rate_n()))
     }
 
     /// Signs of the rate on all rows; then, in a table, on each, and elsewhere signs of the attitude.

@@ -68,6 +68,11 @@ impl<const N: usize> Grid<N> {
         }
     }
 
+    /// [s] the instants of the samples.
+    pub fn nodes_s(&self) -> impl Iterator<Item = f64> {
+        (0..self.values.len()).map(|node| self.from_s + node as f64 * self.step_s)
+    }
+
     fn piece(&self, i: usize) -> Piece<N> {
         let h = self.step_s;
         let (before, after) = (self.bends[i], self.bends[i + 1]);

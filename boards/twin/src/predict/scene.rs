@@ -185,26 +185,29 @@ impl Scene {
         let mut rows = rows.to_vec();
         // A spline has two ends.
         rows.extend(rows.last().copied());
+        Self::through(0.0, 1.0, &rows)
+    }
+
+    /// What was truly felt, if every state is another than it is told.
+    pub fn retold(&self, truly: impl Fn(&Feel) -> Feel) -> Self {
+        let nodes_s: Vec<f64> = self.pose.nodes_s().collect();
+        let rows: Vec<Feel> = nodes_s.iter().map(|t_s| truly(&self.feel(*t_s))).collect();
+        Self::through(nodes_s[0], nodes_s[1] - nodes_s[0], &rows)
+    }
+
+    fn through(from_s: f64, step_s: f64, rows: &[Feel]) -> Self {
         let pose = |row: &Feel| {
             let (q, p) = (row.q_nb.into_inner(), row.position_n);
             SVector::from([q.w, q.i, q.j, q.k, p.x, p.y, p.z])
         };
+        let force = |row: &Feel| force_quantities(row.force_b, row.rate_dot_b, row.rate_b);
+        let temperature = |row: &Feel| Vector1::new(row.temperature_c);
         Self {
-            rate: Grid::natural(0.0, 1.0, rows.iter().map(|row| row.rate_b).collect()),
-            force: Grid::natural(
-                0.0,
-                1.0,
-                rows.iter()
-                    .map(|row| force_quantities(row.force_b, row.rate_dot_b, row.rate_b))
-                    .collect(),
-            ),
-            field: Grid::natural(0.0, 1.0, rows.iter().map(|row| row.field_b_ut).collect()),
-            temperature: Grid::natural(
-                0.0,
-                1.0,
-                rows.iter().map(|row| Vector1::new(row.temperature_c)).collect(),
-            ),
-            pose: Grid::natural(0.0, 1.0, rows.iter().map(pose).collect()),
+            rate: Grid::natural(from_s, step_s, rows.iter().map(|row| row.rate_b).collect()),
+            force: Grid::natural(from_s, step_s, rows.iter().map(force).collect()),
+            field: Grid::natural(from_s, step_s, rows.iter().map(|row| row.field_b_ut).collect()),
+            temperature: Grid::natural(from_s, step_s, rows.iter().map(temperature).collect()),
+            pose: Grid::natural(from_s, step_s, rows.iter().map(pose).collect()),
         }
     }
 

@@ -209,6 +209,14 @@ fn an_attitude_with_a_wrong_sign_is_another_motion() {
             whole > 100.0 && apart < 4e-4 * whole,
             "{signs}: {apart} of {whole} sigmas"
         );
+        let cause = Cause {
+            effect: by_name("reference-sign").unwrap(),
+            locality: Locality::Unit,
+            variant: -f64::from(signs),
+        };
+        let retold = twin(SPARSE).retold(&cause).unwrap().predict(&[]);
+        let apart = difference(&truly, &cause, &retold, &truly.predict(&[])).amax();
+        assert!(apart < 4e-4 * whole, "{signs}: {apart} of {whole} sigmas");
     }
 }
 
