@@ -59,6 +59,8 @@ pub struct View {
     pub turned: DMatrix<f64>,
     /// What it feels at each sample, in units of noise.
     pub felt: DVector<f64>,
+    /// What it is predicted to read at each sample, in units of noise.
+    pub predicted: DVector<f64>,
     /// The clock of its part, where that is its own.
     pub clock: Option<Clock>,
     /// What its reference errs by, where that is not exact.

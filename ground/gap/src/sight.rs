@@ -87,6 +87,9 @@ pub fn views(problem: &Problem) -> Vec<View> {
             felt: DVector::from_fn(frame.series.rows.len(), |row, _| {
                 felt_b(row).dot(&channel.axis_b) / frame.weights[row]
             }),
+            predicted: DVector::from_fn(frame.series.rows.len(), |row, _| {
+                own[frame.series.rows[row] as usize] / frame.weights[row]
+            }),
             clock: clock(problem, index),
             instrument: instrument(problem, index),
             is_limited: problem.is_limited(index),

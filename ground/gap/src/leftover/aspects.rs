@@ -10,7 +10,8 @@
 //! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
 //! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
 //! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
-//! it claims, and outliers the size, no more and no less: a law of outliers "anywhere in the range" would else stand for any.
+//! it claims, and outliers the size and the distance from the sample before, no more and no less: a law of outliers "anywhere in
+//! the range" would else stand for any, values that are sent again among them.
 
 use nalgebra::{DMatrix, Vector1};
 
@@ -172,6 +173,12 @@ impl<'a> Sights<'a> {
                 may_be_none: false,
             }));
         }
+        labels.extend(["the size", "the distance from the sample before"].map(|what| Label {
+            what: format!("outliers together have not {what} that is claimed"),
+            channel: None,
+            is_claimed: true,
+            may_be_none: true,
+        }));
         labels
     }
 
@@ -218,10 +225,21 @@ impl<'a> Sights<'a> {
         }
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
+        let (mut sizes, mut distances) = (Vec::new(), Vec::new());
         for channel in self.scattered {
-            sums.push(size_of_outliers(fitted.rest[*channel].as_slice()));
-            sums.extend(octaves::energies(fitted.rest[*channel].as_slice()));
+            let rest = fitted.rest[*channel].as_slice();
+            let own = outliers(rest).map(|at| rest[at].abs());
+            sums.push(mean_logarithm(own.clone()));
+            sizes.extend(own);
+            let read = |at: usize| self.views[*channel].predicted[at] + rest[at];
+            distances.extend(
+                outliers(rest)
+                    .filter(|at| *at > 0)
+                    .map(|at| 1.0 + (read(at) - read(at - 1)).abs()),
+            );
+            sums.extend(octaves::energies(rest));
         }
+        sums.extend([sizes, distances].map(|values| mean_logarithm(values.into_iter())));
         sums
     }
 }
@@ -231,9 +249,13 @@ fn kinds(views: &[View]) -> usize {
     views.iter().map(|view| view.kind + 1).max().unwrap_or(0)
 }
 
-/// Mean logarithm of what is far out; zero where nothing is.
-fn size_of_outliers(values: &[f64]) -> f64 {
-    let sizes = values.iter().map(|value| value.abs()).filter(|size| *size > FAR);
+/// Places of what is far out.
+fn outliers(values: &[f64]) -> impl Iterator<Item = usize> + Clone {
+    (0..values.len()).filter(|at| values[*at].abs() > FAR)
+}
+
+/// Mean logarithm of sizes; zero where there are none.
+fn mean_logarithm(sizes: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = sizes.fold((0.0, 0.0), |(sum, count), size| (sum + size.ln(), count + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }

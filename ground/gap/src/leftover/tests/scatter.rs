@@ -32,6 +32,43 @@ fn outliers_have_the_size_that_their_law_claims() {
     assert!(p_with(None) > 0.05 && p_with(Some(9.0)) < 0.01);
 }
 
+/// A law of values that are anything has room for each of them, but not for their being what was read before.
+#[test]
+fn values_that_are_sent_again_are_not_anything() {
+    let anything = |residuals: &mut [DVector<f64>], seed: u64| {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let (Ok(size), Ok(once)) = (Uniform::new(-20.0, 20.0), Uniform::new(0.0, 100.0)) else {
+            return;
+        };
+        for value in residuals[0].iter_mut() {
+            if once.sample(&mut random) < 1.5 {
+                *value = size.sample(&mut random);
+            }
+        }
+    };
+    let unlike = |again: bool| {
+        let (views, joint) = scene();
+        let mut residuals = noise(7);
+        if again {
+            let predicted = &views[0].predicted;
+            (20..SAMPLES).step_by(60).for_each(|row| {
+                residuals[0][row] = predicted[row - 1] + residuals[0][row - 1] - predicted[row];
+            });
+        } else {
+            anything(&mut residuals, 5);
+        }
+        let disturb = Disturb {
+            channels: &[0],
+            of: &anything,
+        };
+        let left = judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb));
+        left.aspects
+            .iter()
+            .any(|aspect| aspect.what.contains("the distance from the sample before"))
+    };
+    assert!(unlike(true) && !unlike(false));
+}
+
 /// That they are not there is said of the energy; of a size nothing can be said.
 #[test]
 fn outliers_that_are_not_there_have_no_size() {
