@@ -137,6 +137,30 @@ pub fn slow(view: &Input<Vector3<f64>>, tau_s: f64, to_s: f64) -> Input<Vector3<
         state = state * decay + from * (1.0 - decay - later) + to * later;
         table.push(state);
     }
+    tabled(table)
+}
+
+/// How far friction leans on each axis of a view, from -1 to 1, up to `to_s`: what Dahl (A solid friction model, 1968) has
+/// for a bristle, dz/du = (1 - z sign du) / `way`, solved exactly over a step in which the view is straight.
+pub fn rubbed(view: &Input<Vector3<f64>>, way: f64, to_s: f64) -> Input<Vector3<f64>> {
+    let steps = (to_s / STEP_S).ceil() as usize;
+    let (mut lean, mut before) = (Vector3::zeros(), view(0.0));
+    let mut table = vec![lean];
+    for step in 1..=steps {
+        let now = view(step as f64 * STEP_S);
+        lean = (now - before).zip_map(&lean, |gone, lean: f64| {
+            let side = if gone == 0.0 { lean } else { gone.signum() };
+            side + (lean - side) * (-gone.abs() / way).exp()
+        });
+        before = now;
+        table.push(lean);
+    }
+    tabled(table)
+}
+
+/// What a table says at every [`STEP_S`], straight between; it has two entries at least.
+fn tabled(table: Vec<Vector3<f64>>) -> Input<Vector3<f64>> {
+    let steps = table.len() - 1;
     Arc::new(move |t_s| {
         let place = (t_s / STEP_S).clamp(0.0, steps as f64);
         let at = (place as usize).min(steps - 1);
@@ -176,5 +200,19 @@ mod tests {
             let exact = (w * t - (w * tau).atan()).sin() / (1.0 + (w * tau).powi(2)).sqrt();
             assert!((hummed(t).x - exact).abs() < 1e-5, "at {t}");
         }
+    }
+
+    #[test]
+    fn friction_leans_against_the_way_gone_and_stays_where_nothing_moves() {
+        // Up by three ways in 3 s, rest for 1 s, down again.
+        let (way, rise) = (0.5, 1.5);
+        let hill: Input<Vector3<f64>> =
+            Arc::new(move |t: f64| Vector3::x() * rise * (t.min(3.0) - (t - 4.0).clamp(0.0, 3.0)) / 3.0);
+        let leaning = rubbed(&hill, way, 8.0);
+        let up = 1.0 - (-rise / way).exp();
+        assert!((leaning(3.0).x - up).abs() < 1e-9);
+        assert!((leaning(3.99).x - up).abs() < 1e-9);
+        assert!((leaning(5.0).x - ((1.0 + up) * (-rise / 3.0 / way).exp() - 1.0)).abs() < 1e-9);
+        assert_eq!(leaning(5.0).y, 0.0);
     }
 }

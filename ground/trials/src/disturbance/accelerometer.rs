@@ -8,7 +8,7 @@ use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
 use crate::{
     deal::DURATION_S,
     draw::Draw,
-    scene::{Scene, changed, shifted, slow},
+    scene::{Scene, changed, rubbed, shifted, slow},
 };
 
 /// [m/s2] of one milli-g.
@@ -22,6 +22,8 @@ pub const ALL: &[Disturbance] = &[
     warm("accel-scale-temperature", scale_temperature),
     graded("accel-misalignment", misalignment),
     graded("accel-nonlinearity", nonlinearity),
+    graded("accel-hysteresis", hysteresis),
+    graded("accel-vibration-rectification", vibration_rectification),
     graded("lever-arm", lever_arm),
     graded("accel-latency", latency),
     gross("accel-high-pass", high_pass),
@@ -97,6 +99,33 @@ fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
         let a = strength * 6e-4 * draw.vector();
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
             force + a.component_mul(&force.component_mul(&force))
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// The proof mass rubs: after a turning back the reading stays behind on the other side, in full once some m/s2 are gone.
+fn hysteresis(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let (plates, way) = (plates(draw), draw.log_uniform(0.3, 3.0));
+    for &plate in &plates {
+        let behind = strength * 5.0 * MG * draw.vector().abs();
+        let lean = rubbed(&scene.views.force_p[plate], way, DURATION_S + 2.0);
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
+            force - behind.component_mul(&lean(t))
+        });
+    }
+    channels(SpecificForce, &plates)
+}
+
+/// What turns the unit shakes it, too fast to be recorded, by an amplitude that grows with the rate; of that a spring that is
+/// stiffer one way makes an offset, 2 mg at 1 rad/s. Where stops are near it falls short of the square.
+fn vibration_rectification(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plates = plates(draw);
+    for &plate in &plates {
+        let (k, source) = (strength * 2.0 * MG * draw.vector(), scene.source.clone());
+        scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
+            let shaking = source.at(t).rate_b.norm_squared();
+            force + k * (shaking / (1.0 + 0.005 * shaking))
         });
     }
     channels(SpecificForce, &plates)
