@@ -1,5 +1,7 @@
 //! What is wrong with magnetometers, or with the field where they are.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix3, Vector3};
 use packets::channel::Quantity::Field;
 use twin::{geometry, motion::Motion};
@@ -20,6 +22,7 @@ pub const ALL: &[Disturbance] = &[
     graded("mag-set-reset", set_reset),
     graded("current-field", current_field),
     graded("eddy-current", eddy_current),
+    graded("mains-alias", mains_alias),
     graded("mag-latency", latency),
     graded("field-gradient", field_gradient),
     gross("mag-axis-order", axis_order),
@@ -123,6 +126,25 @@ fn eddy_current(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
     let tau_s = strength * draw.uniform(0.5, 1.5) * 0.006;
     for view in &mut scene.views.field_p_ut {
         *view = lagged(view, tau_s);
+    }
+    channels(Field, &ALL_PLATES)
+}
+
+/// A cable in the room: 60 Hz and a little of its third harmonic, which fold to nothing but what the oscillators of supply
+/// and unit are off by. The supply is one with an oscillator of its own, an inverter; a grid wanders by 10 mHz in minutes.
+fn mains_alias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let hz = 60.0 * (1.0 + 3e-5 * draw.normal()) + 0.01 * draw.normal();
+    let [in_phase_n, behind_n] = [0.5, 0.1].map(|size_ut| strength * size_ut * draw.vector());
+    let third = draw.uniform(0.0, 0.1);
+    for plate in ALL_PLATES {
+        let (dcm_pb, motion) = (geometry::dcm_bp(plate).transpose(), scene.motion.clone());
+        // Copper on the board takes some of it away.
+        let let_in = draw.uniform(0.85, 1.0);
+        scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
+            let phase = TAU * hz * t;
+            let alternating_n = in_phase_n * (phase.sin() + third * (3.0 * phase).sin()) + behind_n * phase.cos();
+            field + let_in * (dcm_pb * (motion.at(t).attitude.q_nb.inverse() * alternating_n))
+        });
     }
     channels(Field, &ALL_PLATES)
 }
