@@ -83,6 +83,11 @@ impl Wander {
         Vector3::from_fn(|axis, _| self.place(axis, t_s).value)
     }
 
+    /// [rad] turned about the vertical since the start, whole turns counted.
+    pub fn heading_rad(&self, t_s: f64) -> f64 {
+        self.angle(0, t_s).value
+    }
+
     fn place(&self, axis: usize, t_s: f64) -> Jet {
         let (amplitude_m, rate) = self.path[axis];
         self.envelope.at(t_s) * Jet::sine(amplitude_m, rate, t_s)

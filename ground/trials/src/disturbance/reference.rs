@@ -1,10 +1,10 @@
-//! What is wrong with the reference: the truth instrument's record, the environment as stated, a plate's place.
+//! What is wrong with the reference: the truth instrument's record, the environment as stated, a plate's place or plug.
 
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use packets::channel::Quantity::{Field, Rate, SpecificForce};
-use twin::geometry;
+use twin::{geometry, plant::Views};
 
 use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving};
 use crate::{
@@ -15,10 +15,13 @@ use crate::{
 /// All of this file.
 pub const ALL: &[Disturbance] = &[
     graded("plate-rotation", plate_rotation),
+    graded("plate-flexing", plate_flexing),
+    gross("plate-swap", plate_swap),
     graded("gravity-value", gravity_value),
     graded("table-tilt", table_tilt),
     graded("mounting", mounting),
     graded("reference-lag", reference_lag),
+    graded("reference-rate-scale", reference_rate_scale),
     graded("field-model", field_model),
     graded("latency", latency),
     graded("read-skew", read_skew),
@@ -40,9 +43,57 @@ fn plate_rotation(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usiz
     scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
         rate + change_b.dot(&source.at(t).rate_b)
     });
+    sensors(&[plate])
+}
+
+/// A plate on stand-offs yields to what presses on its face, and a tenth as much to what pulls along it, and turns its
+/// sensors by that: by its weight, for in all motions here the pull of a turn is a fiftieth of that.
+fn plate_flexing(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let plate = draw.below(4);
+    let hinge = draw.uniform(0.0, std::f64::consts::TAU);
+    // [rad s2/m] 0.17 deg at one g.
+    let yielding = strength * draw.uniform(0.5, 1.5) * 0.003 / 9.8;
+    let along_p = 0.1 * draw.direction();
+    let load_p = Views::of(&scene.source).force_p[plate].clone();
+    let turn_p = move |t: f64| {
+        let load = load_p(t).dot(&(Vector3::z() + along_p));
+        nalgebra::Rotation3::new(yielding * load * Vector3::new(hinge.cos(), hinge.sin(), 0.0))
+    };
+    let turned = turn_p.clone();
+    scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| turned(t).inverse() * force);
+    let turned = turn_p.clone();
+    scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
+        turned(t).inverse() * field
+    });
+    let (dcm_bp, axis_b, source) = (
+        geometry::dcm_bp(plate),
+        geometry::gyro_axis_b(plate),
+        scene.source.clone(),
+    );
+    scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
+        let axis_p = dcm_bp.transpose() * axis_b;
+        rate + (dcm_bp * (turn_p(t) * axis_p - axis_p)).dot(&source.at(t).rate_b)
+    });
+    sensors(&[plate])
+}
+
+/// Two plates' connectors are exchanged: all that is on one is read for the other.
+fn plate_swap(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
+    let one = draw.below(4);
+    let other = (one + 1 + draw.below(3)) % 4;
+    scene.views.force_p.swap(one, other);
+    scene.views.field_p_ut.swap(one, other);
+    scene.views.rate.swap(one, other);
+    scene.views.temperature_c.swap(one, other);
+    scene.views.gyro_temperature_c.swap(one, other);
+    sensors(&[one, other])
+}
+
+/// What moves with these plates.
+fn sensors(plates: &[usize]) -> Vec<usize> {
     [SpecificForce, Field, Rate]
         .into_iter()
-        .flat_map(|quantity| channels(quantity, &[plate]))
+        .flat_map(|quantity| channels(quantity, plates))
         .collect()
 }
 
@@ -79,6 +130,19 @@ fn reference_lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
     let record = scene.record.clone();
     scene.record = Arc::new(move |t| record(t - delay_s));
+    moving()
+}
+
+/// The table turns about the vertical by more or less than its encoder says: rates are off by a factor, and so is the angle
+/// that has been gone.
+fn reference_rate_scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
+    let gear = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.005;
+    let (record, motion) = (scene.record.clone(), scene.motion.clone());
+    scene.record = Arc::new(move |t| {
+        let (q_nb, place_n) = record(t);
+        let more = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), gear * motion.heading_rad(t));
+        (more * q_nb, place_n)
+    });
     moving()
 }
 
