@@ -19,7 +19,8 @@ use serde::{Deserialize, Serialize};
 use self::files::{entries, files, hash, make, parse, read, stem, write};
 use crate::{
     answer::Answer,
-    deal::{self, DealError, Ring},
+    deal::{self, DealError},
+    deck::Hand,
     draw::Draw,
     score::{self, Judged, Line, Verdict},
 };
@@ -79,19 +80,6 @@ pub enum BlindError {
     Other(PathBuf),
 }
 
-/// How many cases of each ring.
-#[derive(Clone, Copy, Debug)]
-pub struct Hand {
-    /// Nothing wrong.
-    pub r0: usize,
-    /// One effect.
-    pub r1: usize,
-    /// A novel disturbance.
-    pub r3: usize,
-    /// Two effects.
-    pub r4: usize,
-}
-
 /// An answer with its salt, as kept.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Kept {
@@ -99,28 +87,19 @@ struct Kept {
     answer: Answer,
 }
 
-/// Deals a hand into `folder`, answers into `answers`; the order of the rings is drawn.
+/// Deals a hand into `folder`, answers into `answers`; the order is drawn.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn deal(folder: &Path, answers: &Path, hand: Hand, seed: u64) -> Result<(), BlindError> {
-    let rings = [
-        (Ring::R0, hand.r0),
-        (Ring::R1, hand.r1),
-        (Ring::R3, hand.r3),
-        (Ring::R4, hand.r4),
-    ];
-    let mut deck: Vec<Ring> = rings.into_iter().flat_map(|(ring, count)| vec![ring; count]).collect();
     let mut draw = Draw::new(seed);
-    for last in (1..deck.len()).rev() {
-        deck.swap(last, draw.below(last + 1));
-    }
+    let deck = hand.shuffled(&mut draw);
     make(answers)?;
     let progress = ProgressBar::new(deck.len() as u64);
-    for (index, ring) in deck.into_iter().enumerate() {
+    for (index, card) in deck.into_iter().enumerate() {
         let name = format!("T{:03}", index + 1);
         let own = draw.uniform(0.0, 1e15) as u64;
-        let answer = deal::deal(folder, &name, ring, own)?;
+        let answer = deal::deal(folder, &name, card, own)?;
         let salt = (0..4)
             .map(|_| format!("{:08x}", draw.uniform(0.0, 4_294_967_296.0) as u32))
             .collect();

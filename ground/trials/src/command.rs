@@ -13,7 +13,8 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{
-    blind::{self, BlindError, Hand, VERDICT},
+    blind::{self, BlindError, VERDICT},
+    deck::Hand,
     reliability::Reliability,
     score,
 };
@@ -49,6 +50,10 @@ enum Step {
         /// Cases with two effects
         #[arg(long, default_value_t = 20)]
         r4: usize,
+        /// Besides, one case with one effect for every effect there is, at a signal to noise ratio of 30 or as large as its
+        /// part can be; give --r0 0 --r1 0 --r3 0 --r4 0 for these alone
+        #[arg(long)]
+        each: bool,
     },
     /// Publishes the hashes of the answers (manifest.json), before anyone looks
     Commit {
@@ -105,12 +110,14 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             r1,
             r3,
             r4,
+            each,
         } => {
             let hand = Hand {
                 r0: *r0,
                 r1: *r1,
                 r3: *r3,
                 r4: *r4,
+                each: *each,
             };
             blind::deal(folder, answers, hand, *seed)
         }

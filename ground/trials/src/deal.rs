@@ -23,6 +23,7 @@ use twin::{
 
 use crate::{
     answer::{Answer, Cause},
+    deck::Card,
     disturbance::{self, Disturbance, novel},
     draw::Draw,
     flight::{self, CYCLE_S, Instants},
@@ -41,6 +42,9 @@ const RECORD_S: f64 = 0.02;
 
 /// Marginal signal to noise ratios dealt, least and most.
 const SNR: (f64, f64) = (8.0, 100.0);
+
+/// The one of a case whose disturbance is given: plain, but not by its mere size.
+const GIVEN_SNR: f64 = 30.0;
 
 /// Where a disturbance's size is measured: far above the rounding of codes.
 const LARGE_SNR: f64 = 400.0;
@@ -77,13 +81,14 @@ pub enum DealError {
     NoInstants(u64),
 }
 
-/// Deals the case `name` of a ring into `folder/name`.
+/// Deals the case `name` of a card into `folder/name`.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn deal(folder: &Path, name: &str, ring: Ring, seed: u64) -> Result<Answer, DealError> {
+pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, DealError> {
+    let Card { ring, given } = card;
     let mut draw = Draw::new(seed).stream(ring as u64);
-    let chosen = choose(ring, &mut draw);
+    let chosen = given.map_or_else(|| choose(ring, &mut draw), |disturbance| vec![disturbance]);
     let style = [Style::Positions, Style::Table, Style::Hand][draw.below(3)];
     let warm = chosen.iter().any(|disturbance| disturbance.warm) || draw.chance(0.3);
     let site = Environment {
@@ -115,7 +120,7 @@ pub fn deal(folder: &Path, name: &str, ring: Ring, seed: u64) -> Result<Answer, 
     let mut strengths = Vec::new();
     let mut energy = 0.0;
     for (index, disturbance) in chosen.iter().enumerate() {
-        let wanted = sizes.log_uniform(SNR.0, SNR.1);
+        let wanted = given.map_or_else(|| sizes.log_uniform(SNR.0, SNR.1), |_| GIVEN_SNR);
         let at = |strength: f64| snr(&fly(&[(index, strength)]), disturbance.random);
         // The ratio of a variance goes with the square of its strength.
         let power = if disturbance.random { 0.5 } else { 1.0 };
@@ -262,7 +267,11 @@ mod tests {
     #[test]
     fn a_seed_is_a_case() {
         let folder = tempfile::tempdir().expect("a folder");
-        let [one, same] = ["A", "B"].map(|name| deal(folder.path(), name, Ring::R1, 5).expect("dealt"));
+        let card = Card {
+            ring: Ring::R1,
+            given: None,
+        };
+        let [one, same] = ["A", "B"].map(|name| deal(folder.path(), name, card, 5).expect("dealt"));
         assert_eq!((one.effects, one.snr_marginal), (same.effects, same.snr_marginal));
         let read = |case: &str, file: &str| fs::read(folder.path().join(case).join(file)).expect(file);
         for file in ["measured.txt.gz", "motion.csv.gz", "unit.toml"] {

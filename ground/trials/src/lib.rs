@@ -9,6 +9,7 @@ pub mod answer;
 pub mod blind;
 pub mod command;
 pub mod deal;
+pub mod deck;
 pub mod disturbance;
 mod draw;
 mod flight;

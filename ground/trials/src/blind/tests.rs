@@ -9,6 +9,7 @@ fn what_was_changed_after_its_hash_was_published_is_found() {
         r1: 0,
         r3: 0,
         r4: 0,
+        each: false,
     };
     make(&folder).expect("a folder");
     deal(&folder, &answers, hand, 1).expect("dealt");

@@ -1,0 +1,91 @@
+//! What a deal consists of: so many cases of each ring, in an order that is drawn.
+//!
+//! In: a [`Hand`], numbers as they are asked for. Out: [`Card`]s, each a case to fly.
+
+use crate::{
+    deal::Ring,
+    disturbance::{self, Disturbance},
+    draw::Draw,
+};
+
+/// How many cases of each ring.
+#[derive(Clone, Copy, Debug)]
+pub struct Hand {
+    /// Nothing wrong.
+    pub r0: usize,
+    /// One effect.
+    pub r1: usize,
+    /// A novel disturbance.
+    pub r3: usize,
+    /// Two effects.
+    pub r4: usize,
+    /// Besides, one case of one effect for every one that has a name.
+    pub each: bool,
+}
+
+/// What is to be dealt.
+#[derive(Clone, Copy)]
+pub struct Card {
+    /// By how much is wrong.
+    pub ring: Ring,
+    /// What is wrong; drawn from the ring if absent.
+    pub given: Option<Disturbance>,
+}
+
+impl Hand {
+    /// Its cards in an order that is drawn.
+    pub fn shuffled(self, draw: &mut Draw) -> Vec<Card> {
+        let rings = [
+            (Ring::R0, self.r0),
+            (Ring::R1, self.r1),
+            (Ring::R3, self.r3),
+            (Ring::R4, self.r4),
+        ];
+        let drawn = |(ring, count)| vec![Card { ring, given: None }; count];
+        let mut deck: Vec<Card> = rings.into_iter().flat_map(drawn).collect();
+        if self.each {
+            deck.extend(disturbance::named().into_iter().map(|disturbance| Card {
+                ring: Ring::R1,
+                given: Some(disturbance),
+            }));
+        }
+        for last in (1..deck.len()).rev() {
+            deck.swap(last, draw.below(last + 1));
+        }
+        deck
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dealing_each_deals_every_name_once_beside_what_is_drawn() {
+        let hand = Hand {
+            r0: 2,
+            r1: 1,
+            r3: 0,
+            r4: 3,
+            each: true,
+        };
+        let deck = hand.shuffled(&mut Draw::new(7));
+        let drawn = deck.iter().filter(|card| card.given.is_none()).map(|card| card.ring);
+        let mut rings: Vec<String> = drawn.map(|ring| format!("{ring:?}")).collect();
+        rings.sort_unstable();
+        assert_eq!(rings, ["R0", "R0", "R1", "R4", "R4", "R4"]);
+        let mut every: Vec<&str> = disturbance::named()
+            .iter()
+            .map(|disturbance| disturbance.name)
+            .collect();
+        let given: Vec<(Ring, Disturbance)> = (deck.iter())
+            .filter_map(|card| Some((card.ring, card.given?)))
+            .collect();
+        assert!(given.iter().all(|(ring, _)| *ring == Ring::R1));
+        let mut dealt: Vec<&str> = given.iter().map(|(_, disturbance)| disturbance.name).collect();
+        assert_ne!(dealt, every, "not shuffled");
+        dealt.sort_unstable();
+        every.sort_unstable();
+        assert_eq!(dealt, every);
+    }
+}
