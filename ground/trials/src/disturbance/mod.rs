@@ -3,6 +3,9 @@
 //! Each [`Disturbance`] changes a [`Scene`] by physics written for this purpose, often richer than the one-parameter law
 //! a library would fit: coefficients bend with temperature, delays jitter, plates differ. Its strength multiplies a typical
 //! size; everything else is drawn. Names are those of verdicts; [`novel`] ones have none.
+//!
+//! Every effect of the library has one but `gyro-sine-response`: it is the law of fibre-optic gyros, which this unit has not
+//! and for which no verdict on a unit whose gyros send codes has a name.
 
 mod accelerometer;
 mod gyro;
