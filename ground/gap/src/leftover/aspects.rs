@@ -201,7 +201,7 @@ impl<'a> Sights<'a> {
                 along.motion,
                 alike(values),
                 alike(&squares(values)),
-                self.spectra[index].line(values),
+                self.spectra[index].plainness(values),
                 values.iter().map(|value| value.clamp(-FAR, FAR).powi(4)).sum(),
                 fitted.nuisance[index].norm_squared(),
             ];

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Bins on either side that tell the level about a bin.
 const AROUND: usize = 12;
@@ -15,6 +16,9 @@ const NEAREST: usize = 3;
 
 /// Cycles of the log below which a line is no line but a shape, and has no level on its lower side.
 const FEWEST: usize = NEAREST + 3;
+
+/// Normal deviate below any that noise without a line has.
+const NO_LINE: f64 = -8.0;
 
 /// A transform ready to be repeated.
 pub struct Spectrum {
@@ -32,9 +36,24 @@ impl Spectrum {
         }
     }
 
+    /// How plain the strongest line is: the normal deviate as rare as it, from [`NO_LINE`], cubed. The strongest of hundreds of
+    /// ratios has a long tail, and would be the largest of all that is looked at where there is nothing.
+    pub fn plainness(&self, values: &[f64]) -> f64 {
+        // Over the mean of k bins of noise a bin is F-distributed with 2 and 2 k degrees of freedom.
+        let k = (AROUND + 1 - NEAREST) as f64;
+        let line = self.line(values);
+        if line <= 0.0 {
+            return 0.0;
+        }
+        let beyond = (1.0 + line / k).powf(-k);
+        let bins = (self.window.len() / 2).saturating_sub(2 * FEWEST) as f64;
+        let p = -(bins * (-beyond).ln_1p()).exp_m1();
+        (-Normal::standard().inverse_cdf(p) - NO_LINE).max(0.0).powi(3)
+    }
+
     /// The power of the strongest line over the mean power about it, of that side where it is higher: a spectrum that only
     /// falls has no line.
-    pub fn line(&self, values: &[f64]) -> f64 {
+    fn line(&self, values: &[f64]) -> f64 {
         let mut bins: Vec<Complex<f64>> = (values.iter().zip(&self.window))
             .map(|(value, window)| Complex::from(value * window))
             .collect();
@@ -88,9 +107,33 @@ mod tests {
     }
 
     #[test]
+    fn noise_is_as_plain_as_a_normal_deviate() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(9);
+        let spectrum = Spectrum::new(COUNT);
+        let mut deviates: Vec<f64> = (0..1000)
+            .map(|_| {
+                let noise: Vec<f64> = (0..COUNT).map(|_| StandardNormal.sample(&mut random)).collect();
+                spectrum.plainness(&noise).cbrt() + NO_LINE
+            })
+            .collect();
+        deviates.sort_by(f64::total_cmp);
+        let spread = deviates[841] - deviates[500];
+        let far = deviates
+            .iter()
+            .filter(|deviate| **deviate - deviates[500] > 3.0 * spread);
+        assert!(
+            (0.7..1.3).contains(&spread) && far.count() < 6,
+            "{spread} {:?}",
+            &deviates[990..]
+        );
+    }
+
+    #[test]
     fn nothing_and_next_to_nothing_have_no_line() {
         for count in [0, 1, 5, 12, 13, 40] {
-            assert_eq!(Spectrum::new(count).line(&vec![0.0; count]), 0.0, "{count}");
+            let spectrum = Spectrum::new(count);
+            assert_eq!(spectrum.plainness(&vec![0.0; count]), 0.0, "{count}");
+            assert!(spectrum.plainness(&walk(3.0)[..count]).is_finite(), "{count}");
         }
     }
 }
