@@ -73,7 +73,9 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
             continue;
         }
         let explained = 0.5 * point.estimate.energy_explained;
-        let is_done = point.to_gain < CONVERGED + NEGLIGIBLE[0] * explained;
+        // A parameter that does nothing while others are zero has its slope only where they are not.
+        let is_silent = step < 2 && slopes.iter().skip(library.reference).any(is_zero);
+        let is_done = !is_silent && point.to_gain < CONVERGED + NEGLIGIBLE[0] * explained;
         let mut next = Vec::new();
         let mut from = library.reference;
         for hypothesis in set {
@@ -91,7 +93,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         if is_done {
             break;
         }
-        if step > 0 && point.to_gain > CURVED + NEGLIGIBLE[1] * explained {
+        if step > 0 && (is_silent || point.to_gain > CURVED + NEGLIGIBLE[1] * explained) {
             slopes.truncate(library.reference);
             let model = model_of(library, set, &thetas);
             slopes.extend((0..set.len()).flat_map(|index| problem.slopes(&model, index)));
@@ -111,6 +113,12 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         log_evidence: f64::NEG_INFINITY,
         slopes,
     })
+}
+
+fn is_zero(entries: &Entries) -> bool {
+    entries
+        .iter()
+        .all(|(_, values)| values.iter().all(|value| *value == 0.0))
 }
 
 /// A set with its parameters, as a model.

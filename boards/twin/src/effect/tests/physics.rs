@@ -238,16 +238,17 @@ fn a_gradient_is_the_same_field_where_the_centre_is_and_another_at_the_plates() 
     };
     let active = Active {
         cause,
-        theta: vec![2.0, 0.0, 0.0, 0.0, 0.0],
+        theta: vec![2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01],
     };
     let index = nominal.unit().channel("m4y").unwrap();
     let (with, without) = (predicted(&nominal, &active), nominal.predict(&[]));
-    let (channel, plate) = (
-        &nominal.unit().channels[index],
-        &nominal.unit().channels[nominal.unit().channel("a4x").unwrap()],
-    );
+    let [channel, plate, face] = ["m4y", "a4x", "a4z"].map(|name| {
+        let index = nominal.unit().channel(name).unwrap();
+        &nominal.unit().channels[index]
+    });
+    let place_b = plate.lever_m + 0.01 * face.axis_b;
     for ((with, without), feel) in with[index].iter().zip(&without[index]).zip(nominal.feels(index)) {
-        let place_n = feel.position_n + feel.q_nb * plate.lever_m;
+        let place_n = feel.position_n + feel.q_nb * place_b;
         let change_n = Vector3::new(2.0 * place_n.x, 0.0, -2.0 * place_n.z);
         assert!((with - without - channel.axis_b.dot(&feel.to_b(change_n))).abs() < 1e-9);
     }
