@@ -8,13 +8,17 @@ use crate::predict::{Aim, Chain, Kind};
 /// The variant of a load that is the force; its unit of compliance is then rad per m/s2.
 const OF_FORCE: f64 = 1.0;
 
+/// Of one that is the force on the face of the plate, along its third axis, in the same unit: a board on stand-offs is stiff
+/// along itself.
+const ON_FACE: f64 = 2.0;
+
 /// `plate-flexing`.
 pub struct PlateFlexing;
 
 const PAGE: Page = Page {
     name: "plate-flexing",
     physics: "Centrifugal or inertial load bends a plate; its axes turn by an angle in proportion to it.",
-    equation: "y = (n + phi x n).v, phi = c |w|^2 or c |f|",
+    equation: "y = (n + phi x n).v, phi = c |w|^2, c |f| or c f.n_plate",
     source: "Thin boards on stand-offs: 0.1 to 0.5 deg",
     excited_by: "high rate or acceleration",
     siblings: &["lever-arm", "accel-nonlinearity", "plate-rotation"],
@@ -34,12 +38,14 @@ impl Effect for PlateFlexing {
         &PAGE
     }
 
-    fn act<'a>(&self, theta: &'a [f64], variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
+    fn act<'a>(&self, theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
         let compliance = Vector3::from_column_slice(theta);
         let aim = chain.aim;
+        let face_b = site.plate_axis_b(3.0).unwrap_or_default();
         chain.add(move |feel, _| {
             let load = match variant {
                 OF_FORCE => feel.force_b.norm(),
+                ON_FACE => feel.force_b.dot(&face_b),
                 _ => feel.rate_b.norm_squared(),
             };
             let turned = Aim {
@@ -50,8 +56,8 @@ impl Effect for PlateFlexing {
         });
     }
 
-    /// With the square of the rate, with the force.
+    /// With the square of the rate, with the force, with the force on the face.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
-        vec![0.0, OF_FORCE]
+        vec![0.0, OF_FORCE, ON_FACE]
     }
 }
