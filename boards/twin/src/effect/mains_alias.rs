@@ -63,4 +63,9 @@ impl Effect for MainsAlias {
         let around = |hz: f64| (-steps..=steps).map(move |k| hz + f64::from(k) * step_hz);
         around(60.0).chain(around(50.0)).collect()
     }
+
+    /// Half a step off, a line has turned over at the end of the log.
+    fn has_values_between(&self) -> bool {
+        true
+    }
 }
