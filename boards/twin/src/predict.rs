@@ -25,7 +25,7 @@ pub use grid::{Grid, LowPass};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
 
-use crate::effect::{Active, Cause, Site, UnknownEffect};
+use crate::effect::{Active, Cause, Nature, Site, UnknownEffect};
 use crate::environment::Environment;
 
 /// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
@@ -103,13 +103,42 @@ impl Twin {
         Ok(twin)
     }
 
-    /// The twin along what was truly felt, if an effect says that the truth instrument tells something else; what is open
-    /// about a unit is open along its true motion.
+    /// The twin of what is truly felt, and by sensors that truly look where they do, if a cause says that either is told
+    /// wrongly: what is open about a unit is open along that.
     pub fn retold(&self, cause: &Cause) -> Option<Self> {
         let truly = |feel: &Feel| cause.effect.retold(cause.variant, feel, &self.environment);
-        truly(&self.scene.feel(*self.starts_s.first()?))?;
-        let scene = self.scene.retold(|feel| truly(feel).unwrap_or(*feel));
-        Self::new(self.unit.clone(), self.environment, scene, self.starts_s.clone()).ok()
+        let is_moved = truly(&self.scene.feel(*self.starts_s.first()?)).is_some();
+        let scene = match is_moved {
+            true => self.scene.retold(|feel| truly(feel).unwrap_or(*feel)),
+            false => self.scene.clone(),
+        };
+        let mut unit = self.unit.clone();
+        let active = Active {
+            cause: cause.clone(),
+            theta: vec![],
+        };
+        let is_gross = cause.effect.page().nature == Nature::Discrete;
+        for (index, channel) in unit.channels.iter_mut().enumerate().filter(|_| is_gross) {
+            let mut chain = Chain::of(&self.unit.channels[index]);
+            active.act(&self.site(index), &mut chain);
+            (channel.axis_b, channel.lever_m) = (chain.aim.axis_b, chain.aim.lever_m);
+        }
+        (is_moved || unit != self.unit)
+            .then(|| Self::new(unit, self.environment, scene, self.starts_s.clone()).ok())
+            .flatten()
+    }
+
+    fn site(&self, index: usize) -> Site<'_> {
+        Site {
+            unit: &self.unit,
+            index,
+            channel: &self.unit.channels[index],
+            environment: &self.environment,
+            log_s: (
+                *self.starts_s.first().unwrap_or(&0.0),
+                *self.starts_s.last().unwrap_or(&0.0),
+            ),
+        }
     }
 
     /// The unit.
@@ -159,16 +188,7 @@ impl Twin {
     fn computed(&self, index: usize, active: &[Active]) -> Vec<f64> {
         let channel = &self.unit.channels[index];
         let t_s = self.instants_s(index);
-        let site = Site {
-            unit: &self.unit,
-            index,
-            channel,
-            environment: &self.environment,
-            log_s: (
-                *self.starts_s.first().unwrap_or(&0.0),
-                *self.starts_s.last().unwrap_or(&0.0),
-            ),
-        };
+        let site = self.site(index);
         let mut chain = Chain::of(channel);
         for active in self.known.iter().chain(active) {
             active.act(&site, &mut chain);

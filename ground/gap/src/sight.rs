@@ -48,7 +48,7 @@ pub fn views(problem: &Problem) -> Vec<View> {
         (from.min(t), to.max(t))
     });
     let view = |(index, frame): (usize, &Frame)| {
-        let channel = &twin.unit().channels[index];
+        let channel = &problem.true_twin().unit().channels[index];
         let own = problem.predict(index, &[]);
         let felt_b = |row: usize| {
             let feel = &feels[frame.series.rows[row] as usize];
