@@ -174,6 +174,7 @@ mod tests {
             p,
             log_tail: p.ln(),
             aspects: Vec::new(),
+            again: None,
             scale: [1.0, 1.0],
         }
     }

@@ -31,11 +31,7 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         let hypotheses: Vec<usize> = members.iter().map(|chosen| chosen.hypothesis).collect();
         let start: Vec<_> = members.iter().map(|chosen| chosen.theta.clone()).collect();
         let refined = refine(problem, library, &hypotheses, &start);
-        left(&Model::around(
-            problem,
-            library,
-            model_of(library, &hypotheses, &refined.thetas),
-        ))
+        left(&Model::around(problem, model_of(library, &hypotheses, &refined.thetas)))
     };
     let energies = shapley::shares(chosen.len(), |set| -left(set));
     causes

@@ -61,7 +61,7 @@ pub fn keys(problem: &Problem, library: &Library, model: &Model) -> Vec<Option<K
         }
         let mut others = model.components.clone();
         others.remove(index);
-        let without = losses(problem, library, &Model::around(problem, library, others), &blocks);
+        let without = losses(problem, library, &Model::around(problem, others), &blocks);
         Some(key_of(&without, &with))
     };
     (0..model.components.len()).map(key).collect()

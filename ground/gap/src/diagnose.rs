@@ -1,7 +1,8 @@
 //! From a case to a diagnosis: every step of the gap's method in its order.
 //!
-//! In: a [`Subject`] and what to leave out of the library. Out: [`Diagnosis`]. The held-out samples are asked once, at the end,
-//! about a model that no longer changes; if its effects do not shrink their gap, they are withdrawn.
+//! In: a [`Subject`] and what to leave out of the library. Out: [`Diagnosis`]. The held-out samples are asked at the end, about
+//! a model that no longer changes; if its effects do not shrink their gap, they are withdrawn, and where nothing explains a
+//! gap, they say whether it is there too.
 
 use crate::{
     attribute::attribute,
@@ -22,6 +23,9 @@ use crate::{
     sight,
     trace::{Trace, cells, traces},
 };
+
+/// Probability of as large a leftover by chance from which on nothing speaks for one, wherever else it is.
+const DOUBTFUL: f64 = 0.36;
 
 /// What a case says.
 pub struct Diagnosis {
@@ -80,7 +84,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
     let search = |share| progress("search", share);
     let mut found = attribute(&problem, &mut library, &search);
-    let quiet = Model::around(&problem, &library, Vec::new());
+    let quiet = Model::around(&problem, Vec::new());
     let views = sight::views(&problem);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
@@ -139,6 +143,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     if explanation.is_empty() {
         // Without the effects what is left is all there was.
         left = gate.clone();
+        let found = left.aspects.first().filter(|_| left.p < DOUBTFUL);
+        left.again = found.and_then(|aspect| {
+            progress("again", 0.0);
+            subject.held.recurrence(&subject.twin, &subject.reference, &aspect.what)
+        });
         shrink = subject.held.judge(without);
     }
 

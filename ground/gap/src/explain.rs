@@ -71,7 +71,7 @@ impl Explanation {
         withheld: &[String],
         progress: &dyn Fn(f64),
     ) -> Self {
-        let first = Model::around(problem, library, found.model(library));
+        let first = Model::around(problem, found.model(library));
         let mut scatter = best_scatter(problem, &first, withheld);
         let explained = gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let wandering = wandering(problem, quiet, withheld)
@@ -107,7 +107,7 @@ impl Explanation {
         // What is left is judged with the noise as described, or a misfit would excuse itself.
         let back: Vec<f64> = of_misfit.iter().map(|factor| 1.0 / factor).collect();
         reweigh(problem, library, &back);
-        let model = Model::around(problem, library, found.model(library));
+        let model = Model::around(problem, found.model(library));
         if scatter.is_some() && !wanders {
             // What a large effect's law leaves looks like scatter, and would be held to what that claims.
             scatter = best_scatter(problem, &model, withheld)

@@ -10,8 +10,9 @@
 //! ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
 //!
 //! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
-//! [`strength`].
+//! [`strength`]; in [`recurrence`], whether what nothing explains is there too.
 
+mod recurrence;
 pub mod stages;
 pub mod strength;
 

@@ -98,26 +98,36 @@ pub struct Leftover {
     pub log_tail: f64,
     /// Aspects above three, largest first.
     pub aspects: Vec<Aspect>,
+    /// Probability of the largest of them being as large as it is on other windows too; `None` where it was not looked for.
+    pub again: Option<f64>,
     /// Mean and spread of the largest aspect over the simulated logs.
     pub scale: [f64; 2],
 }
 
 impl Leftover {
-    /// Probability that something else is needed, from its prior: a p-value speaks against "enough" by at most
-    /// `-1 / (e p ln p)` (Sellke, Bayarri and Berger 2001).
+    /// Probability that something else is needed, from its prior.
     pub fn unknown(&self, prior: f64) -> f64 {
-        let log_p = self.log_tail.min(self.p.ln());
-        let bound = if log_p < -1.0 {
-            (1.0 + log_p + (-log_p).ln()).exp()
-        } else {
-            1.0
-        };
-        prior / (prior + (1.0 - prior) * bound)
+        let again = self.again.map_or(1.0, |p| odds(p.ln()));
+        prior / (prior + (1.0 - prior) * odds(self.log_p()) * again)
     }
 
     /// Energy of what is left, in squares of noise: what a Gaussian of that energy is as rare as.
     pub fn energy(&self) -> f64 {
-        -2.0 * self.log_tail.min(self.p.ln())
+        -2.0 * self.log_p()
+    }
+
+    fn log_p(&self) -> f64 {
+        self.log_tail.min(self.p.ln())
+    }
+}
+
+/// Least odds of "enough" that a p-value leaves: it speaks against it by at most `-1 / (e p ln p)` (Sellke, Bayarri and Berger
+/// 2001).
+fn odds(log_p: f64) -> f64 {
+    if log_p < -1.0 {
+        (1.0 + log_p + (-log_p).ln()).exp()
+    } else {
+        1.0
     }
 }
 
@@ -146,43 +156,16 @@ pub fn judge(
     suspects: &[Suspect],
     disturb: Option<Disturb>,
 ) -> Leftover {
-    let sights = Sights::new(views, suspects, disturb.map_or(&[], |disturb| disturb.channels));
-    let observed = sights.sums(fitted);
-    let samples: usize = views.iter().map(|view| view.phase.len()).sum();
-    let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    let parameters = unshrunk(joint, &fitted.parameters);
-    let simulated: Vec<Vec<f64>> = (0..count)
-        .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &parameters, disturb, &mut random))))
-        .collect();
-    let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
-    let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
-    let observed = roots(&observed);
-    let labels = sights.labels();
-    let spread = |(at, label): (usize, &Label)| {
-        let values = simulated.iter().map(|run| run[at]);
-        let is_there = |value: &f64| !label.may_be_none || *value > 0.0;
-        moments(values.filter(is_there))
-    };
-    let spreads: Vec<(f64, f64)> = labels.iter().enumerate().map(spread).collect();
-    let sizes = |run: &[f64]| -> Vec<f64> {
-        (run.iter().zip(&spreads).zip(&labels))
-            .map(|((value, (mean, spread)), label)| {
-                let is_none = label.may_be_none && *value == 0.0;
-                let size = if *mean > FITTED && *spread > 0.0 && !is_none {
-                    (value - mean) / spread
-                } else {
-                    0.0
-                };
-                if label.is_claimed { size.abs() } else { size }
-            })
-            .collect()
-    };
-    let largest = |run: &[f64]| sizes(run).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let Sizes {
+        labels,
+        observed,
+        simulated,
+    } = Sizes::of(views, joint, fitted, suspects, disturb);
+    let largest = |run: &Vec<f64>| run.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let seen = largest(&observed);
-    let scale = moments(simulated.iter().map(|run| largest(run)));
+    let scale = moments(simulated.iter().map(largest));
     let beyond = simulated.iter().filter(|run| largest(run) >= seen).count();
-    let mut aspects: Vec<Aspect> = (labels.iter().zip(sizes(&observed)))
+    let mut aspects: Vec<Aspect> = (labels.iter().zip(observed))
         .map(|(label, size)| Aspect {
             what: label.what.clone(),
             channel: label.channel,
@@ -192,10 +175,74 @@ pub fn judge(
         .collect();
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));
     Leftover {
-        p: (1 + beyond) as f64 / (1 + count) as f64,
+        p: (1 + beyond) as f64 / (1 + simulated.len()) as f64,
         log_tail: log_tail(seen, [scale.0, scale.1]),
         scale: [scale.0, scale.1],
         aspects,
+        again: None,
+    }
+}
+
+/// Probability that one aspect of a residual is as large as it is if the model, which names no effect, is enough: of one that
+/// was found on other windows, which share nothing with these but the calibration. `None` of what that makes.
+pub fn recurrence(views: &[View], joint: &Joint, fitted: &Fitted, what: &str) -> Option<f64> {
+    let sizes = Sizes::of(views, joint, fitted, &[], None);
+    let at = sizes.labels.iter().position(|label| label.what == what)?;
+    if sizes.labels[at].is_of_calibration() {
+        return None;
+    }
+    let beyond = sizes.simulated.iter().filter(|run| run[at] >= sizes.observed[at]);
+    Some((1 + beyond.count()) as f64 / (1 + sizes.simulated.len()) as f64)
+}
+
+/// Every aspect in standard deviations.
+struct Sizes {
+    labels: Vec<Label>,
+    observed: Vec<f64>,
+    /// Of each simulated log.
+    simulated: Vec<Vec<f64>>,
+}
+
+impl Sizes {
+    fn of(views: &[View], joint: &Joint, fitted: &Fitted, suspects: &[Suspect], disturb: Option<Disturb>) -> Self {
+        let sights = Sights::new(views, suspects, disturb.map_or(&[], |disturb| disturb.channels));
+        let observed = sights.sums(fitted);
+        let samples: usize = views.iter().map(|view| view.phase.len()).sum();
+        let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        let parameters = unshrunk(joint, &fitted.parameters);
+        let simulated: Vec<Vec<f64>> = (0..count)
+            .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &parameters, disturb, &mut random))))
+            .collect();
+        let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
+        let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
+        let observed = roots(&observed);
+        let labels = sights.labels();
+        let spread = |(at, label): (usize, &Label)| {
+            let values = simulated.iter().map(|run| run[at]);
+            let is_there = |value: &f64| !label.may_be_none || *value > 0.0;
+            moments(values.filter(is_there))
+        };
+        let spreads: Vec<(f64, f64)> = labels.iter().enumerate().map(spread).collect();
+        let sizes = |run: &[f64]| -> Vec<f64> {
+            (run.iter().zip(&spreads).zip(&labels))
+                .map(|((value, (mean, spread)), label)| {
+                    let is_none = label.may_be_none && *value == 0.0;
+                    let size = if *mean > FITTED && *spread > 0.0 && !is_none {
+                        (value - mean) / spread
+                    } else {
+                        0.0
+                    };
+                    if label.is_claimed { size.abs() } else { size }
+                })
+                .collect()
+        };
+        let (observed, simulated) = (sizes(&observed), simulated.iter().map(|run| sizes(run)).collect());
+        Sizes {
+            labels,
+            observed,
+            simulated,
+        }
     }
 }
 

@@ -4,7 +4,6 @@ use nalgebra::DVector;
 
 use crate::{
     joint::{Fitted, Joint},
-    library::{Entries, Library},
     problem::{Component, Problem},
 };
 
@@ -22,12 +21,10 @@ pub struct Model {
 
 impl Model {
     /// Refits calibration and reference around effects whose parameters `theta` are the best already.
-    pub fn around(problem: &Problem, library: &Library, components: Vec<Component>) -> Self {
-        let mut slopes: Vec<Entries> = (0..library.reference)
-            .map(|place| library.products.column(place).clone())
-            .collect();
-        let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
-        let mut values = vec![0.0; library.reference];
+    pub fn around(problem: &Problem, components: Vec<Component>) -> Self {
+        let mut slopes = problem.reference_columns();
+        let mut sigmas: Vec<f64> = problem.reference.iter().map(|column| column.sigma).collect();
+        let mut values = vec![0.0; slopes.len()];
         for (index, component) in components.iter().enumerate() {
             let parameters = component.active.cause.parameters(problem.twin.unit());
             if parameters.is_empty() {

@@ -277,6 +277,12 @@ fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::f
     {
         writeln!(text, "        left: {} ({:.1} sigma)", aspect.what, aspect.size)?;
     }
+    if let Some(p) = diagnosis.leftover.again.filter(|_| diagnosis.none_of_these > 0.5) {
+        writeln!(
+            text,
+            "        the first of them is on the held-out windows too: by chance {p:.3}"
+        )?;
+    }
     Ok(())
 }
 

@@ -39,6 +39,8 @@ const COMMON: [usize; 2] = [60, 12];
 
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
 
+const OF_CALIBRATION: &str = "a calibration beyond its sigmas";
+
 /// What is looked at in each channel, before the levels.
 const OF_CHANNEL: [&str; 9] = [
     "more energy than noise",
@@ -49,7 +51,7 @@ const OF_CHANNEL: [&str; 9] = [
     "noise that comes and goes",
     "a tone",
     "outliers",
-    "a calibration beyond its sigmas",
+    OF_CALIBRATION,
 ];
 
 /// Those of [`OF_CHANNEL`] that look at nothing but how a sample scatters. Where the reference errs more than the sensor
@@ -70,6 +72,13 @@ pub struct Label {
     pub is_claimed: bool,
     /// Whether it is a mean over what may not be there at all, and then is zero.
     pub may_be_none: bool,
+}
+
+impl Label {
+    /// Whether it is how far the fitted calibration is off.
+    pub fn is_of_calibration(&self) -> bool {
+        self.what.ends_with(OF_CALIBRATION)
+    }
 }
 
 /// The views made ready for sums.
