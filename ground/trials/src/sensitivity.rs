@@ -229,17 +229,17 @@ mod tests {
 
     #[test]
     fn louder_noise_is_as_plain_as_the_best_test_of_a_variance_finds_it() {
-        // A variance of 0.3 beside one, 1500 samples: the energy of all of them lies 450 above the 1500 it should be, give or
-        // take sqrt(3000).
+        // A variance of 0.3 beside one, 15,000 samples: the energy of all of them lies 4,500 above the 15,000 it should be,
+        // give or take sqrt(30,000).
         let mut random = Draw::new(5);
-        let difference = DVector::from_fn(1500, |_, _| 0.3f64.sqrt() * random.normal());
+        let difference = DVector::from_fn(15_000, |_, _| 0.3f64.sqrt() * random.normal());
         let snr = |difference: DVector<f64>| {
             let nuisance = DMatrix::zeros(difference.len(), 5);
             Differences { difference, nuisance }.in_variance().sqrt()
         };
-        assert!((snr(difference.clone()) - 450.0 / 3000f64.sqrt()).abs() < 1.0);
+        assert!((snr(difference.clone()) - 4500.0 / 30_000f64.sqrt()).abs() < 1.0);
         // All of it in a tenth of the time is plainer by the root of ten.
-        let bursts = DVector::from_fn(1500, |row, _| {
+        let bursts = DVector::from_fn(15_000, |row, _| {
             if row % 200 < 20 {
                 10f64.sqrt() * difference[row]
             } else {
