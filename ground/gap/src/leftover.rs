@@ -19,6 +19,7 @@ mod shapes;
 mod simulated;
 mod spectrum;
 mod strength;
+mod together;
 use aspects::{Label, Sights};
 pub use instrument::Instrument;
 pub(crate) use simulated::simulate;

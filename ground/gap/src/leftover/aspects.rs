@@ -11,7 +11,8 @@
 //! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
 //! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
 //! it claims, and outliers the size and the distance from the sample before, no more and no less: a law of outliers "anywhere in
-//! the range" would else stand for any, values that are sent again among them.
+//! the range" would else stand for any, values that are sent again among them; and whether channels that scatter each by itself
+//! go one way ([`super::together`]).
 
 use nalgebra::{DMatrix, Vector1};
 
@@ -21,6 +22,7 @@ use super::{
     shapes::{BINS, Shapes},
     spectrum::Spectrum,
     strength::Strength,
+    together,
 };
 use crate::place::octaves;
 
@@ -182,6 +184,15 @@ impl<'a> Sights<'a> {
                 may_be_none: false,
             }));
         }
+        labels.extend(self.scattered_kinds().map(|kind| Label {
+            what: format!(
+                "{} go one way together",
+                KIND_NAMES.get(kind).copied().unwrap_or("sensors")
+            ),
+            channel: None,
+            is_claimed: false,
+            may_be_none: false,
+        }));
         labels.extend(["the size", "the distance from the sample before"].map(|what| Label {
             what: format!("outliers together have not {what} that is claimed"),
             channel: None,
@@ -189,6 +200,12 @@ impl<'a> Sights<'a> {
             may_be_none: true,
         }));
         labels
+    }
+
+    /// Kinds of the channels that an effect on the scatter is in.
+    fn scattered_kinds(&self) -> impl Iterator<Item = usize> {
+        let is_in = |kind: &usize| self.scattered.iter().any(|channel| self.views[*channel].kind == *kind);
+        (0..kinds(self.views)).filter(is_in)
     }
 
     /// The sums of squares, in the order of [`Sights::labels`].
@@ -247,6 +264,14 @@ impl<'a> Sights<'a> {
                     .map(|at| 1.0 + (read(at) - read(at - 1)).abs()),
             );
             sums.extend(octaves::energies(rest));
+        }
+        for kind in self.scattered_kinds() {
+            let own = self
+                .scattered
+                .iter()
+                .filter(|channel| self.views[**channel].kind == kind);
+            let courses = own.map(|channel| (self.views[*channel].phase.as_slice(), fitted.rest[*channel].as_slice()));
+            sums.push(together::alike(courses));
         }
         sums.extend([sizes, distances].map(|values| mean_logarithm(values.into_iter())));
         sums

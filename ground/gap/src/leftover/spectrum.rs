@@ -6,7 +6,6 @@
 use std::sync::Arc;
 
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
-use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Bins on either side that tell the level about a bin.
 const AROUND: usize = 12;
@@ -16,9 +15,6 @@ const NEAREST: usize = 3;
 
 /// Cycles of the log below which a line is no line but a shape, and has no level on its lower side.
 const FEWEST: usize = NEAREST + 3;
-
-/// Normal deviate below any that noise without a line has.
-const NO_LINE: f64 = -8.0;
 
 /// A transform ready to be repeated.
 pub struct Spectrum {
@@ -36,19 +32,13 @@ impl Spectrum {
         }
     }
 
-    /// How plain the strongest line is: the normal deviate as rare as it, from [`NO_LINE`], cubed. The strongest of hundreds of
-    /// ratios has a long tail, and would be the largest of all that is looked at where there is nothing.
+    /// How plain the strongest line is: minus the logarithm of how rare it is in one bin of noise. The ratio itself, over a level
+    /// that few bins tell, has a long tail: the strongest of hundreds would be the largest of all that is looked at where there
+    /// is nothing.
     pub fn plainness(&self, values: &[f64]) -> f64 {
         // Over the mean of k bins of noise a bin is F-distributed with 2 and 2 k degrees of freedom.
         let k = (AROUND + 1 - NEAREST) as f64;
-        let line = self.line(values);
-        if line <= 0.0 {
-            return 0.0;
-        }
-        let beyond = (1.0 + line / k).powf(-k);
-        let bins = (self.window.len() / 2).saturating_sub(2 * FEWEST) as f64;
-        let p = -(bins * (-beyond).ln_1p()).exp_m1();
-        (-Normal::standard().inverse_cdf(p) - NO_LINE).max(0.0).powi(3)
+        k * (self.line(values) / k).ln_1p()
     }
 
     /// The power of the strongest line over the mean power about it, of that side where it is higher: a spectrum that only
@@ -107,25 +97,19 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_as_plain_as_a_normal_deviate() {
+    fn the_strongest_line_of_noise_has_the_tail_of_an_exponential() {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(9);
         let spectrum = Spectrum::new(COUNT);
-        let mut deviates: Vec<f64> = (0..1000)
+        let mut strongest: Vec<f64> = (0..1000)
             .map(|_| {
                 let noise: Vec<f64> = (0..COUNT).map(|_| StandardNormal.sample(&mut random)).collect();
-                spectrum.plainness(&noise).cbrt() + NO_LINE
+                spectrum.plainness(&noise)
             })
             .collect();
-        deviates.sort_by(f64::total_cmp);
-        let spread = deviates[841] - deviates[500];
-        let far = deviates
-            .iter()
-            .filter(|deviate| **deviate - deviates[500] > 3.0 * spread);
-        assert!(
-            (0.7..1.3).contains(&spread) && far.count() < 6,
-            "{spread} {:?}",
-            &deviates[990..]
-        );
+        strongest.sort_by(f64::total_cmp);
+        // From one in ten to one in a hundred of a Gumbel law: ln(-ln 0.9) - ln(-ln 0.99) = 2.35.
+        let tail = strongest[990] - strongest[900];
+        assert!((1.5..3.2).contains(&tail), "{tail}");
     }
 
     #[test]

@@ -69,6 +69,45 @@ fn values_that_are_sent_again_are_not_anything() {
     assert!(unlike(true) && !unlike(false));
 }
 
+/// Gyros wander each by itself; what all of them follow, a supply, is no walk.
+#[test]
+fn a_course_that_all_follow_is_not_each_ones_own() {
+    let walk = |seed: u64| -> Vec<f64> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut level = 0.0;
+        let mut next = |_| {
+            let step: f64 = StandardNormal.sample(&mut random);
+            level += 0.2 * step;
+            level
+        };
+        (0..SAMPLES).map(&mut next).collect()
+    };
+    let each_its_own = |residuals: &mut [DVector<f64>], seed: u64| {
+        for (channel, residual) in (0..).zip(residuals) {
+            *residual += DVector::from_vec(walk(seed.wrapping_add(channel)));
+        }
+    };
+    let together = |is_one: bool| {
+        let (views, joint) = scene();
+        let mut residuals = noise(7);
+        if is_one {
+            let common = DVector::from_vec(walk(5));
+            (residuals.iter_mut().zip([1.0, -0.7, 1.4])).for_each(|(residual, part)| *residual += &common * part);
+        } else {
+            each_its_own(&mut residuals, 5);
+        }
+        let disturb = Disturb {
+            channels: &[0, 1, 2],
+            of: &each_its_own,
+        };
+        let left = judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb));
+        left.aspects
+            .iter()
+            .any(|aspect| aspect.what.contains("one way together"))
+    };
+    assert!(together(true) && !together(false));
+}
+
 /// That they are not there is said of the energy; of a size nothing can be said.
 #[test]
 fn outliers_that_are_not_there_have_no_size() {
