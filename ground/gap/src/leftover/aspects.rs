@@ -258,11 +258,9 @@ impl<'a> Sights<'a> {
             sums.push(mean_logarithm(own.clone()));
             sizes.extend(own);
             let read = |at: usize| self.views[*channel].predicted[at] + rest[at];
-            distances.extend(
-                outliers(rest)
-                    .filter(|at| *at > 0)
-                    .map(|at| 1.0 + (read(at) - read(at - 1)).abs()),
-            );
+            // What is sent again is as near as a calibration is right, and how near that is says nothing.
+            let away = |at: usize| (read(at) - read(at - 1)).abs().max(FAR);
+            distances.extend(outliers(rest).filter(|at| *at > 0).map(away));
             sums.extend(octaves::energies(rest));
         }
         for kind in self.scattered_kinds() {
