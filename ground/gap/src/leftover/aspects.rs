@@ -36,6 +36,10 @@ const CUT: f64 = 3.0;
 /// the energy; here it would only make the simulated logs' own few hide everyone else's.
 const FAR: f64 = 5.0;
 
+/// [units of noise] within which a sample is where the one before was: what is sent again is as near as a calibration is right,
+/// and how near that is says nothing.
+const NEAR: f64 = 1.2;
+
 /// Stretches in which vectors, factors and rotations common to sensors are sought: of seconds, and of a minute.
 const COMMON: [usize; 2] = [60, 12];
 
@@ -258,8 +262,7 @@ impl<'a> Sights<'a> {
             sums.push(mean_logarithm(own.clone()));
             sizes.extend(own);
             let read = |at: usize| self.views[*channel].predicted[at] + rest[at];
-            // What is sent again is as near as a calibration is right, and how near that is says nothing.
-            let away = |at: usize| (read(at) - read(at - 1)).abs().max(FAR);
+            let away = |at: usize| (read(at) - read(at - 1)).abs().max(NEAR);
             distances.extend(outliers(rest).filter(|at| *at > 0).map(away));
             sums.extend(octaves::energies(rest));
         }
