@@ -280,7 +280,7 @@ fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::f
     if let Some(p) = diagnosis.leftover.again.filter(|_| diagnosis.none_of_these > 0.5) {
         writeln!(
             text,
-            "        the first of them is on the held-out windows too: by chance {p:.3}"
+            "        the first of them is as large on the held-out windows as it is by chance with probability {p:.3}"
         )?;
     }
     Ok(())

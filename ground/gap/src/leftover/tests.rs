@@ -1,5 +1,6 @@
 //! Residuals with and without something in them.
 
+mod recurrence;
 mod scatter;
 
 use rand_distr::{Distribution, StandardNormal, Uniform};

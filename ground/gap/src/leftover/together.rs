@@ -36,7 +36,11 @@ fn course(phases: &[f64], values: &[f64]) -> DVector<f64> {
         counts[stretch] += 1.0;
     }
     let means = sums.component_div(&counts.map(|count: f64| count.max(1.0)));
-    means.add_scalar(-means.mean()).normalize()
+    // A channel without a course, or without samples, goes no way.
+    let about_zero = means.add_scalar(-means.mean());
+    about_zero
+        .try_normalize(0.0)
+        .unwrap_or_else(|| DVector::zeros(STRETCHES))
 }
 
 #[cfg(test)]

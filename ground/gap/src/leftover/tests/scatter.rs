@@ -2,6 +2,22 @@
 
 use super::*;
 
+/// What is left of these residuals if they are held to a law of the scatter of some channels.
+fn held_to(channels: &[usize], of: &dyn Fn(&mut [DVector<f64>], u64), residuals: &[DVector<f64>]) -> Leftover {
+    let (views, joint) = scene();
+    judge(
+        &views,
+        &joint,
+        &joint.fit(residuals),
+        &[],
+        Some(Disturb { channels, of }),
+    )
+}
+
+fn says(left: &Leftover, what: &str) -> bool {
+    left.aspects.iter().any(|aspect| aspect.what.contains(what))
+}
+
 /// A law of outliers anywhere in the range would else stand for any samples that are a little off.
 #[test]
 fn outliers_have_the_size_that_their_law_claims() {
@@ -17,17 +33,12 @@ fn outliers_have_the_size_that_their_law_claims() {
         });
     };
     let p_with = |size: Option<f64>| {
-        let (views, joint) = scene();
         let mut residuals = noise(7);
         match size {
             Some(size) => (0..6).for_each(|k| residuals[0][100 * k + 37] += size),
             None => anywhere(&mut residuals, 5),
         }
-        let disturb = Disturb {
-            channels: &[0],
-            of: &anywhere,
-        };
-        judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb)).p
+        held_to(&[0], &anywhere, &residuals).p
     };
     assert!(p_with(None) > 0.05 && p_with(Some(9.0)) < 0.01);
 }
@@ -47,7 +58,7 @@ fn values_that_are_sent_again_are_not_anything() {
         }
     };
     let unlike = |again: bool| {
-        let (views, joint) = scene();
+        let (views, _) = scene();
         let mut residuals = noise(7);
         if again {
             let predicted = &views[0].predicted;
@@ -57,14 +68,10 @@ fn values_that_are_sent_again_are_not_anything() {
         } else {
             anything(&mut residuals, 5);
         }
-        let disturb = Disturb {
-            channels: &[0],
-            of: &anything,
-        };
-        let left = judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb));
-        left.aspects
-            .iter()
-            .any(|aspect| aspect.what.contains("the distance from the sample before"))
+        says(
+            &held_to(&[0], &anything, &residuals),
+            "the distance from the sample before",
+        )
     };
     assert!(unlike(true) && !unlike(false));
 }
@@ -88,7 +95,6 @@ fn a_course_that_all_follow_is_not_each_ones_own() {
         }
     };
     let together = |is_one: bool| {
-        let (views, joint) = scene();
         let mut residuals = noise(7);
         if is_one {
             let common = DVector::from_vec(walk(5));
@@ -96,14 +102,7 @@ fn a_course_that_all_follow_is_not_each_ones_own() {
         } else {
             each_its_own(&mut residuals, 5);
         }
-        let disturb = Disturb {
-            channels: &[0, 1, 2],
-            of: &each_its_own,
-        };
-        let left = judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb));
-        left.aspects
-            .iter()
-            .any(|aspect| aspect.what.contains("one way together"))
+        says(&held_to(&[0, 1, 2], &each_its_own, &residuals), "one way together")
     };
     assert!(together(true) && !together(false));
 }
@@ -114,15 +113,9 @@ fn outliers_that_are_not_there_have_no_size() {
     let blows = |residuals: &mut [DVector<f64>], _: u64| {
         (0..6).for_each(|k| residuals[0][100 * k + 37] += 9.0);
     };
-    let (views, joint) = scene();
-    let disturb = Disturb {
-        channels: &[0],
-        of: &blows,
-    };
-    let left = judge(&views, &joint, &joint.fit(&noise(7)), &[], Some(disturb));
-    let said: Vec<&str> = left.aspects.iter().map(|aspect| aspect.what.as_str()).collect();
-    assert!(said.iter().any(|what| what.contains("not the energy")), "{said:?}");
-    assert!(!said.iter().any(|what| what.contains("not the size")), "{said:?}");
+    let left = held_to(&[0], &blows, &noise(7));
+    assert!(says(&left, "not the energy"), "{:?}", left.aspects);
+    assert!(!says(&left, "not the size"), "{:?}", left.aspects);
 }
 
 #[test]
@@ -137,16 +130,11 @@ fn an_effect_on_the_scatter_is_held_to_the_energy_that_it_claims() {
         });
     };
     let p_with = |there: bool| {
-        let (views, joint) = scene();
         let mut residuals = noise(7);
         if there {
             swings(&mut residuals, 5);
         }
-        let disturb = Disturb {
-            channels: &[0],
-            of: &swings,
-        };
-        judge(&views, &joint, &joint.fit(&residuals), &[], Some(disturb)).p
+        held_to(&[0], &swings, &residuals).p
     };
     assert!(p_with(true) > 0.05 && p_with(false) < 0.01);
 }
