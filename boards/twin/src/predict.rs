@@ -11,6 +11,7 @@ mod calibration;
 mod chain;
 mod emems;
 mod grid;
+mod heading;
 mod scene;
 #[cfg(test)]
 mod tests;

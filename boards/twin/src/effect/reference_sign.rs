@@ -18,7 +18,7 @@ pub struct ReferenceSign;
 const SIGNS: core::ops::Range<u32> = 1..8;
 /// A log of at most this many rows is a table, whose rows may be wrong one by one: variants are then `8 row + signs`, rows
 /// counted from one. Of a longer one the attitude may be: `-signs`.
-const MOST_ROWS: usize = 64;
+pub(super) const MOST_ROWS: usize = 64;
 
 const PAGE: Page = Page {
     name: "reference-sign",

@@ -13,17 +13,21 @@ mod scatter;
 /// A motion that excites everything: all axes up to 130 deg/s, acceleration of the centre, temperature up and down.
 struct Exercise;
 
+/// The attitude of the exercise, turned about the vertical by so much as often.
+fn exercised(gear: f64, t_s: f64) -> Attitude {
+    Attitude::level()
+        .yawed(Jet::sine(gear * 2.5, 0.43, t_s))
+        .pitched(Jet::sine(1.2, 0.91, t_s))
+        .rolled(Jet::sine(2.2, 0.67, t_s))
+}
+
 impl Motion for Exercise {
     fn at(&self, t_s: f64) -> Pose {
         let shake = |amplitude: f64, rate: f64| -amplitude * rate * rate * (rate * t_s).sin();
-        let attitude = Attitude::level()
-            .yawed(Jet::sine(2.5, 0.43, t_s))
-            .pitched(Jet::sine(1.2, 0.91, t_s))
-            .rolled(Jet::sine(2.2, 0.67, t_s));
         Pose {
             acc_n: Vector3::new(shake(0.3, 2.9), shake(0.4, 1.7), shake(0.2, 3.7)),
             temperature_c: Some(25.0 + 12.0 * (0.031 * t_s).sin()),
-            ..Pose::turning(attitude)
+            ..Pose::turning(exercised(1.0, t_s))
         }
     }
 

@@ -104,6 +104,13 @@ impl<const N: usize> Grid<N> {
         self.piece(i).slope(s)
     }
 
+    /// Its second time derivative at `t_s`.
+    pub fn bend(&self, t_s: f64) -> SVector<f64, N> {
+        let (i, s) = self.place(t_s);
+        let Piece([_, _, c2, c3]) = self.piece(i);
+        c2 * 2.0 + c3 * (6.0 * s)
+    }
+
     /// Its low-pass of time constant `tau_s`, settled at the first sample.
     pub fn low_pass(&self, tau_s: f64) -> LowPass<N> {
         let mut nodes = Vec::new();

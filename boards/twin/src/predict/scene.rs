@@ -11,6 +11,7 @@
 use nalgebra::{Quaternion, SVector, UnitQuaternion, Vector1, Vector3};
 
 use super::grid::{Grid, LowPass};
+use super::heading::Heading;
 use super::unit::{Channel, Kind};
 use crate::environment::Environment;
 use crate::motion::Motion;
@@ -36,6 +37,12 @@ pub struct Feel {
     pub q_nb: UnitQuaternion<f64>,
     /// [m] place of the centre in n.
     pub position_n: Vector3<f64>,
+    /// [rad] turned about the vertical since the motion began, whole turns counted ([`Heading`]).
+    pub heading: f64,
+    /// [rad/s] its time derivative.
+    pub heading_rate: f64,
+    /// [rad/s2] and that one's.
+    pub heading_acc: f64,
 }
 
 impl Feel {
@@ -130,6 +137,8 @@ pub struct Scene {
     temperature: Grid<1>,
     /// Quaternion q_nb and place in n.
     pose: Grid<7>,
+    /// [rad] turned about the vertical.
+    heading: Grid<1>,
 }
 
 impl Scene {
@@ -137,7 +146,8 @@ impl Scene {
     pub fn new(motion: &dyn Motion, environment: &Environment, from_s: f64, to_s: f64, step_s: f64) -> Self {
         let last = (((to_s - from_s) / step_s).round() as usize).max(1);
         let [mut rates, mut fields] = [const { Vec::new() }; 2].map(|v: Vec<Vector3<f64>>| v);
-        let (mut forces, mut temperatures, mut poses) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut forces, mut temperatures, mut poses, mut headings) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut heading = Heading::default();
         let (earth_n, gravity_n) = (environment.earth_rate_n(), environment.gravity_n());
         let mut sign = 1.0;
         let mut previous: Option<Quaternion<f64>> = None;
@@ -154,6 +164,7 @@ impl Scene {
             fields.push(to_b * environment.field_n_ut);
             temperatures.push(Vector1::new(pose.temperature_c.unwrap_or(environment.temperature_c)));
             let q = pose.attitude.q_nb.into_inner();
+            headings.push(Vector1::new(heading.follow(q)));
             // q and -q are one attitude, but not to a spline.
             if previous.is_some_and(|previous| previous.dot(&q) < 0.0) {
                 sign = -sign;
@@ -176,6 +187,7 @@ impl Scene {
             field: Grid::natural(from_s, step_s, fields),
             temperature: Grid::natural(from_s, step_s, temperatures),
             pose: Grid::natural(from_s, step_s, poses),
+            heading: Grid::natural(from_s, step_s, headings),
         }
     }
 
@@ -208,6 +220,11 @@ impl Scene {
             field: Grid::natural(from_s, step_s, rows.iter().map(|row| row.field_b_ut).collect()),
             temperature: Grid::natural(from_s, step_s, rows.iter().map(temperature).collect()),
             pose: Grid::natural(from_s, step_s, rows.iter().map(pose).collect()),
+            heading: Grid::natural(
+                from_s,
+                step_s,
+                rows.iter().map(|row| Vector1::new(row.heading)).collect(),
+            ),
         }
     }
 
@@ -225,6 +242,9 @@ impl Scene {
             temperature_rate: self.temperature.slope(t_s).x,
             q_nb: UnitQuaternion::from_quaternion(Quaternion::new(pose[0], pose[1], pose[2], pose[3])),
             position_n: pose.fixed_rows::<3>(4).into_owned(),
+            heading: self.heading.at(t_s).x,
+            heading_rate: self.heading.slope(t_s).x,
+            heading_acc: self.heading.bend(t_s).x,
         }
     }
 

@@ -227,6 +227,9 @@ fn steady(position: &Position, temperature_c: f64) -> Feel {
         temperature_rate: 0.0,
         q_nb: UnitQuaternion::identity(),
         position_n: Vector3::zeros(),
+        heading: 0.0,
+        heading_rate: 0.0,
+        heading_acc: 0.0,
     }
 }
 

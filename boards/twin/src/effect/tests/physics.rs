@@ -220,6 +220,29 @@ fn an_attitude_with_a_wrong_sign_is_another_motion() {
     }
 }
 
+/// The exercise on a table that turns 1 % more about the vertical than it says.
+struct Geared;
+
+impl Motion for Geared {
+    fn at(&self, t_s: f64) -> Pose {
+        let told = Exercise.at(t_s);
+        Pose {
+            attitude: exercised(1.01, t_s),
+            ..told
+        }
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        None
+    }
+}
+
+#[test]
+fn a_geared_table_turns_further_than_its_record_says() {
+    let geared = twin_of(emems(thesis_slot_s), Environment::laboratory(), &Geared);
+    same("reference-rate-scale", Locality::Unit, 1.0, &[0.01], &geared);
+}
+
 #[test]
 fn eddy_currents_delay_the_field_to_first_order() {
     let delayed = changed_unit(|_, channel| channel.slot_s -= if channel.name.starts_with('m') { 2e-3 } else { 0.0 });
