@@ -85,7 +85,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let search = |share| progress("search", share);
     let mut found = attribute(&problem, &mut library, &search);
     let quiet = Model::around(&problem, Vec::new());
-    let views = sight::views(&problem);
+    let views = sight::views(&problem, &quiet.predicted);
     let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
     let mut place = place::locate(&problem, &views, &quiet);
@@ -106,7 +106,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         let model = &explanation.model;
         let disturb = explanation.disturb(&problem);
         leftover::judge(
-            &sight::views(&problem),
+            &sight::views(&problem, &explanation.beneath),
             &model.joint,
             &model.fitted,
             &suspects(&problem, model),

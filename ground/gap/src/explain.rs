@@ -16,7 +16,7 @@ use crate::{
     contribution,
     library::Library,
     model::Model,
-    problem::Problem,
+    problem::{Frame, Problem},
     scatter::{Scatter, scatters},
     temper,
 };
@@ -52,6 +52,8 @@ pub struct Explanation {
     pub scatter: Option<Scatter>,
     /// The chosen effects on readings with everything else fitted.
     pub model: Model,
+    /// What it predicts without the effect on the scatter.
+    pub beneath: Vec<Vec<f64>>,
     /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
     pub louder: Vec<f64>,
     /// Different effects on readings that the search chose, refused ones included.
@@ -74,26 +76,35 @@ impl Explanation {
         let first = Model::around(problem, found.model(library));
         let mut scatter = best_scatter(problem, &first, withheld);
         let explained = gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
-        let wandering = wandering(problem, quiet, withheld)
-            .filter(|wandering| !found.chosen.is_empty() && wandering.gain > explained);
-        let wanders = wandering.is_some();
-        if wanders {
+        let alone = best_scatter(problem, quiet, withheld)
+            .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
+        let is_alone = alone.is_some();
+        let wanders = alone
+            .as_ref()
+            .is_some_and(|alone| alone.effect.page().name == WANDERING);
+        if is_alone {
             found.chosen.clear();
-            scatter = wandering;
+            scatter = alone;
         }
-        let first = if wanders { quiet } else { &first };
+        let first = if is_alone { quiet } else { &first };
         let louder = scatter.as_ref().map_or_else(
             || vec![1.0; problem.frames.len()],
             |scatter| louder(problem, first, scatter),
         );
-        let of_misfit: Vec<f64> = temper::factors(&first.fitted.rest)
-            .into_iter()
-            .zip(&louder)
-            .map(|(factor, louder)| if *louder == 1.0 { factor } else { 1.0 })
+        let described = problem.frames.clone();
+        // What the effect on the scatter says of samples takes the place of how much louder their channel is.
+        let tells = |channel: usize| scatter.as_ref().is_some_and(|scatter| scatter.tells_of(channel));
+        let both: Vec<f64> = (temper::factors(&first.fitted.rest).into_iter().zip(&louder).enumerate())
+            .map(|(channel, (misfit, louder))| match *louder == 1.0 {
+                true => misfit,
+                false if tells(channel) => 1.0,
+                false => *louder,
+            })
             .collect();
-        let both: Vec<f64> = louder.iter().zip(&of_misfit).map(|(one, other)| one * other).collect();
-        if both.iter().any(|factor| *factor != 1.0) {
-            reweigh(problem, library, &both);
+        let beneath = scatter.as_ref().map(|scatter| scatter.uncovered(problem));
+        if scatter.is_some() || both.iter().any(|factor| *factor != 1.0) {
+            let frames = beneath.unwrap_or_else(|| described.clone());
+            reframe(problem, library, weighed(frames, &both));
             if !wanders {
                 found = attribute(problem, library, progress);
             }
@@ -104,20 +115,33 @@ impl Explanation {
             .partition(|chosen| probability_of_any(library, chosen) >= SAID);
         let is_refused = gains(&refused) > gains(&kept);
         found.chosen = kept;
-        // What is left is judged with the noise as described, or a misfit would excuse itself.
-        let back: Vec<f64> = of_misfit.iter().map(|factor| 1.0 / factor).collect();
-        reweigh(problem, library, &back);
-        let model = Model::around(problem, found.model(library));
+        let loud = weighed(described.clone(), &louder);
+        reframe(problem, library, described);
+        let first = Model::around(problem, found.model(library));
         if scatter.is_some() && !wanders {
             // What a large effect's law leaves looks like scatter, and would be held to what that claims.
-            scatter = best_scatter(problem, &model, withheld)
+            scatter = best_scatter(problem, &first, withheld)
                 .filter(|scatter| scatter.gain > REMAINDER * gains(&found.chosen));
+        }
+        let own = scatter.as_ref().map(|scatter| scatter.recalibrated(problem, &first));
+        // What is left is judged with the noise as described, or a misfit would excuse itself.
+        reframe(problem, library, loud);
+        let mut model = Model::around(problem, found.model(library));
+        let mut beneath = model.predicted.clone();
+        for (channel, predicted) in own.into_iter().flatten() {
+            beneath[channel] = predicted;
+        }
+        if let Some(scatter) = &scatter {
+            for channel in &scatter.channels {
+                model.predicted[*channel] = scatter.expected(problem, *channel, &beneath[*channel]);
+            }
         }
         Self {
             found,
             refused,
             scatter,
             model,
+            beneath,
             louder,
             sought,
             is_refused,
@@ -140,7 +164,7 @@ impl Explanation {
         let scatter = self.scatter.as_ref()?;
         (scatter.effect.page().name != LOUDER).then_some(move |residuals: &mut [DVector<f64>], seed: u64| {
             (residuals.iter_mut().zip(&self.louder)).for_each(|(residual, louder)| *residual /= *louder);
-            scatter.disturb(problem, &self.model.predicted, residuals, Noise::new(seed));
+            scatter.disturb(problem, &self.beneath, residuals, Noise::new(seed));
         })
     }
 
@@ -152,8 +176,8 @@ impl Explanation {
                 .max(2.0 * gains(&self.found.chosen))
         };
         match &self.scatter {
-            // Louder noise takes in whatever is there: that it does is no sign of its law.
-            Some(scatter) if scatter.effect.page().name == LOUDER => by_readings(scatter),
+            // Louder noise takes in whatever is there, and a walk whatever is slow: that it does is no sign of its law.
+            Some(scatter) if [LOUDER, WANDERING].contains(&scatter.effect.page().name) => by_readings(scatter),
             Some(scatter) => by_readings(scatter) + 2.0 * scatter.gain,
             None => self.energy_without(quiet, &[]),
         }
@@ -205,27 +229,33 @@ fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
     names.len()
 }
 
-/// Takes the noise of each channel for so many times what it was.
-fn reweigh(problem: &mut Problem, library: &mut Library, factors: &[f64]) {
-    if factors.iter().all(|factor| *factor == 1.0) {
-        return;
+/// Frames whose noise is so many times what it was, one factor a channel.
+fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
+    for (frame, factor) in frames.iter_mut().zip(factors).filter(|(_, factor)| **factor != 1.0) {
+        frame.reweigh(&frame.weights.map(|_| *factor));
     }
-    problem.reweigh(factors);
-    let inverse: Vec<f64> = factors.iter().map(|factor| 1.0 / factor).collect();
-    library.products.reweigh(problem, &inverse);
+    frames
+}
+
+/// Takes other frames for the problem's.
+fn reframe(problem: &mut Problem, library: &mut Library, frames: Vec<Frame>) {
+    let before: Vec<DVector<f64>> = problem.frames.iter().map(|frame| frame.weights.clone()).collect();
+    problem.reframe(frames);
+    library.products.reweigh(problem, &before);
 }
 
 fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
-    let all = scatters(problem, &model.predicted, withheld);
+    let all = scatters(problem, model, withheld);
     all.into_iter().next().filter(|scatter| scatter.gain > SCATTER_MARGIN)
 }
 
-/// A walk that alone explains the log best: what wanders at random looks like a little of everything.
-fn wandering(problem: &Problem, quiet: &Model, withheld: &[String]) -> Option<Scatter> {
+/// Whether an effect on the scatter, if it alone explains a log best, takes the place of what was found on readings: one that
+/// says what is beneath it does, for that is searched; and a walk, for what wanders at random looks like a little of
+/// everything.
+fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-    best_scatter(problem, quiet, withheld).filter(|scatter| {
-        scatter.effect.page().name == WANDERING && scatter.channels.iter().map(steps).all(|steps| steps >= STEPS)
-    })
+    let is_walk = scatter.effect.page().name == WANDERING;
+    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= STEPS)
 }
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.

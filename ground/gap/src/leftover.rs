@@ -13,6 +13,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use crate::joint::{Fitted, Joint};
 
 mod aspects;
+mod codes;
 mod common;
 mod instrument;
 mod shapes;
@@ -20,7 +21,9 @@ mod simulated;
 mod spectrum;
 mod strength;
 mod together;
-use aspects::{Label, Sights};
+use aspects::{Label, Sights, coded};
+pub use codes::Codes;
+use codes::{Counts, rarities};
 pub use instrument::Instrument;
 pub(crate) use simulated::simulate;
 pub use simulated::{Clock, Disturb};
@@ -62,6 +65,8 @@ pub struct View {
     pub felt: DVector<f64>,
     /// What it is predicted to read at each sample, in units of noise.
     pub predicted: DVector<f64>,
+    /// Its codes, where it sends such.
+    pub codes: Option<Codes>,
     /// The clock of its part, where that is its own.
     pub clock: Option<Clock>,
     /// What its reference errs by, where that is not exact.
@@ -212,9 +217,25 @@ impl Sizes {
         let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
         let parameters = unshrunk(joint, &fitted.parameters);
-        let simulated: Vec<Vec<f64>> = (0..count)
-            .map(|_| sights.sums(&joint.fit(&simulate(views, joint, &parameters, disturb, &mut random))))
+        let mut counts: Vec<Vec<Counts>> = Vec::new();
+        let mut simulated: Vec<Vec<f64>> = (0..count)
+            .map(|_| {
+                let log = simulate(views, joint, &parameters, disturb, &mut random);
+                counts.push(log.counts);
+                sights.sums(&joint.fit(&log.residuals))
+            })
             .collect();
+        let mut observed = observed;
+        for (coded, view) in coded(views).enumerate() {
+            let logged = view.codes.as_ref().map_or_else(Counts::default, Codes::counts);
+            let of_channel: Vec<Counts> = counts.iter().map(|counts| counts[coded]).collect();
+            let (rarities, rarity) = rarities(&of_channel, logged, view.phase.len());
+            simulated
+                .iter_mut()
+                .zip(rarities)
+                .for_each(|(sums, own)| sums.push(own));
+            observed.push(rarity);
+        }
         let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
         let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
         let observed = roots(&observed);

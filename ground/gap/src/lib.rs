@@ -51,6 +51,7 @@ pub mod sight;
 pub mod temper;
 pub mod terminal;
 pub mod trace;
+pub mod uncovered;
 pub mod verdict;
 pub mod windows;
 

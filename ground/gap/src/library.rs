@@ -167,7 +167,8 @@ impl Library {
         for (place, column) in problem.reference_columns().into_iter().enumerate() {
             self.products.renew(problem, place, column);
         }
-        self.products.reweigh(problem, &vec![1.0; problem.frames.len()]);
+        let weights: Vec<DVector<f64>> = problem.frames.iter().map(|frame| frame.weights.clone()).collect();
+        self.products.reweigh(problem, &weights);
     }
 
     /// Normal equations of some columns, given the scores of all.

@@ -89,13 +89,11 @@ pub fn locate(problem: &Problem, views: &[View], quiet: &Model) -> Place {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let simulated: Vec<Sums> = (0..count)
         .map(|_| {
-            sums(&quiet.joint.fit(&simulate(
-                views,
-                &quiet.joint,
-                &quiet.fitted.parameters,
-                None,
-                &mut random,
-            )))
+            sums(
+                &quiet
+                    .joint
+                    .fit(&simulate(views, &quiet.joint, &quiet.fitted.parameters, None, &mut random).residuals),
+            )
         })
         .collect();
     let mean = |of: &dyn Fn(&Sums) -> f64| simulated.iter().map(of).sum::<f64>() / count as f64;

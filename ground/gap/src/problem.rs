@@ -71,10 +71,12 @@ impl Frame {
         }
     }
 
-    /// Weighs its samples anew: the noise is `factor` times what it was taken for.
-    pub fn reweigh(&mut self, factor: f64) {
-        self.weights *= factor;
-        self.nuisance /= factor;
+    /// Weighs its samples anew: the noise of each is so many times what it was taken for.
+    pub fn reweigh(&mut self, factors: &DVector<f64>) {
+        self.weights.component_mul_assign(factors);
+        for mut column in self.nuisance.column_iter_mut() {
+            column.component_div_assign(factors);
+        }
         self.factorise();
     }
 
@@ -219,13 +221,9 @@ impl<'a> Problem<'a> {
         DVector::from_iterator(residuals.len(), standard)
     }
 
-    /// Weighs channels anew by these factors of their noise.
-    pub fn reweigh(&mut self, factors: &[f64]) {
-        for (frame, factor) in self.frames.iter_mut().zip(factors) {
-            if *factor != 1.0 {
-                frame.reweigh(*factor);
-            }
-        }
+    /// Takes other frames for these: other weights, and other values.
+    pub fn reframe(&mut self, frames: Vec<Frame>) {
+        self.frames = frames;
         self.settle();
     }
 

@@ -7,7 +7,11 @@ use std::{cell::RefCell, collections::HashMap};
 
 use nalgebra::DVector;
 
-use crate::{evidence::Screen, library::Entries, problem::Problem};
+use crate::{
+    evidence::Screen,
+    library::Entries,
+    problem::{Frame, Problem},
+};
 
 /// Columns and the products known so far.
 #[derive(Clone, Debug, Default)]
@@ -35,12 +39,14 @@ impl Products {
             .retain(|(one, other), _| *one != place && *other != place);
     }
 
-    /// After the weights of the problem's channels changed by these factors.
-    pub fn reweigh(&mut self, problem: &Problem, factors: &[f64]) {
+    /// After the weights of the problem's samples, channel by channel, were these.
+    pub fn reweigh(&mut self, problem: &Problem, before: &[DVector<f64>]) {
+        let ratio = |(before, frame): (&DVector<f64>, &Frame)| before.component_div(&frame.weights);
+        let factors: Vec<DVector<f64>> = before.iter().zip(&problem.frames).map(ratio).collect();
         for (place, column) in self.columns.iter_mut().enumerate() {
             column
                 .iter_mut()
-                .for_each(|(channel, values)| *values *= factors[*channel]);
+                .for_each(|(channel, values)| values.component_mul_assign(&factors[*channel]));
             self.open[place] = open_part(problem, column);
         }
         self.known.borrow_mut().clear();

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Feel, Kind};
 
 use crate::{
-    leftover::{Clock, Instrument, LEVELS, View},
+    leftover::{Clock, Codes, Instrument, LEVELS, View},
     open::conversion_period_s,
     problem::{Frame, Problem},
 };
@@ -18,8 +18,8 @@ const QUANTITIES: usize = 10;
 /// rest a reference sees nothing but its errors, and these are minus the residual: a factor of -1 in every sensor.
 const PLAIN: f64 = 10.0;
 
-/// The views of every channel.
-pub fn views(problem: &Problem) -> Vec<View> {
+/// The views of every channel; `read` is what each sensor reads by itself at every row, by the model whose leftover is looked at.
+pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
     let twin = problem.twin;
     let kinds = [Kind::Gyro, Kind::Accelerometer, Kind::Magnetometer, Kind::Thermometer];
     let steps = kinds.map(|kind| PLAIN * reference_sigma(problem, kind));
@@ -90,6 +90,7 @@ pub fn views(problem: &Problem) -> Vec<View> {
             predicted: DVector::from_fn(frame.series.rows.len(), |row, _| {
                 own[frame.series.rows[row] as usize] / frame.weights[row]
             }),
+            codes: codes(problem, index, &read[index]),
             clock: clock(problem, index),
             instrument: instrument(problem, index),
             is_limited: problem.is_limited(index),
@@ -119,6 +120,19 @@ fn reference_sigma(problem: &Problem, kind: Kind) -> f64 {
     };
     let sum: f64 = (0..rows).map(square).sum();
     (sum / (rows * of_kind.len()).max(1) as f64).sqrt()
+}
+
+/// The codes of a channel at the fitted samples, if it sends such.
+fn codes(problem: &Problem, index: usize, read: &[f64]) -> Option<Codes> {
+    let (channel, frame) = (&problem.twin.unit().channels[index], &problem.frames[index]);
+    channel.bits?;
+    let values = frame.series.values.iter();
+    Some(Codes {
+        lsb: channel.lsb,
+        logged: values.map(|value| (value / channel.lsb).round() as i64).collect(),
+        read: frame.series.rows.iter().map(|row| read[*row as usize]).collect(),
+        noise: frame.weights.component_mul(&frame.own).as_slice().to_vec(),
+    })
 }
 
 /// What the reference errs by in a channel at the fitted samples.

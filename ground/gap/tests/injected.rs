@@ -1,110 +1,23 @@
 //! A small case made here, with and without an effect in it: the way from files to a verdict.
 
-use std::{fmt::Write, fs};
+mod gyros;
 
-use gap::{
-    case::Subject,
-    command::taught,
-    diagnose::{Diagnosis, diagnose},
-    terminal,
-    verdict::Verdict,
-};
+use std::fs;
+
+use gap::{case::Subject, command::taught, diagnose::Diagnosis, terminal, verdict::Verdict};
+use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;
 use tempfile::TempDir;
-
-/// [s] of the log, at [`RATE_HZ`].
-const SECONDS: usize = 240;
-
-const RATE_HZ: usize = 5;
-
-/// [rad/s] white noise of a gyro.
-const NOISE: f64 = 0.003;
-
-/// [rad/s] pace of the motion.
-const W: f64 = 0.9;
-
-const CASE: &str = r#"format = "gap-case/1"
-name = "injected"
-kind = "csv"
-unit = "unit.toml"
-measured = "measured.csv"
-motion = "motion.csv"
-[environment]
-latitude_deg = 0.0
-[windows]
-fit = [[0.0, 120.0]]
-hold = [[120.0, 240.0]]
-"#;
-
-/// [rad/s] about z alone: phi(t) = (1 - cos(w t))/2.
-fn rate(t_s: f64) -> f64 {
-    W / 2.0 * (W * t_s).sin()
-}
 
 /// Three gyros along the axes of b, turning about z; gz reads `scale` of the time [s] too much.
 fn case(scale: impl Fn(f64) -> f64) -> TempDir {
     erring(|t_s| scale(t_s) * rate(t_s), "")
 }
 
-/// The same; gz reads `error` [rad/s] of the time [s] too much, and its description has these keys too.
-fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut unit = "name = \"three gyros\"\n".to_owned();
-    for (name, axis) in [
-        ("gx", "1.0, 0.0, 0.0"),
-        ("gy", "0.0, 1.0, 0.0"),
-        ("gz", "0.0, 0.0, 1.0"),
-    ] {
-        let _ = write!(
-            unit,
-            "[[channel]]\nname = \"{name}\"\nsensor = \"gyro\"\ngroup = \"unit\"\naxis_b = [{axis}]\nlsb = 1.0\n\
-             noise_sigma = {NOISE}\nbias_sigma = 0.001\nscale_sigma = 0.001\naxis_sigma_rad = 0.001\nrange = [-6.0, 6.0]\n"
-        );
-    }
-    unit += keys_of_gz;
-    let mut motion = "t_s,qw,qx,qy,qz\n".to_owned();
-    let mut measured = "t_s,gx,gy,gz\n".to_owned();
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
-    for k in 0..=50 * SECONDS {
-        let t = k as f64 / 50.0;
-        let half = (1.0 - (W * t).cos()) / 4.0;
-        let _ = writeln!(motion, "{t:.2},{:.9},0,0,{:.9}", half.cos(), half.sin());
-    }
-    // Earth's rate at the equator points north, which is x of n; the attitude turns it in the plane x, y of b.
-    let earth = 7.292e-5;
-    for k in 0..SECONDS * RATE_HZ {
-        let t = k as f64 / RATE_HZ as f64;
-        let angle = (1.0 - (W * t).cos()) / 2.0;
-        let mut noise = || -> f64 { NOISE * Distribution::<f64>::sample(&StandardNormal, &mut random) };
-        let _ = writeln!(
-            measured,
-            "{t:.1},{:.7},{:.7},{:.7}",
-            earth * angle.cos() + noise(),
-            -earth * angle.sin() + noise(),
-            rate(t) + error(t) + noise()
-        );
-    }
-    for (name, text) in [
-        ("case.toml", CASE),
-        ("unit.toml", &unit),
-        ("motion.csv", &motion),
-        ("measured.csv", &measured),
-    ] {
-        fs::write(folder.path().join(name), text).expect("a file");
-    }
-    folder
-}
-
-fn diagnosed_in(folder: &TempDir) -> (Subject, Diagnosis) {
-    let subject = Subject::open(folder.path()).expect("opens");
-    let diagnosis = diagnose(&subject, &[], &|_, _| {});
-    (subject, diagnosis)
-}
-
 fn diagnosed(scale: f64) -> (Subject, Diagnosis) {
-    diagnosed_in(&case(|_| scale))
+    diagnosed_in(&case(|_| scale), &[])
 }
 
 #[test]
@@ -146,7 +59,7 @@ fn a_healthy_unit_needs_nothing() {
 
 #[test]
 fn a_scale_that_is_gone_in_the_hold_windows_is_withdrawn() {
-    let (subject, diagnosis) = diagnosed_in(&case(|t_s| if t_s < 120.0 { 0.02 } else { 0.0 }));
+    let (subject, diagnosis) = diagnosed_in(&case(|t_s| if t_s < 120.0 { 0.02 } else { 0.0 }), &[]);
     assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
     assert!(!diagnosis.withdrawn.is_empty());
     let screen = terminal::screen(&subject, &diagnosis, "");
@@ -159,11 +72,11 @@ fn a_scale_that_is_gone_in_the_hold_windows_is_withdrawn() {
 #[test]
 fn a_twin_taught_the_effect_needs_nothing_more() {
     let folder = case(|_| 0.02);
-    let (subject, diagnosis) = diagnosed_in(&folder);
+    let (subject, diagnosis) = diagnosed_in(&folder, &[]);
     let unit = taught(&subject, &diagnosis);
     assert_eq!(unit.effects.len(), 1);
     fs::write(folder.path().join("unit.toml"), unit.text()).expect("a file");
-    let (_, again) = diagnosed_in(&folder);
+    let (_, again) = diagnosed_in(&folder, &[]);
     assert!(again.causes.is_empty(), "{:?}", again.causes);
     // The gap of the fit is that of its noise: 1800 samples, three standard deviations.
     assert!(
@@ -267,7 +180,7 @@ fn a_reading_that_is_late_by_less_than_its_instant_is_known_is_no_effect() {
     ];
     for error in errors {
         let said = |keys: &str| {
-            let diagnosis = diagnosed_in(&erring(error, keys)).1;
+            let diagnosis = diagnosed_in(&erring(error, keys), &[]).1;
             let causes = diagnosis.causes.iter().map(|cause| cause.probability);
             let others = diagnosis.alternatives.iter().map(|(_, probability)| *probability);
             causes.chain(others).sum::<f64>() + diagnosis.none_of_these
@@ -277,25 +190,10 @@ fn a_reading_that_is_late_by_less_than_its_instant_is_known_is_no_effect() {
     }
 }
 
-/// Rewrites the cells of measured.csv below its header, given where their row begins.
-fn rewritten(folder: TempDir, change: impl Fn(&mut [String])) -> TempDir {
-    let path = folder.path().join("measured.csv");
-    let text = fs::read_to_string(&path).expect("a file");
-    let (header, rows) = text.split_once('\n').expect("a header");
-    let mut changed = header.to_owned();
-    for row in rows.lines() {
-        let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
-        change(&mut cells);
-        changed += &format!("\n{}", cells.join(","));
-    }
-    fs::write(&path, changed + "\n").expect("a file");
-    folder
-}
-
 #[test]
 fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     let folder = rewritten(case(|_| 0.02), |cells| cells[2].clear());
-    let (subject, diagnosis) = diagnosed_in(&folder);
+    let (subject, diagnosis) = diagnosed_in(&folder, &[]);
     let cause = diagnosis.causes.first().expect("a cause");
     assert_eq!(subject.names(cause.channels.iter().copied()), ["gz"]);
     let screen = terminal::screen(&subject, &diagnosis, "");
@@ -313,11 +211,11 @@ fn a_tone_is_not_called_a_walk_of_the_zero() {
             zero
         })
         .collect();
-    let walked = diagnosed_in(&erring(|t_s| walk[(t_s * RATE_HZ as f64).round() as usize], "")).1;
+    let walked = diagnosed_in(&erring(|t_s| walk[(t_s * RATE_HZ as f64).round() as usize], ""), &[]).1;
     assert_eq!(walked.causes.first().expect("a cause").effect, "gyro-bias-walk");
     assert!(walked.none_of_these < 0.1, "{}", walked.none_of_these);
     let tone = |t_s: f64| 2.0 * NOISE * (std::f64::consts::TAU * t_s / 17.0).sin();
-    let hummed = diagnosed_in(&erring(tone, "")).1;
+    let hummed = diagnosed_in(&erring(tone, ""), &[]).1;
     assert!(hummed.causes.is_empty(), "{:?}", hummed.causes);
     assert!(hummed.none_of_these > 0.9, "{}", hummed.none_of_these);
 }

@@ -6,6 +6,7 @@ use std::{fmt::Write, fs};
 use gap::{
     case::Subject,
     diagnose::{Diagnosis, diagnose},
+    model::Model,
     problem::Problem,
     scatter::scatters,
 };
@@ -152,8 +153,7 @@ fn what_the_reference_leaves_open_slowly_hides_no_noise() {
         ..Seen::default()
     });
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
-    let predicted: Vec<Vec<f64>> = (0..6).map(|channel| problem.predict(channel, &[])).collect();
-    let found = scatters(&problem, &predicted, &[]);
+    let found = scatters(&problem, &Model::around(&problem, Vec::new()), &[]);
     let loud = found.first().expect("an effect on the scatter");
     assert_eq!(
         (loud.effect.page().name, loud.channels.as_slice()),

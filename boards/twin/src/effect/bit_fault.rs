@@ -1,6 +1,6 @@
 //! Bit faults: one bit of the code is stuck, or the two bytes come in the wrong order.
 
-use super::spread::{IMPOSSIBLE, View, mixed};
+use super::spread::{Beneath, IMPOSSIBLE, View, mixed, unusual_part};
 use super::{Effect, Nature, Page};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -24,6 +24,13 @@ fn origins(code: i16, variant: i16) -> [Option<i16>; 2] {
     }
     let possible = forced(code, variant) == code;
     [code, code ^ 1 << (variant / 2)].map(|origin| possible.then_some(origin))
+}
+
+/// ln probability that the sensor gave `origin` where `code` was logged with this residual.
+fn of_origin(view: &View, code: i16, origin: i16, residual: f64) -> f64 {
+    let lsb = view.channel.lsb;
+    let from = residual + f64::from(i32::from(origin) - i32::from(code)) * lsb;
+    view.within(from - 0.5 * lsb, from + 0.5 * lsb)
 }
 
 /// `bit-fault`.
@@ -58,12 +65,8 @@ impl Effect for BitFault {
             let sample = |(k, residual): (usize, f64)| {
                 let code = (view.measured[k] / lsb).round() as i16;
                 // What it must have been: one code, or, where the stuck bit hides it, two.
-                let could = origins(code, variant as i16);
-                let mass = |origin: i16| {
-                    let from = residual + f64::from(i32::from(origin) - i32::from(code)) * lsb;
-                    view.within(from - 0.5 * lsb, from + 0.5 * lsb)
-                };
-                let fault = match could {
+                let mass = |origin: i16| of_origin(view, code, origin, residual);
+                let fault = match origins(code, variant as i16) {
                     [None, None] => IMPOSSIBLE,
                     [Some(one), None] | [None, Some(one)] => mass(one),
                     [Some(one), Some(other)] => mixed(0.5, mass(one), mass(other)) + 2.0_f64.ln(),
@@ -86,6 +89,36 @@ impl Effect for BitFault {
                 .collect()
         };
         views.iter().map(faulty).collect()
+    }
+
+    fn beneath(&self, _theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let of = |view: &View| -> Vec<Beneath> {
+            let lsb = view.channel.lsb;
+            let sample = |logged: Beneath, predicted: f64| {
+                let (code, residual) = ((logged.value / lsb).round() as i16, logged.value - predicted);
+                let away = |origin: i16| f64::from(i32::from(origin) - i32::from(code)) * lsb;
+                let added = match origins(code, variant as i16) {
+                    [None, None] => return Beneath { worth: 0.0, ..logged },
+                    [Some(one), None] | [None, Some(one)] => away(one),
+                    [Some(one), Some(other)] => {
+                        let mass = |origin: i16| of_origin(view, code, origin, residual);
+                        let part = unusual_part(0.5, mass(one), mass(other));
+                        away(one) * (1.0 - part) + away(other) * part
+                    }
+                };
+                Beneath {
+                    value: logged.value + added,
+                    ..logged
+                }
+            };
+            let pairs = view.as_logged().into_iter().zip(view.predicted);
+            pairs.map(|(logged, predicted)| sample(logged, *predicted)).collect()
+        };
+        views.iter().map(of).collect()
+    }
+
+    fn expected(&self, variant: f64, view: &View) -> Vec<f64> {
+        view.mean_of_codes(|code| f64::from(forced(code as i16, variant as i16)))
     }
 
     /// `2 bit` for stuck at 0, `2 bit + 1` for stuck at 1, then exchanged bytes.

@@ -1,6 +1,6 @@
 //! Coarse quantisation: low bits are missing, rounded or cut off, because a mode has fewer of them or a shift went wrong.
 
-use super::spread::{IMPOSSIBLE, View};
+use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -22,6 +22,48 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
+/// [physical unit] of one step.
+fn step(view: &View, variant: f64) -> f64 {
+    view.channel.lsb * variant.abs().exp2()
+}
+
+/// Steps that are whole, rounded or cut off.
+fn whole(steps: f64, variant: f64) -> f64 {
+    if variant > 0.0 { steps.round() } else { steps.floor() }
+}
+
+/// [physical unit] least that a value may have been above its prediction, of a sample with this residual: rounded, it was
+/// within half a step; cut off, within the step above.
+fn lowest(view: &View, variant: f64, residual: f64) -> f64 {
+    let half = if variant > 0.0 { 0.5 } else { 0.0 };
+    residual - half * step(view, variant)
+}
+
+/// Least worth of a sample that is somewhere in a wide step.
+const LEAST: f64 = 1e-3;
+
+/// Where a normal variable with mean zero, known to lie within `low` to `high`, pins its mean, and by how many samples' worth:
+/// a Newton step of its likelihood. With `m`, `v` the mean and variance of what lies there, `m / I` and `I = 1 - v / sigma^2`
+/// (Johnson and Kotz, truncated normal law).
+fn pinned(low: f64, high: f64, sigma: f64) -> [f64; 2] {
+    let [a, b] = [low, high].map(|end| end / sigma);
+    let density = |z: f64| (-0.5 * z * z).exp() / core::f64::consts::TAU.sqrt();
+    // Both tails from the side where they are small.
+    let tail = |z: f64| 0.5 * libm::erfc(z * core::f64::consts::FRAC_1_SQRT_2);
+    let mass = if a > 0.0 {
+        tail(a) - tail(b)
+    } else {
+        tail(-b) - tail(-a)
+    };
+    if mass < 1e-12 {
+        // So far out it is at the nearer end.
+        return [if low > 0.0 { low } else { high }, 1.0];
+    }
+    let mean = (density(a) - density(b)) / mass;
+    let worth = (mean * mean - (a * density(a) - b * density(b)) / mass).clamp(LEAST, 1.0);
+    [sigma * mean / worth, worth]
+}
+
 impl Effect for CoarseQuantisation {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -30,14 +72,13 @@ impl Effect for CoarseQuantisation {
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let _ = theta;
         let of = |view: &View| -> f64 {
-            let q = view.channel.lsb * variant.abs().exp2();
+            let q = step(view, variant);
             let sample = |(k, residual): (usize, f64)| {
                 let code = view.measured[k] / q;
                 if view.channel.bits.is_none() || (code - code.round()).abs() > 0.25 * view.channel.lsb / q {
                     return view.explained(IMPOSSIBLE, residual);
                 }
-                // Rounded, the value was within half a step; cut off, within the step above.
-                let low = if variant > 0.0 { residual - 0.5 * q } else { residual };
+                let low = lowest(view, variant, residual);
                 view.explained(view.within(low, low + q), residual)
             };
             view.residuals().map(sample).sum()
@@ -48,11 +89,36 @@ impl Effect for CoarseQuantisation {
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
         let _ = (theta, noise);
         let coarse = |view: &View| {
-            let q = view.channel.lsb * variant.abs().exp2();
-            let code = |value: f64| if variant > 0.0 { value.round() } else { value.floor() };
-            view.measured.iter().map(|measured| code(measured / q) * q).collect()
+            let (q, measured) = (step(view, variant), view.measured.iter());
+            measured.map(|measured| whole(measured / q, variant) * q).collect()
         };
         views.iter().map(coarse).collect()
+    }
+
+    fn beneath(&self, _theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let of = |view: &View| {
+            let pairs = view.as_logged().into_iter().zip(view.predicted);
+            let steps = pairs.map(|(logged, predicted)| {
+                let low = lowest(view, variant, logged.value - predicted);
+                let [away, worth] = pinned(low, low + step(view, variant), view.channel.noise_sigma);
+                Beneath {
+                    value: predicted + away,
+                    worth,
+                }
+            });
+            steps.collect()
+        };
+        views.iter().map(of).collect()
+    }
+
+    fn expected(&self, variant: f64, view: &View) -> Vec<f64> {
+        let steps = variant.abs().exp2();
+        view.mean_of_codes(|code| whole(code / steps, variant) * steps)
+    }
+
+    /// Cut off, a value is rounded that is half a step lower.
+    fn shifted(&self, variant: f64) -> Option<f64> {
+        Some(-variant)
     }
 
     /// Bits that are missing; negative where they are cut off instead of rounded.

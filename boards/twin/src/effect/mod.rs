@@ -82,7 +82,7 @@ mod warm_up;
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{Nature, Page, Scope, Symbol};
 pub use site::Site;
-pub use spread::{View, logged_step, most_likely};
+pub use spread::{Beneath, View, logged_step, most_likely};
 
 use crate::environment::Environment;
 use crate::part::signal::Noise;
@@ -209,6 +209,13 @@ pub trait Effect: Sync {
         views.iter().map(|view| view.measured.to_vec()).collect()
     }
 
+    /// What the samples of the channels of one block were before this effect, as far as what was logged tells, for one that
+    /// changes their scatter; nothing for one that does not say. A calibration is fitted to these: an effect that makes
+    /// readings larger on the whole, or a few of them anything, would be taken for one.
+    fn beneath(&self, _theta: &[f64], _variant: f64, _views: &[View]) -> Vec<Vec<Beneath>> {
+        Vec::new()
+    }
+
     /// The values to try of a parameter in which the effect is not smooth (an onset, a time constant, a choice), for a log
     /// whose cycles begin at these instants [s].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
@@ -218,6 +225,17 @@ pub trait Effect: Sync {
     /// The variant that these channels, in which it was found, speak for together; `None` where the likelihood does not
     /// average over variants.
     fn settled(&self, _views: &[View]) -> Option<f64> {
+        None
+    }
+
+    /// What a channel would log with this effect on the whole, at every row, where its sensor reads what is predicted. An effect
+    /// that pushes readings no way leaves that as it is.
+    fn expected(&self, _variant: f64, view: &View) -> Vec<f64> {
+        view.predicted.to_vec()
+    }
+
+    /// The variant that does the same to readings with another zero: a calibration may take one for the other.
+    fn shifted(&self, _variant: f64) -> Option<f64> {
         None
     }
 

@@ -1,6 +1,6 @@
 //! Noise level: the white noise is stronger or weaker than described.
 
-use super::spread::View;
+use super::spread::{Beneath, View};
 use super::{Effect, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -35,6 +35,11 @@ impl Effect for NoiseLevel {
             view.residuals().map(|(_, residual)| view.normal(residual, sigma)).sum()
         };
         views.iter().map(of).sum()
+    }
+
+    fn beneath(&self, theta: &[f64], _variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let worth = (-2.0 * theta[0]).exp();
+        views.iter().map(|view| view.each_worth(|_, _| worth)).collect()
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

@@ -1,6 +1,6 @@
 //! Corruption: a damaged packet passes for a whole one, and a value is anything.
 
-use super::spread::{View, mixed};
+use super::spread::{Beneath, View, mixed, unusual_part};
 use super::{Effect, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -38,6 +38,15 @@ impl Effect for PacketCorruption {
                 .sum()
         };
         views.iter().map(of).sum()
+    }
+
+    fn beneath(&self, theta: &[f64], _variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let p = theta[0].clamp(0.0, 0.999);
+        let of = |view: &View| {
+            let (sigma, anything) = (view.channel.sigma(), (view.resolution() / view.span()).ln());
+            view.each_worth(|_, residual| 1.0 - unusual_part(p, view.normal(residual, sigma), anything))
+        };
+        views.iter().map(of).collect()
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

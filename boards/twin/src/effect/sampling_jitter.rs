@@ -1,6 +1,8 @@
 //! Sampling jitter: the instants of sampling scatter, so the faster a reading changes the more it scatters.
+//!
+//! Each reading may be late by itself, or a cycle as a whole: then one number explains what 28 channels read.
 
-use super::spread::View;
+use super::spread::{Beneath, View};
 use super::{Effect, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -21,13 +23,31 @@ fn slopes(view: &View) -> Vec<f64> {
     (0..view.t_s.len()).map(slope).collect()
 }
 
+/// The variants: what is late by itself.
+const OF_READINGS: f64 = 0.0;
+const OF_CYCLE: f64 = 1.0;
+
+/// Of each cycle what pulls its instant [sigma2/s] and how stiffly its readings hold it [1/s2].
+fn cycles(views: &[View]) -> Vec<[f64; 2]> {
+    let count = views.iter().map(|view| view.measured.len()).max().unwrap_or(0);
+    let mut cycles = vec![[0.0; 2]; count];
+    for view in views {
+        let (slopes, weight) = (slopes(view), view.channel.sigma().powi(-2));
+        for (k, residual) in view.residuals() {
+            cycles[k][0] += weight * slopes[k] * residual;
+            cycles[k][1] += weight * slopes[k] * slopes[k];
+        }
+    }
+    cycles
+}
+
 /// `sampling-jitter`.
 pub struct SamplingJitter;
 
 const PAGE: Page = Page {
     name: "sampling-jitter",
     physics: "The sampling instants scatter about the stamped ones.",
-    equation: "sigma^2 + (sigma_t dy/dt)^2",
+    equation: "y + dy/dt e, e normal with sigma_t, each reading's own or the cycle's",
     source: "Software timing: 0.1 to 5 ms",
     excited_by: "dynamics",
     siblings: &["noise-level", "stale-sample"],
@@ -45,7 +65,16 @@ impl Effect for SamplingJitter {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
-        let _ = variant;
+        if variant == OF_CYCLE {
+            let nominal: f64 = views.iter().map(View::nominal).sum();
+            let variance = theta[0] * theta[0];
+            // The ratio of a normal law whose covariance has one direction more to one without.
+            let change = |[pull, stiffness]: &[f64; 2]| {
+                let grown = 1.0 + variance * stiffness;
+                0.5 * (variance * pull * pull / grown - grown.ln())
+            };
+            return nominal + cycles(views).iter().map(change).sum::<f64>();
+        }
         let of = |view: &View| -> f64 {
             let slopes = slopes(view);
             let sigma = |k: usize| view.channel.sigma().hypot(theta[0] * slopes[k]);
@@ -56,17 +85,42 @@ impl Effect for SamplingJitter {
         views.iter().map(of).sum()
     }
 
+    fn beneath(&self, theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let variance = theta[0] * theta[0];
+        let cycles = if variant == OF_CYCLE { cycles(views) } else { Vec::new() };
+        let of = |view: &View| -> Vec<Beneath> {
+            let slopes = slopes(view);
+            if variant != OF_CYCLE {
+                return view.each_worth(|k, _| 1.0 / (1.0 + variance * (slopes[k] / view.channel.sigma()).powi(2)));
+            }
+            let late_s = |k: usize| variance * cycles[k][0] / (1.0 + variance * cycles[k][1]);
+            let all = view.as_logged().into_iter().enumerate();
+            all.map(|(k, logged)| Beneath {
+                value: logged.value - slopes[k] * late_s(k),
+                ..logged
+            })
+            .collect()
+        };
+        views.iter().map(of).collect()
+    }
+
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
-        let _ = variant;
         // One error of time an instant: what is read together is late together.
-        let late_s = |t_s: f64| theta[0] * noise.normal(t_s.to_bits());
+        let late_s = |k: usize, t_s: f64| {
+            let number = if variant == OF_CYCLE { k as u64 } else { t_s.to_bits() };
+            theta[0] * noise.normal(number)
+        };
         let disturbed = |view: &View| {
             let slopes = slopes(view);
-            let samples = view.measured.iter().zip(&slopes).zip(view.t_s);
+            let samples = view.measured.iter().zip(&slopes).zip(view.t_s).enumerate();
             samples
-                .map(|((measured, slope), t_s)| measured + slope * late_s(*t_s))
+                .map(|(k, ((measured, slope), t_s))| measured + slope * late_s(k, *t_s))
                 .collect()
         };
         views.iter().map(disturbed).collect()
+    }
+
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        vec![OF_READINGS, OF_CYCLE]
     }
 }

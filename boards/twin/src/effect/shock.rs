@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::spread::{View, mixed};
+use super::spread::{Beneath, View, mixed, unusual_part};
 use super::{Effect, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -25,6 +25,20 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
+/// ln probability of all that was read in each cycle, without a blow and in one.
+fn of_rows(views: &[View], variant: f64) -> Vec<[f64; 2]> {
+    let count = views.iter().map(|view| view.measured.len()).max().unwrap_or(0);
+    let mut rows = vec![[0.0; 2]; count];
+    for view in views {
+        let sigma = view.channel.sigma();
+        for (k, residual) in view.residuals() {
+            rows[k][0] += view.normal(residual, sigma);
+            rows[k][1] += view.normal(residual, sigma * variant);
+        }
+    }
+    rows
+}
+
 impl Effect for Shock {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -32,20 +46,15 @@ impl Effect for Shock {
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let p = theta[0].clamp(0.0, 0.999);
-        let rows = views.iter().map(|view| view.measured.len()).max().unwrap_or(0);
-        let (mut usual, mut hit) = (vec![0.0; rows], vec![0.0; rows]);
-        for view in views {
-            let sigma = view.channel.sigma();
-            for (k, residual) in view.residuals() {
-                usual[k] += view.normal(residual, sigma);
-                hit[k] += view.normal(residual, sigma * variant);
-            }
-        }
-        usual
-            .into_iter()
-            .zip(hit)
-            .map(|(usual, hit)| mixed(p, usual, hit))
-            .sum()
+        let rows = of_rows(views, variant).into_iter();
+        rows.map(|[usual, hit]| mixed(p, usual, hit)).sum()
+    }
+
+    fn beneath(&self, theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let p = theta[0].clamp(0.0, 0.999);
+        let rows = of_rows(views, variant).into_iter();
+        let worth: Vec<f64> = rows.map(|[usual, hit]| 1.0 - unusual_part(p, usual, hit)).collect();
+        views.iter().map(|view| view.each_worth(|k, _| worth[k])).collect()
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

@@ -23,6 +23,15 @@ pub struct View<'a> {
     pub step: f64,
 }
 
+/// What is known of a sample as it was before an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beneath {
+    /// [physical unit] its mean; NaN for no sample.
+    pub value: f64,
+    /// How many samples with the noise of the sensor alone it is worth: 0 tells nothing.
+    pub worth: f64,
+}
+
 /// [physical unit] least distance between two values in a log, 0 if all are alike. A file of physical units does not say that
 /// a part rounds, but shows it.
 pub fn logged_step(measured: &[f64]) -> f64 {
@@ -105,6 +114,40 @@ impl View<'_> {
         }
     }
 
+    /// [physical unit] at every row the mean of what becomes of the codes that its sensor may give.
+    pub(super) fn mean_of_codes(&self, made: impl Fn(f64) -> f64) -> Vec<f64> {
+        let lsb = self.channel.lsb;
+        let reach = (4.0 * self.channel.noise_sigma / lsb).ceil();
+        let mean = |predicted: &f64| {
+            let middle = (predicted / lsb).round();
+            let (mut sum, mut mass) = (0.0, 0.0);
+            for away in -reach as i32..=reach as i32 {
+                let code = middle + f64::from(away);
+                let apart = code * lsb - predicted;
+                let weight = self.within(apart - 0.5 * lsb, apart + 0.5 * lsb).exp();
+                (sum, mass) = (sum + weight * made(code) * lsb, mass + weight);
+            }
+            if mass > 0.0 { sum / mass } else { *predicted }
+        };
+        self.predicted.iter().map(mean).collect()
+    }
+
+    /// Every sample as it was logged.
+    pub fn as_logged(&self) -> Vec<Beneath> {
+        self.each_worth(|_, _| 1.0)
+    }
+
+    /// Every sample as it was logged, worth so much, by its index and residual.
+    pub(super) fn each_worth(&self, worth: impl Fn(usize, f64) -> f64) -> Vec<Beneath> {
+        let pairs = self.measured.iter().zip(self.predicted).enumerate();
+        pairs
+            .map(|(k, (measured, predicted))| Beneath {
+                value: *measured,
+                worth: worth(k, measured - predicted),
+            })
+            .collect()
+    }
+
     /// ln probability of the log of this channel if nothing is wrong.
     pub fn nominal(&self) -> f64 {
         let sigma = self.channel.sigma();
@@ -121,6 +164,12 @@ pub(super) fn mixed(p: f64, usual: f64, unusual: f64) -> f64 {
     } else {
         most + ((usual - most).exp() + (unusual - most).exp()).ln()
     }
+}
+
+/// Probability of the unusual one of [`mixed`].
+pub(super) fn unusual_part(p: f64, usual: f64, unusual: f64) -> f64 {
+    let odds = (-p).ln_1p() + usual - p.ln() - unusual;
+    if odds.is_nan() { 0.0 } else { 1.0 / (1.0 + odds.exp()) }
 }
 
 /// Relative sizes at which the search for the best parameter begins.

@@ -1,6 +1,6 @@
 //! Stale samples: now and then a read times out and the value before is sent again.
 
-use super::spread::{View, mixed};
+use super::spread::{Beneath, View, mixed, unusual_part};
 use super::{Effect, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -26,6 +26,21 @@ const PAGE: Page = Page {
 /// [sigma] within which a reading is of what is measured.
 const FRESH: f64 = 8.0;
 
+/// ln probability of each sample if it is one that was sent before.
+fn stale(view: &View) -> Vec<f64> {
+    let sigma = view.channel.sigma();
+    // Where the value that a sample has was fresh.
+    let mut first = 0;
+    let sample = |k: usize| {
+        let repeats = k > 0 && (view.measured[k] - view.measured[k - 1]).abs() < 0.5 * view.resolution();
+        first = if repeats { first } else { k };
+        // What was no reading of the sensor when it was fresh is none when it is sent again.
+        let was_read = (view.measured[first] - view.predicted[first]).abs() < FRESH * sigma;
+        if first < k && was_read { 0.0 } else { f64::NEG_INFINITY }
+    };
+    (0..view.measured.len()).map(sample).collect()
+}
+
 impl Effect for StaleSample {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -35,26 +50,20 @@ impl Effect for StaleSample {
         let _ = variant;
         let p = theta[0].clamp(0.0, 0.999);
         let of = |view: &View| -> f64 {
-            let sigma = view.channel.sigma();
-            // For each sample where the value that it has was fresh.
-            let mut first = 0;
-            let firsts: Vec<usize> = (0..view.measured.len())
-                .map(|k| {
-                    let repeats = k > 0 && (view.measured[k] - view.measured[k - 1]).abs() < 0.5 * view.resolution();
-                    first = if repeats { first } else { k };
-                    first
-                })
-                .collect();
-            let sample = |(k, residual): (usize, f64)| {
-                let (fresh, first) = (view.normal(residual, sigma), firsts[k]);
-                // What was no reading of the sensor when it was fresh is none when it is sent again.
-                let was_read = (view.measured[first] - view.predicted[first]).abs() < FRESH * sigma;
-                let stale = if first < k && was_read { 0.0 } else { f64::NEG_INFINITY };
-                mixed(p, fresh, stale)
-            };
+            let stale = stale(view);
+            let sample = |(k, residual): (usize, f64)| mixed(p, view.normal(residual, view.channel.sigma()), stale[k]);
             view.residuals().map(sample).sum()
         };
         views.iter().map(of).sum()
+    }
+
+    fn beneath(&self, theta: &[f64], _variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let p = theta[0].clamp(0.0, 0.999);
+        let of = |view: &View| {
+            let stale = stale(view);
+            view.each_worth(|k, residual| 1.0 - unusual_part(p, view.normal(residual, view.channel.sigma()), stale[k]))
+        };
+        views.iter().map(of).collect()
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

@@ -1,6 +1,6 @@
 //! A stuck channel: from some instant on it says the same, whatever happens.
 
-use super::spread::{IMPOSSIBLE, View};
+use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page, onsets};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -47,6 +47,11 @@ impl Effect for StuckChannel {
             view.residuals().map(sample).sum()
         };
         views.iter().map(of).sum()
+    }
+
+    fn beneath(&self, _theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
+        let of = |view: &View| view.each_worth(|k, _| f64::from(view.t_s[k] < variant));
+        views.iter().map(of).collect()
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

@@ -21,6 +21,11 @@ impl Held {
         };
         let problem = Problem::new(twin, &own, instrument);
         let quiet = Model::around(&problem, Vec::new());
-        leftover::recurrence(&sight::views(&problem), &quiet.joint, &quiet.fitted, what)
+        leftover::recurrence(
+            &sight::views(&problem, &quiet.predicted),
+            &quiet.joint,
+            &quiet.fitted,
+            what,
+        )
     }
 }

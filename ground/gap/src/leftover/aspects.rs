@@ -6,7 +6,7 @@
 //! shapes in time; shapes in time and motion together ([`super::shapes`]); the motion itself; neighbouring samples alike
 //! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone ([`super::spectrum`]); heavy tails; the size
 //! of the fitted calibration, without which an unknown effect hides in the calibration; steps between levels of one
-//! quantity, which a wrong law leaves. Of all channels together: the energy of a stretch of time; the same vector in all
+//! quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of all channels together: the energy of a stretch of time; the same vector in all
 //! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
 //! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
 //! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
@@ -137,7 +137,7 @@ impl<'a> Sights<'a> {
         }
     }
 
-    /// What each entry of [`Sights::sums`] is.
+    /// What each entry of [`Sights::sums`] is, and then the rarity of the codes of each channel that has such.
     pub fn labels(&self) -> Vec<Label> {
         let mut labels = Vec::new();
         let each = |name: &str| -> Vec<String> {
@@ -203,6 +203,12 @@ impl<'a> Sights<'a> {
             is_claimed: true,
             may_be_none: true,
         }));
+        labels.extend(coded(self.views).map(|view| Label {
+            what: format!("{}: bits that are set too often or too seldom", view.name),
+            channel: self.views.iter().position(|own| own.name == view.name),
+            is_claimed: false,
+            may_be_none: false,
+        }));
         labels
     }
 
@@ -212,7 +218,7 @@ impl<'a> Sights<'a> {
         (0..kinds(self.views)).filter(is_in)
     }
 
-    /// The sums of squares, in the order of [`Sights::labels`].
+    /// The sums of squares, in that order.
     pub fn sums(&self, fitted: &Fitted) -> Vec<f64> {
         let kinds = kinds(self.views);
         let mut sums = Vec::new();
@@ -277,6 +283,11 @@ impl<'a> Sights<'a> {
         sums.extend([sizes, distances].map(|values| mean_logarithm(values.into_iter())));
         sums
     }
+}
+
+/// The views of channels that send codes.
+pub fn coded(views: &[View]) -> impl Iterator<Item = &View> {
+    views.iter().filter(|view| view.codes.is_some())
 }
 
 /// Number of kinds in the views.

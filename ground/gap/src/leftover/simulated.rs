@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
-use super::{View, instrument::Played};
+use super::{View, codes::Counts, instrument::Played};
 use crate::joint::Joint;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
@@ -25,6 +25,9 @@ const SLOWEST: f64 = 0.1;
 
 /// Draws after which any beat will do: a clock and a sampling that are as slow as each other have no other.
 const TRIES: usize = 20;
+
+/// [units of noise] to which the zero of a channel is known.
+const ZERO: f64 = 0.2;
 
 /// When a part converts by its own clock.
 #[derive(Clone, Debug)]
@@ -47,13 +50,21 @@ pub struct Disturb<'a> {
 }
 
 /// One log.
+pub struct Simulated {
+    /// Per channel, in units of noise.
+    pub residuals: Vec<DVector<f64>>,
+    /// How often each bit is set, of each channel that sends codes.
+    pub counts: Vec<Counts>,
+}
+
+/// Draws one.
 pub fn simulate(
     views: &[View],
     joint: &Joint,
     parameters: &DVector<f64>,
     disturb: Option<Disturb>,
     random: &mut Xoshiro256PlusPlus,
-) -> Vec<DVector<f64>> {
+) -> Simulated {
     let spread = ChiSquared::new(TAILS);
     // A Student variable of n degrees has variance n / (n - 2).
     let unit = (TAILS - 2.0).sqrt();
@@ -68,9 +79,17 @@ pub fn simulate(
                 .map_or(normal, |spread| normal * unit / spread.sample(&mut *random).sqrt())
         }));
     }
+    // Of what a sensor reads by itself the zero is known to a part of its noise, and codes are made before anything is fitted.
+    for residual in &mut residuals {
+        let zero: f64 = StandardNormal.sample(&mut *random);
+        residual.add_scalar_mut(ZERO * zero);
+    }
     if let Some(disturb) = disturb {
         (disturb.of)(&mut residuals, random.next_u64());
     }
+    let coded = views.iter().zip(&residuals);
+    let counts = coded.filter_map(|(view, residual)| view.codes.as_ref().map(|codes| codes.counts_with(residual)));
+    let counts = counts.collect();
     for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
         let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
         if let Some((instrument, played)) = view.instrument.as_ref().zip(played.as_ref()) {
@@ -82,7 +101,7 @@ pub fn simulate(
             clock.age(residual, random);
         }
     }
-    residuals
+    Simulated { residuals, counts }
 }
 
 impl Clock {

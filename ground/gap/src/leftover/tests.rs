@@ -28,6 +28,7 @@ fn scene() -> (Vec<View>, Joint) {
         }),
         felt: DVector::from_fn(SAMPLES, |row, _| (row as f64 * 0.07 + channel as f64).sin()),
         predicted: DVector::from_fn(SAMPLES, |row, _| 40.0 * (row as f64 * 0.5 + channel as f64).sin()),
+        codes: None,
         clock: None,
         instrument: None,
         is_limited: false,

@@ -104,6 +104,7 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
         Injected("gyro-bias-walk", &[5e-4], 0.0, 0.0, one("g2")),
         Injected("stale-sample", &[0.1], 0.0, 0.0, one("m3x")),
         Injected("sampling-jitter", &[4e-3], 0.0, 0.0, Locality::Unit),
+        Injected("sampling-jitter", &[4e-3], 1.0, 1.0, Locality::Unit),
         Injected("coarse-quantisation", &[], -2.0, -2.0, one("a2y")),
         Injected("coarse-quantisation", &[], 3.0, 3.0, one("a2y")),
         Injected("bit-fault", &[], 7.0, 7.0, one("a1x")),
@@ -162,6 +163,66 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
                 );
             }
         }
+    }
+}
+
+/// A zero that is off is seen beneath an effect on the scatter, and as sharply as the effect says.
+#[test]
+fn what_is_beneath_an_effect_on_the_scatter_still_tells_a_zero_that_is_off() {
+    let twin = twin(DENSE);
+    let predicted = twin.predict(&[]);
+    let one = |name: &str| Locality::Channel(name.to_owned());
+    /// [sigma] a zero's error.
+    const OFF: f64 = 0.3;
+    let injected = [
+        ("stale-sample", vec![0.1], 0.0, one("m3x"), 0.8),
+        ("sampling-jitter", vec![4e-3], 0.0, Locality::Unit, 0.3),
+        ("sampling-jitter", vec![4e-3], 1.0, Locality::Unit, 1.0),
+        ("coarse-quantisation", vec![], -3.0, one("a2y"), 0.3),
+        ("coarse-quantisation", vec![], 3.0, one("a2y"), 0.3),
+        ("bit-fault", vec![], 7.0, one("a1x"), 1.0),
+        ("stuck-channel", vec![], 120.0, one("m4y"), 0.49),
+        ("packet-corruption", vec![0.1], 0.0, one("a3z"), 0.85),
+        ("noise-level", vec![0.4], 0.0, one("g1"), 0.44),
+        ("shock", vec![0.1], 20.0, Locality::Unit, 0.85),
+    ];
+    let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
+    for (name, theta, variant, locality, least_part) in injected {
+        let effect = by_name(name).unwrap();
+        let channels = Cause {
+            effect,
+            locality,
+            variant,
+        }
+        .channels(twin.unit());
+        let mut measured = noisy(&twin, &predicted, 7);
+        for &channel in &channels {
+            let off = OFF * twin.unit().channels[channel].sigma();
+            measured[channel].iter_mut().for_each(|value| *value += off);
+        }
+        let healthy = views(&twin, &channels, &t_s, &predicted, &measured);
+        let disturbed = effect.disturb(&theta, variant, &healthy, Noise::new(3));
+        for (&channel, disturbed) in channels.iter().zip(disturbed) {
+            measured[channel] = disturbed;
+        }
+        let measured = logged(&twin, &measured);
+        let seen = views(&twin, &channels, &t_s, &predicted, &measured);
+        let (mut pull, mut worth, mut as_logged, mut samples) = (0.0, 0.0, 0.0, 0.0);
+        for (view, rows) in seen.iter().zip(effect.beneath(&theta, variant, &seen)) {
+            for (row, (predicted, measured)) in rows.iter().zip(view.predicted.iter().zip(view.measured)) {
+                let sigma = view.channel.sigma();
+                pull += row.worth * (row.value - predicted) / sigma;
+                as_logged += (measured - predicted) / sigma;
+                (worth, samples) = (worth + row.worth, samples + 1.0);
+            }
+        }
+        let (found, part) = (pull / worth, worth / samples);
+        println!(
+            "{name} {variant}: {found:.3}, as logged {:.3}, worth {part:.2}",
+            as_logged / samples
+        );
+        assert!((found - OFF).abs() < 4.0 / worth.sqrt(), "{name}: {found}");
+        assert!(part >= least_part, "{name}: {part}");
     }
 }
 

@@ -1,0 +1,358 @@
+//! The search for effects on the scatter.
+//!
+//! In: the problem, a model and what it leaves. Out: the effects that gain anything, best first. All are tried about the
+//! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
+//! and maximisation ([`crate::uncovered`]), also in channels where only the wrong one hid them.
+
+use twin::{
+    effect::{Beneath, Effect, LIBRARY, Nature, Scope, View, logged_step, most_likely},
+    predict::Kind,
+};
+
+use super::Scatter;
+use crate::{model::Model, open::instant_sigma_s, problem::Problem, uncovered::recalibrated};
+
+/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
+const ODD: f64 = 2.0;
+
+/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
+/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+fn is_odd(view: &View) -> bool {
+    let sigma = view.channel.sigma();
+    let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
+    let samples = standard.len().max(1) as f64;
+    let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
+    let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
+    let root = samples.sqrt();
+    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
+        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
+        || alike.abs() * root > ODD
+}
+
+/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
+/// would otherwise swallow any effect the library does not have, and be believed.
+const COLOURED: f64 = 0.2;
+
+/// Effects that stand for white noise, for its outliers, or for errors of each sample's own.
+const WHITE: [&str; 4] = ["noise-level", "packet-corruption", "shock", "sampling-jitter"];
+
+/// Of those, effects that only make a sample scatter more: a reference that errs does so too.
+const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];
+
+/// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
+/// and these must not make the rest of the log look alike.
+const CUT: f64 = 2.0;
+
+/// Median of the absolute value of a standard normal variable.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
+
+/// [nats] what a part's own clock explains of a log.
+fn own_clock(view: &View) -> f64 {
+    let sigma_s = instant_sigma_s(view.channel);
+    let is_polled = view.channel.bits.is_some() && view.channel.sensor != Kind::Thermometer;
+    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| is_polled && sigma_s > 0.0);
+    jitter.map_or(0.0, |jitter| {
+        (jitter.log_likelihood(&[sigma_s], 0.0, &[*view]) - view.nominal()).max(0.0)
+    })
+}
+
+/// Whether neighbouring residuals are alike.
+fn is_coloured(view: &View) -> bool {
+    let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let mut sizes: Vec<f64> = rest.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return false;
+    }
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let most = (CUT * median / MEDIAN_OF_NORMAL).max(f64::MIN_POSITIVE);
+    rest.iter_mut().for_each(|value| *value = value.clamp(-most, most));
+    let energy: f64 = rest.iter().map(|value| value * value).sum();
+    let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    alike > COLOURED * energy
+}
+
+/// [nats a sample] that the tails of a reference's errors gain over normal scatter: those of a Student law of five degrees of
+/// freedom, whose excess kurtosis of six is the largest that BROAD's recordings show, between blows. Its entropy is 1.3721 and
+/// a normal law's of the same variance 1.4189.
+const TAILS: f64 = 0.0468;
+
+/// Part of the best gain from which an effect may come out best with a calibration of its own.
+const NEAR: f64 = 0.2;
+
+/// Steps of expectation and maximisation, and what one must bring [nats].
+const STEPS: usize = 5;
+const CONVERGED: f64 = 0.5;
+
+/// Every effect on the scatter that gains anything, best first.
+pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Scatter> {
+    let search = Search::new(problem, model);
+    let is_offered = |effect: &&&dyn Effect| {
+        let page = effect.page();
+        page.nature == Nature::Spread && withheld.iter().all(|name| name != page.name)
+    };
+    let mut found: Vec<Scatter> = Vec::new();
+    // What is not white is no effect that stands for white noise, unless a calibration of its own makes it so.
+    let mut hidden: Vec<Scatter> = Vec::new();
+    for effect in LIBRARY.iter().filter(is_offered) {
+        let variants = effect.variants(problem.twin.starts_s());
+        let price = -((LIBRARY.len() * variants.len()) as f64).ln();
+        let seek = |variant: f64, is_strict: bool| search.seek(*effect, variant, price, is_strict);
+        for scatter in variants.iter().filter_map(|variant| seek(*variant, true)) {
+            let views: Vec<View> = scatter.channels.iter().map(|channel| search.view(*channel)).collect();
+            // Where channels agree on a variant that each alone had to average over, more of them show it.
+            let settled = effect.settled(&views).and_then(|variant| seek(variant, true));
+            found.push(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter));
+        }
+        let is_found = found.iter().any(|own| own.effect.page().name == effect.page().name);
+        if WHITE.contains(&effect.page().name) && !is_found {
+            hidden.extend(variants.iter().filter_map(|variant| seek(*variant, false)));
+        }
+    }
+    by_gain(&mut found);
+    by_gain(&mut hidden);
+    let least = found.first().map_or(0.0, |best| NEAR * best.gain);
+    let mut names: Vec<&str> = Vec::new();
+    let mut near: Vec<Scatter> = Vec::new();
+    for scatter in found.iter().chain(&hidden) {
+        let name = scatter.effect.page().name;
+        if scatter.gain >= least && !names.contains(&name) {
+            names.push(name);
+            let shifted = scatter.effect.shifted(scatter.variant);
+            let variants = [scatter.variant].into_iter().chain(shifted);
+            near.extend(variants.filter_map(|variant| search.uncovered(scatter, variant)));
+        }
+    }
+    found.extend(near);
+    by_gain(&mut found);
+    found
+}
+
+fn by_gain(found: &mut [Scatter]) {
+    found.sort_by(|one, other| other.gain.total_cmp(&one.gain));
+}
+
+/// What the search looks at, channel by channel.
+struct Search<'a> {
+    problem: &'a Problem<'a>,
+    model: &'a Model,
+    /// [s] instants.
+    instants: Vec<Vec<f64>>,
+    /// At every row; NaN where nothing was logged.
+    measured: Vec<Vec<f64>>,
+    /// Predicted, or nearer to what was measured where the reference may err.
+    near: Vec<Vec<f64>>,
+    steps: Vec<f64>,
+    odd: Vec<bool>,
+    own_clock: Vec<f64>,
+}
+
+/// One block of channels under an effect.
+struct Block {
+    theta: Vec<f64>,
+    /// [nats] over the nominal scatter with the model's calibration.
+    gain: f64,
+    beneath: Vec<Vec<Beneath>>,
+}
+
+impl<'a> Search<'a> {
+    fn new(problem: &'a Problem<'a>, model: &'a Model) -> Self {
+        let twin = problem.twin;
+        let channels = 0..twin.unit().channels.len();
+        let measured: Vec<Vec<f64>> = (problem.frames.iter())
+            .map(|frame| {
+                let mut rows = vec![f64::NAN; twin.starts_s().len()];
+                (frame.series.rows.iter().zip(&frame.series.values))
+                    .for_each(|(row, value)| rows[*row as usize] = *value);
+                rows
+            })
+            .collect();
+        let mut search = Search {
+            problem,
+            model,
+            instants: channels.clone().map(|index| twin.instants_s(index)).collect(),
+            near: Vec::new(),
+            steps: measured.iter().map(|measured| logged_step(measured)).collect(),
+            measured,
+            odd: Vec::new(),
+            own_clock: Vec::new(),
+        };
+        let near = |channel: usize| search.near(channel, &model.predicted[channel]);
+        search.near = channels.clone().map(near).collect();
+        search.odd = channels.clone().map(|channel| is_odd(&search.view(channel))).collect();
+        search.own_clock = channels.map(|channel| own_clock(&search.view(channel))).collect();
+        search
+    }
+
+    /// What is predicted of a channel, as far as it may be held against it: effects know the sensor's own noise, and a reference
+    /// that errs as well must not look like more of it.
+    fn near(&self, channel: usize, predicted: &[f64]) -> Vec<f64> {
+        let problem = self.problem;
+        let (own, is_limited) = (
+            problem.twin.unit().channels[channel].sigma(),
+            problem.is_limited(channel),
+        );
+        // What errs slowly is no scatter, unless there is more of it.
+        let part = |row: usize| match is_limited {
+            true => own / problem.sigmas[channel][row],
+            false => problem.own_part(channel, row),
+        };
+        let (mut near, measured) = (predicted.to_vec(), &self.measured[channel]);
+        let rows = problem.frames[channel].series.rows.iter().map(|row| *row as usize);
+        rows.filter(|row| part(*row) < 1.0).for_each(|row| {
+            near[row] = measured[row] - part(row) * (measured[row] - predicted[row]);
+        });
+        near
+    }
+
+    fn view(&self, channel: usize) -> View<'_> {
+        self.view_near(channel, &self.near[channel])
+    }
+
+    fn view_near<'b>(&'b self, channel: usize, near: &'b [f64]) -> View<'b> {
+        View {
+            channel: &self.problem.twin.unit().channels[channel],
+            t_s: &self.instants[channel],
+            predicted: near,
+            measured: &self.measured[channel],
+            step: self.steps[channel],
+        }
+    }
+
+    /// Channels that an effect may be in, by what shares its parameters.
+    fn blocks(&self, effect: &dyn Effect) -> Vec<Vec<usize>> {
+        let (unit, page) = (self.problem.twin.unit(), effect.page());
+        let concerned: Vec<usize> = (0..unit.channels.len())
+            .filter(|index| page.sensors.contains(&unit.channels[*index].sensor))
+            .filter(|index| !(self.problem.is_limited(*index) && SHAPELESS.contains(&page.name)))
+            .collect();
+        match page.scope {
+            Scope::Channel => concerned.iter().map(|index| vec![*index]).collect(),
+            Scope::Plate => {
+                let of_group = |group: &&str| {
+                    let is_in = |index: &usize| unit.channels[*index].group == *group;
+                    concerned.iter().copied().filter(is_in).collect()
+                };
+                unit.groups().iter().map(of_group).collect()
+            }
+            Scope::Unit => vec![concerned],
+        }
+    }
+
+    /// An effect in every block that gains by it, about the model's calibration; if strictly, where it may be.
+    fn seek(&self, effect: &'static dyn Effect, variant: f64, price: f64, is_strict: bool) -> Option<Scatter> {
+        let judged = |block: &[usize]| {
+            let views: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
+            let is_possible = !is_strict || self.is_possible(effect, &views);
+            let (theta, gain) = is_possible.then(|| most_likely(effect, variant, &views))?;
+            let beneath = effect.beneath(&theta, variant, &views);
+            Some(Block { theta, gain, beneath })
+        };
+        self.gathered(effect, variant, price, judged)
+    }
+
+    /// An effect with the calibration that goes with it, if it says what is beneath it. In blocks where it was not found it begins
+    /// as in those where it was.
+    fn uncovered(&self, found: &Scatter, variant: f64) -> Option<Scatter> {
+        if found.beneath.is_empty() {
+            return None;
+        }
+        let effect = found.effect;
+        let judged = |block: &[usize]| {
+            let at = found.channels.iter().position(|channel| *channel == block[0]);
+            let mut theta = found.thetas[at.unwrap_or(0)].clone();
+            let mut near: Vec<Vec<f64>> = block.iter().map(|channel| self.near[*channel].clone()).collect();
+            let mut best: Option<Block> = None;
+            for _ in 0..STEPS {
+                let pairs = || {
+                    block
+                        .iter()
+                        .zip(&near)
+                        .map(|(channel, near)| self.view_near(*channel, near))
+                };
+                let beneath = effect.beneath(&theta, variant, &pairs().collect::<Vec<View>>());
+                let refits = block.iter().zip(&beneath);
+                let refits: Vec<_> = refits
+                    .map(|(channel, rows)| recalibrated(self.problem, self.model, *channel, rows))
+                    .collect();
+                let open: f64 = refits.iter().map(|refit| refit.gain).sum();
+                near = (block.iter().zip(&refits))
+                    .map(|(channel, refit)| self.near(*channel, &refit.predicted))
+                    .collect();
+                let views: Vec<View> = block
+                    .iter()
+                    .zip(&near)
+                    .map(|(channel, near)| self.view_near(*channel, near))
+                    .collect();
+                if !self.is_possible(effect, &views) {
+                    break;
+                }
+                let (found, gain) = most_likely(effect, variant, &views);
+                let nominal = |views: &[View]| -> f64 { views.iter().map(View::nominal).sum() };
+                let before: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
+                let gain = gain + nominal(&views) - nominal(&before) + open;
+                let brings = best.as_ref().map_or(f64::INFINITY, |best| gain - best.gain);
+                if brings > 0.0 {
+                    theta = found;
+                    let beneath = effect.beneath(&theta, variant, &views);
+                    best = Some(Block {
+                        theta: theta.clone(),
+                        gain,
+                        beneath,
+                    });
+                }
+                if brings < CONVERGED {
+                    break;
+                }
+            }
+            best
+        };
+        let variants = effect.variants(self.problem.twin.starts_s()).len();
+        let price = -((LIBRARY.len() * variants) as f64).ln();
+        self.gathered(effect, variant, price, judged)
+    }
+
+    /// Whether an effect may be what these scatter by: one that stands for white noise is not where neighbours are alike.
+    fn is_possible(&self, effect: &dyn Effect, views: &[View]) -> bool {
+        !(WHITE.contains(&effect.page().name) && views.iter().any(is_coloured))
+    }
+
+    /// An effect in every block in which it gains more than it costs there.
+    fn gathered(
+        &self,
+        effect: &'static dyn Effect,
+        variant: f64,
+        price: f64,
+        judged: impl Fn(&[usize]) -> Option<Block>,
+    ) -> Option<Scatter> {
+        let mut scatter = Scatter {
+            effect,
+            variant,
+            channels: Vec::new(),
+            thetas: Vec::new(),
+            gain: price,
+            beneath: Vec::new(),
+        };
+        let blocks = self.blocks(effect);
+        for block in blocks.iter().filter(|block| block.iter().any(|index| self.odd[*index])) {
+            let Some(found) = judged(block) else {
+                continue;
+            };
+            let samples_of = |index: &usize| self.problem.frames[*index].series.rows.len();
+            let samples: usize = block.iter().map(samples_of).sum();
+            let of_reference = block.iter().filter(|index| self.problem.is_limited(**index));
+            let gain = found.gain
+                - block.iter().map(|index| self.own_clock[*index]).sum::<f64>()
+                - TAILS * of_reference.map(samples_of).sum::<usize>() as f64;
+            let price =
+                0.5 * (samples.max(1) as f64).ln() * found.theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
+            if gain > price {
+                scatter.gain += gain - price;
+                scatter.channels.extend(block);
+                scatter.thetas.extend(block.iter().map(|_| found.theta.clone()));
+                scatter.beneath.extend(found.beneath);
+            }
+        }
+        Some(scatter).filter(|scatter| !scatter.channels.is_empty() && scatter.gain > 0.0)
+    }
+}
