@@ -258,6 +258,14 @@ impl<'a> Problem<'a> {
         readings
     }
 
+    /// Readings of one channel at every row of the log; NaN where nothing was fitted.
+    pub fn measured(&self, channel: usize) -> Vec<f64> {
+        let series = &self.frames[channel].series;
+        let mut rows = vec![f64::NAN; self.twin.starts_s().len()];
+        (series.rows.iter().zip(&series.values)).for_each(|(row, value)| rows[*row as usize] = *value);
+        rows
+    }
+
     /// Measured minus predicted of one channel, in units of noise.
     pub fn residual(&self, channel: usize, model: &[Component]) -> DVector<f64> {
         let predicted = self.predict(channel, model);

@@ -16,7 +16,7 @@ mod search;
 
 use nalgebra::DVector;
 use twin::{
-    effect::{Beneath, Effect, Scope, View},
+    effect::{Beneath, Effect, Scope, View, logged_step},
     part::signal::Noise,
 };
 
@@ -136,13 +136,13 @@ impl Scatter {
 
     /// What a channel logs on the whole, where its sensor reads `predicted`.
     pub fn expected(&self, problem: &Problem, channel: usize, predicted: &[f64]) -> Vec<f64> {
-        let t_s = problem.twin.instants_s(channel);
+        let (t_s, measured) = (problem.twin.instants_s(channel), problem.measured(channel));
         let view = View {
             channel: &problem.twin.unit().channels[channel],
             t_s: &t_s,
             predicted,
-            measured: predicted,
-            step: 0.0,
+            measured: &measured,
+            step: logged_step(&measured),
         };
         self.effect.expected(self.variant, &view)
     }

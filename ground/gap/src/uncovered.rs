@@ -36,15 +36,25 @@ pub fn recalibrated(problem: &Problem, model: &Model, channel: usize, rows: &[Be
     let pull = open.tr_mul(&rest) - before;
     let change = Cholesky::new(DMatrix::identity(width, width) + open.tr_mul(&open))
         .map_or_else(|| DVector::zeros(width), |factor| factor.solve(&pull));
+    Recalibrated {
+        predicted: changed(problem, model, channel, &change),
+        gain: 0.5 * (before.norm_squared() - (before + change).norm_squared()),
+    }
+}
+
+/// What a model predicts of `channel` at every row with the calibration as described.
+pub fn as_described(problem: &Problem, model: &Model, channel: usize) -> Vec<f64> {
+    changed(problem, model, channel, &-&model.fitted.nuisance[channel])
+}
+
+/// What a model predicts with the calibration changed by so many of its sigmas.
+fn changed(problem: &Problem, model: &Model, channel: usize, change: &DVector<f64>) -> Vec<f64> {
     let mut predicted = model.predicted[channel].clone();
     for (column, change) in problem.open(channel).iter().zip(change.iter()) {
         let slopes = &column.entries[0].1;
         (predicted.iter_mut().zip(slopes)).for_each(|(value, slope)| *value += slope * column.sigma * change);
     }
-    Recalibrated {
-        predicted,
-        gain: 0.5 * (before.norm_squared() - (before + change).norm_squared()),
-    }
+    predicted
 }
 
 /// A number for each fitted sample of a channel, from its row.

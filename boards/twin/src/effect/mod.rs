@@ -222,14 +222,14 @@ pub trait Effect: Sync {
         vec![0.0]
     }
 
-    /// The variant that these channels, in which it was found, speak for together; `None` where the likelihood does not
-    /// average over variants.
+    /// The variant that these channels, in which it was found, tell together, where those tried stand too far apart or the
+    /// likelihood averages over them.
     fn settled(&self, _views: &[View]) -> Option<f64> {
         None
     }
 
-    /// What a channel would log with this effect on the whole, at every row, where its sensor reads what is predicted. An effect
-    /// that pushes readings no way leaves that as it is.
+    /// What a channel would log with this effect on the whole, at every row, where its sensor reads what is predicted, given
+    /// what was measured of it where that is known. An effect that pushes readings no way leaves that as it is.
     fn expected(&self, _variant: f64, view: &View) -> Vec<f64> {
         view.predicted.to_vec()
     }

@@ -53,9 +53,19 @@ impl Site<'_> {
         Some(self.unit.channels[index].axis_b)
     }
 
-    /// Place of the channel's sensor in the reading order: how many slots are before its own.
+    /// Place of the channel's sensor in the reading order: how many sensors are read before it. The slots tell that, but not of
+    /// parts that convert by clocks of their own, whose slots are as old as their readings: of these the order of the file does.
     pub fn read_position(&self) -> usize {
-        let before = self.unit.channels.iter().map(|channel| channel.slot_s);
+        let channels = &self.unit.channels;
+        if channels.iter().any(|channel| channel.instant_sigma_s.is_some()) {
+            let chip = |channel: &Channel| (channel.group.clone(), channel.sensor);
+            let mut before: Vec<_> = channels.iter().map(chip).collect();
+            before.truncate(self.index);
+            before.retain(|other| *other != chip(self.channel));
+            before.dedup();
+            return before.len();
+        }
+        let before = channels.iter().map(|channel| channel.slot_s);
         let mut before: Vec<f64> = before.filter(|slot_s| *slot_s < self.channel.slot_s).collect();
         before.sort_by(f64::total_cmp);
         before.dedup();

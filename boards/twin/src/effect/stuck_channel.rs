@@ -55,19 +55,47 @@ impl Effect for StuckChannel {
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {
-        let _ = (theta, noise);
-        let stuck = |view: &View| {
-            let mut held = None;
-            let sample = |(measured, t_s): (&f64, &f64)| {
-                if *t_s < variant {
-                    *measured
-                } else {
-                    *held.get_or_insert(*measured)
-                }
-            };
+        let _ = theta;
+        let stuck = |(number, view): (usize, &View)| {
+            let [low, _] = view.limits();
+            let resolution = view.resolution();
+            // Which value it sticks at is anything.
+            let value = low + view.span() * noise.uniform(number as u64);
+            let value = (value / resolution).round() * resolution;
+            let sample = |(measured, t_s): (&f64, &f64)| if *t_s < variant { *measured } else { value };
             view.measured.iter().zip(view.t_s).map(sample).collect()
         };
-        views.iter().map(stuck).collect()
+        views.iter().enumerate().map(stuck).collect()
+    }
+
+    fn expected(&self, variant: f64, view: &View) -> Vec<f64> {
+        let logged = view.measured.iter().zip(view.t_s);
+        let stuck = logged
+            .filter(|(value, t_s)| value.is_finite() && **t_s >= variant)
+            .next_back();
+        let rows = view.predicted.iter().zip(view.t_s);
+        rows.map(|(predicted, t_s)| match stuck {
+            Some((value, _)) if *t_s >= variant => *value,
+            _ => *predicted,
+        })
+        .collect()
+    }
+
+    /// The instant from which each of them gives one value to the end, the last of these.
+    fn settled(&self, views: &[View]) -> Option<f64> {
+        let of = |view: &View| {
+            let logged = view
+                .measured
+                .iter()
+                .zip(view.t_s)
+                .filter(|(value, _)| value.is_finite());
+            let logged: Vec<(&f64, &f64)> = logged.collect();
+            let (end, _) = logged.last()?;
+            let is_other = |(value, _): &(&f64, &f64)| (*value - *end).abs() > 0.5 * view.resolution();
+            let changed = logged.iter().rposition(is_other).map_or(0, |at| at + 1);
+            logged.get(changed).map(|(_, t_s)| **t_s)
+        };
+        views.iter().filter_map(of).reduce(f64::max)
     }
 
     /// Onsets [s]; the first is the start of the log.

@@ -10,7 +10,12 @@ use twin::{
 };
 
 use super::Scatter;
-use crate::{model::Model, open::instant_sigma_s, problem::Problem, uncovered::recalibrated};
+use crate::{
+    model::Model,
+    open::instant_sigma_s,
+    problem::Problem,
+    uncovered::{as_described, recalibrated},
+};
 
 /// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
 const ODD: f64 = 2.0;
@@ -80,6 +85,9 @@ const TAILS: f64 = 0.0468;
 /// Part of the best gain from which an effect may come out best with a calibration of its own.
 const NEAR: f64 = 0.2;
 
+/// [prior sigmas] from which a calibration may have been dragged to where it is.
+const DRAGGED: f64 = 4.0;
+
 /// Steps of expectation and maximisation, and what one must bring [nats].
 const STEPS: usize = 5;
 const CONVERGED: f64 = 0.5;
@@ -128,6 +136,11 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
     found
 }
 
+/// [nats] the log of some channels if nothing scatters otherwise than described.
+fn nominal(views: &[View]) -> f64 {
+    views.iter().map(View::nominal).sum()
+}
+
 fn by_gain(found: &mut [Scatter]) {
     found.sort_by(|one, other| other.gain.total_cmp(&one.gain));
 }
@@ -142,6 +155,8 @@ struct Search<'a> {
     measured: Vec<Vec<f64>>,
     /// Predicted, or nearer to what was measured where the reference may err.
     near: Vec<Vec<f64>>,
+    /// The same with the calibration as described, where that was dragged far.
+    described: Vec<Option<Vec<f64>>>,
     steps: Vec<f64>,
     odd: Vec<bool>,
     own_clock: Vec<f64>,
@@ -159,19 +174,13 @@ impl<'a> Search<'a> {
     fn new(problem: &'a Problem<'a>, model: &'a Model) -> Self {
         let twin = problem.twin;
         let channels = 0..twin.unit().channels.len();
-        let measured: Vec<Vec<f64>> = (problem.frames.iter())
-            .map(|frame| {
-                let mut rows = vec![f64::NAN; twin.starts_s().len()];
-                (frame.series.rows.iter().zip(&frame.series.values))
-                    .for_each(|(row, value)| rows[*row as usize] = *value);
-                rows
-            })
-            .collect();
+        let measured: Vec<Vec<f64>> = channels.clone().map(|channel| problem.measured(channel)).collect();
         let mut search = Search {
             problem,
             model,
             instants: channels.clone().map(|index| twin.instants_s(index)).collect(),
             near: Vec::new(),
+            described: Vec::new(),
             steps: measured.iter().map(|measured| logged_step(measured)).collect(),
             measured,
             odd: Vec::new(),
@@ -179,6 +188,11 @@ impl<'a> Search<'a> {
         };
         let near = |channel: usize| search.near(channel, &model.predicted[channel]);
         search.near = channels.clone().map(near).collect();
+        let described = |channel: usize| {
+            let is_dragged = model.fitted.nuisance[channel].amax() > DRAGGED;
+            is_dragged.then(|| search.near(channel, &as_described(problem, model, channel)))
+        };
+        search.described = channels.clone().map(described).collect();
         search.odd = channels.clone().map(|channel| is_odd(&search.view(channel))).collect();
         search.own_clock = channels.map(|channel| own_clock(&search.view(channel))).collect();
         search
@@ -243,10 +257,31 @@ impl<'a> Search<'a> {
     fn seek(&self, effect: &'static dyn Effect, variant: f64, price: f64, is_strict: bool) -> Option<Scatter> {
         let judged = |block: &[usize]| {
             let views: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
-            let is_possible = !is_strict || self.is_possible(effect, &views);
-            let (theta, gain) = is_possible.then(|| most_likely(effect, variant, &views))?;
-            let beneath = effect.beneath(&theta, variant, &views);
-            Some(Block { theta, gain, beneath })
+            let sought = |views: &[View], open: f64| {
+                let is_possible = !is_strict || self.is_possible(effect, views);
+                let (theta, gain) = is_possible.then(|| most_likely(effect, variant, views))?;
+                let beneath = effect.beneath(&theta, variant, views);
+                let gain = gain + open;
+                Some(Block { theta, gain, beneath })
+            };
+            let found = sought(&views, 0.0);
+            // What an effect adds may have dragged the calibration so far that nothing fits it any more.
+            if block.iter().all(|channel| self.described[*channel].is_none()) {
+                return found;
+            }
+            let near = |channel: &usize| self.described[*channel].as_ref().unwrap_or(&self.near[*channel]);
+            let described = block.iter().map(|channel| self.view_near(*channel, near(channel)));
+            let described: Vec<View> = described.collect();
+            let dragged = block.iter().filter(|channel| self.described[**channel].is_some());
+            let open: f64 = dragged
+                .map(|channel| 0.5 * self.model.fitted.nuisance[*channel].norm_squared())
+                .sum();
+            let again = sought(&described, open + nominal(&described) - nominal(&views));
+            let tells = |block: &Block| !block.beneath.is_empty();
+            match (found, again.filter(tells)) {
+                (Some(found), Some(again)) if again.gain <= found.gain => Some(found),
+                (found, again) => again.or(found),
+            }
         };
         self.gathered(effect, variant, price, judged)
     }
@@ -288,7 +323,6 @@ impl<'a> Search<'a> {
                     break;
                 }
                 let (found, gain) = most_likely(effect, variant, &views);
-                let nominal = |views: &[View]| -> f64 { views.iter().map(View::nominal).sum() };
                 let before: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
                 let gain = gain + nominal(&views) - nominal(&before) + open;
                 let brings = best.as_ref().map_or(f64::INFINITY, |best| gain - best.gain);

@@ -244,6 +244,38 @@ fn a_geared_table_turns_further_than_its_record_says() {
 }
 
 #[test]
+fn the_reading_order_is_that_of_the_slots_and_where_parts_have_clocks_that_of_the_file() {
+    let own = changed_unit(|index, channel| {
+        // Of parts with clocks of their own a slot is as old as the reading.
+        channel.slot_s = if index % 2 == 0 { 0.013 } else { 0.002 };
+        channel.instant_sigma_s = Some(0.004);
+    });
+    let cause = Cause {
+        effect: by_name("read-skew").unwrap(),
+        locality: Locality::Unit,
+        variant: 0.0,
+    };
+    let late = own.channel(
+        own.unit().channel("g2").unwrap(),
+        &[Active {
+            cause,
+            theta: vec![1e-3],
+        }],
+    );
+    // Four accelerometers, four magnetometers and a gyro are read before.
+    let by_hand = {
+        let mut unit = own.unit().clone();
+        let index = unit.channel("g2").unwrap();
+        unit.channels[index].slot_s += 9e-3;
+        twin_of(unit, Environment::laboratory(), &Exercise)
+            .channel(index, &[])
+            .into_owned()
+    };
+    let apart = late.iter().zip(&by_hand).map(|(one, other)| (one - other).abs());
+    assert!(apart.fold(0.0, f64::max) < 1e-9);
+}
+
+#[test]
 fn eddy_currents_delay_the_field_to_first_order() {
     let delayed = changed_unit(|_, channel| channel.slot_s -= if channel.name.starts_with('m') { 2e-3 } else { 0.0 });
     let (apart, whole) = compared("eddy-current", Locality::Unit, 0.0, &[2e-3], &delayed);

@@ -226,6 +226,25 @@ fn what_is_beneath_an_effect_on_the_scatter_still_tells_a_zero_that_is_off() {
     }
 }
 
+#[test]
+fn a_stuck_channel_tells_since_when_and_what_it_will_say() {
+    let twin = twin(DENSE);
+    let (predicted, effect) = (twin.predict(&[]), by_name("stuck-channel").unwrap());
+    let channel = twin.unit().channel("m4y").unwrap();
+    let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
+    let mut measured = noisy(&twin, &predicted, 3);
+    // None of the onsets tried, and the last quarter is not known.
+    const ONSET: usize = 333;
+    measured[channel][ONSET..].fill(1.5);
+    measured[channel][900..].fill(f64::NAN);
+    let seen = views(&twin, &[channel], &t_s, &predicted, &measured);
+    let onset_s = effect.settled(&seen).unwrap();
+    assert_eq!(onset_s, t_s[channel][ONSET]);
+    let expected = effect.expected(onset_s, &seen[0]);
+    assert_eq!(expected[ONSET - 1], predicted[channel][ONSET - 1]);
+    assert!(expected[ONSET..].iter().all(|value| *value == 1.5));
+}
+
 /// One digit in a hundred samples is another: no bit is stuck, and no law that leaves those samples unexplained may gain by
 /// them.
 #[test]
