@@ -4,78 +4,23 @@
 //! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
 //! and maximisation ([`crate::uncovered`]), also in channels where only the wrong one hid them.
 
-use twin::{
-    effect::{Beneath, Effect, LIBRARY, Nature, Scope, View, logged_step, most_likely},
-    predict::Kind,
-};
+use twin::effect::{Beneath, Effect, LIBRARY, Nature, Scope, View, logged_step, most_likely};
 
-use super::Scatter;
+use super::{
+    Scatter,
+    odd::{is_coloured, is_odd, own_clock},
+};
 use crate::{
     model::Model,
-    open::instant_sigma_s,
     problem::Problem,
     uncovered::{as_described, recalibrated},
 };
-
-/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
-const ODD: f64 = 2.0;
-
-/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
-/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
-fn is_odd(view: &View) -> bool {
-    let sigma = view.channel.sigma();
-    let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
-    let samples = standard.len().max(1) as f64;
-    let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
-    let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
-    let root = samples.sqrt();
-    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
-        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
-        || alike.abs() * root > ODD
-}
-
-/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
-/// would otherwise swallow any effect the library does not have, and be believed.
-const COLOURED: f64 = 0.2;
 
 /// Effects that stand for white noise, for its outliers, or for errors of each sample's own.
 const WHITE: [&str; 4] = ["noise-level", "packet-corruption", "shock", "sampling-jitter"];
 
 /// Of those, effects that only make a sample scatter more: a reference that errs does so too.
 const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];
-
-/// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
-/// and these must not make the rest of the log look alike.
-const CUT: f64 = 2.0;
-
-/// Median of the absolute value of a standard normal variable.
-const MEDIAN_OF_NORMAL: f64 = 0.6745;
-
-/// [nats] what a part's own clock explains of a log.
-fn own_clock(view: &View) -> f64 {
-    let sigma_s = instant_sigma_s(view.channel);
-    let is_polled = view.channel.bits.is_some() && view.channel.sensor != Kind::Thermometer;
-    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| is_polled && sigma_s > 0.0);
-    jitter.map_or(0.0, |jitter| {
-        (jitter.log_likelihood(&[sigma_s], 0.0, &[*view]) - view.nominal()).max(0.0)
-    })
-}
-
-/// Whether neighbouring residuals are alike.
-fn is_coloured(view: &View) -> bool {
-    let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
-    let mut sizes: Vec<f64> = rest.iter().map(|value| value.abs()).collect();
-    let middle = sizes.len() / 2;
-    if sizes.is_empty() {
-        return false;
-    }
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let most = (CUT * median / MEDIAN_OF_NORMAL).max(f64::MIN_POSITIVE);
-    rest.iter_mut().for_each(|value| *value = value.clamp(-most, most));
-    let energy: f64 = rest.iter().map(|value| value * value).sum();
-    let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    alike > COLOURED * energy
-}
 
 /// [nats a sample] that the tails of a reference's errors gain over normal scatter: those of a Student law of five degrees of
 /// freedom, whose excess kurtosis of six is the largest that BROAD's recordings show, between blows. Its entropy is 1.3721 and
@@ -107,7 +52,7 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
         let price = -((LIBRARY.len() * variants.len()) as f64).ln();
         let seek = |variant: f64, is_strict: bool| search.seek(*effect, variant, price, is_strict);
         for scatter in variants.iter().filter_map(|variant| seek(*variant, true)) {
-            let views: Vec<View> = scatter.channels.iter().map(|channel| search.view(*channel)).collect();
+            let views = search.views(&scatter.channels, |channel| &search.near[channel]);
             // Where channels agree on a variant that each alone had to average over, more of them show it.
             let settled = effect.settled(&views).and_then(|variant| seek(variant, true));
             found.push(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter));
@@ -233,6 +178,11 @@ impl<'a> Search<'a> {
         }
     }
 
+    fn views<'b>(&'b self, block: &[usize], near: impl Fn(usize) -> &'b Vec<f64>) -> Vec<View<'b>> {
+        let view = |channel: &usize| self.view_near(*channel, near(*channel));
+        block.iter().map(view).collect()
+    }
+
     /// Channels that an effect may be in, by what shares its parameters.
     fn blocks(&self, effect: &dyn Effect) -> Vec<Vec<usize>> {
         let (unit, page) = (self.problem.twin.unit(), effect.page());
@@ -256,7 +206,7 @@ impl<'a> Search<'a> {
     /// An effect in every block that gains by it, about the model's calibration; if strictly, where it may be.
     fn seek(&self, effect: &'static dyn Effect, variant: f64, price: f64, is_strict: bool) -> Option<Scatter> {
         let judged = |block: &[usize]| {
-            let views: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
+            let views = self.views(block, |channel| &self.near[channel]);
             let sought = |views: &[View], open: f64| {
                 let is_possible = !is_strict || self.is_possible(effect, views);
                 let (theta, gain) = is_possible.then(|| most_likely(effect, variant, views))?;
@@ -269,9 +219,8 @@ impl<'a> Search<'a> {
             if block.iter().all(|channel| self.described[*channel].is_none()) {
                 return found;
             }
-            let near = |channel: &usize| self.described[*channel].as_ref().unwrap_or(&self.near[*channel]);
-            let described = block.iter().map(|channel| self.view_near(*channel, near(channel)));
-            let described: Vec<View> = described.collect();
+            let near = |channel: usize| self.described[channel].as_ref().unwrap_or(&self.near[channel]);
+            let described = self.views(block, near);
             let dragged = block.iter().filter(|channel| self.described[**channel].is_some());
             let open: f64 = dragged
                 .map(|channel| 0.5 * self.model.fitted.nuisance[*channel].norm_squared())
@@ -296,43 +245,37 @@ impl<'a> Search<'a> {
         let judged = |block: &[usize]| {
             let at = found.channels.iter().position(|channel| *channel == block[0]);
             let mut theta = found.thetas[at.unwrap_or(0)].clone();
-            let mut near: Vec<Vec<f64>> = block.iter().map(|channel| self.near[*channel].clone()).collect();
+            let before = self.views(block, |channel| &self.near[channel]);
+            let mut beneath = match at.filter(|_| variant == found.variant) {
+                Some(at) => found.beneath[at..at + block.len()].to_vec(),
+                None => effect.beneath(&theta, variant, &before),
+            };
             let mut best: Option<Block> = None;
             for _ in 0..STEPS {
-                let pairs = || {
-                    block
-                        .iter()
-                        .zip(&near)
-                        .map(|(channel, near)| self.view_near(*channel, near))
-                };
-                let beneath = effect.beneath(&theta, variant, &pairs().collect::<Vec<View>>());
-                let refits = block.iter().zip(&beneath);
-                let refits: Vec<_> = refits
+                let refits: Vec<_> = (block.iter().zip(&beneath))
                     .map(|(channel, rows)| recalibrated(self.problem, self.model, *channel, rows))
                     .collect();
                 let open: f64 = refits.iter().map(|refit| refit.gain).sum();
-                near = (block.iter().zip(&refits))
-                    .map(|(channel, refit)| self.near(*channel, &refit.predicted))
+                let near: Vec<(usize, Vec<f64>)> = (block.iter().zip(&refits))
+                    .map(|(channel, refit)| (*channel, self.near(*channel, &refit.predicted)))
                     .collect();
-                let views: Vec<View> = block
+                let views: Vec<View> = near
                     .iter()
-                    .zip(&near)
                     .map(|(channel, near)| self.view_near(*channel, near))
                     .collect();
                 if !self.is_possible(effect, &views) {
                     break;
                 }
-                let (found, gain) = most_likely(effect, variant, &views);
-                let before: Vec<View> = block.iter().map(|channel| self.view(*channel)).collect();
+                let (likeliest, gain) = most_likely(effect, variant, &views);
                 let gain = gain + nominal(&views) - nominal(&before) + open;
                 let brings = best.as_ref().map_or(f64::INFINITY, |best| gain - best.gain);
+                theta = likeliest;
+                beneath = effect.beneath(&theta, variant, &views);
                 if brings > 0.0 {
-                    theta = found;
-                    let beneath = effect.beneath(&theta, variant, &views);
                     best = Some(Block {
                         theta: theta.clone(),
                         gain,
-                        beneath,
+                        beneath: beneath.clone(),
                     });
                 }
                 if brings < CONVERGED {

@@ -1,0 +1,59 @@
+//! Whether a channel scatters otherwise than described, and how: what a search for effects on the scatter looks at first.
+
+use twin::{effect::View, predict::Kind};
+
+use crate::open::instant_sigma_s;
+
+/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
+const ODD: f64 = 2.0;
+
+/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
+/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+pub fn is_odd(view: &View) -> bool {
+    let sigma = view.channel.sigma();
+    let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
+    let samples = standard.len().max(1) as f64;
+    let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
+    let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
+    let root = samples.sqrt();
+    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
+        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
+        || alike.abs() * root > ODD
+}
+
+/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
+/// would otherwise swallow any effect the library does not have, and be believed.
+const COLOURED: f64 = 0.2;
+
+/// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
+/// and these must not make the rest of the log look alike.
+const CUT: f64 = 2.0;
+
+/// Median of the absolute value of a standard normal variable.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
+
+/// [nats] what a part's own clock explains of a log.
+pub fn own_clock(view: &View) -> f64 {
+    let sigma_s = instant_sigma_s(view.channel);
+    let is_polled = view.channel.bits.is_some() && view.channel.sensor != Kind::Thermometer;
+    let jitter = twin::effect::by_name("sampling-jitter").filter(|_| is_polled && sigma_s > 0.0);
+    jitter.map_or(0.0, |jitter| {
+        (jitter.log_likelihood(&[sigma_s], 0.0, &[*view]) - view.nominal()).max(0.0)
+    })
+}
+
+/// Whether neighbouring residuals are alike.
+pub fn is_coloured(view: &View) -> bool {
+    let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
+    let mut sizes: Vec<f64> = rest.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return false;
+    }
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let most = (CUT * median / MEDIAN_OF_NORMAL).max(f64::MIN_POSITIVE);
+    rest.iter_mut().for_each(|value| *value = value.clamp(-most, most));
+    let energy: f64 = rest.iter().map(|value| value * value).sum();
+    let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    alike > COLOURED * energy
+}
