@@ -69,10 +69,8 @@ impl Effect for StuckChannel {
     }
 
     fn expected(&self, variant: f64, view: &View) -> Vec<f64> {
-        let logged = view.measured.iter().zip(view.t_s);
-        let stuck = logged
-            .filter(|(value, t_s)| value.is_finite() && **t_s >= variant)
-            .next_back();
+        let mut logged = view.measured.iter().zip(view.t_s);
+        let stuck = logged.rfind(|(value, t_s)| value.is_finite() && **t_s >= variant);
         let rows = view.predicted.iter().zip(view.t_s);
         rows.map(|(predicted, t_s)| match stuck {
             Some((value, _)) if *t_s >= variant => *value,
