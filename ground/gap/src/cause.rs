@@ -59,6 +59,8 @@ pub struct Cause {
     pub share: f64,
     /// When it shows.
     pub when: String,
+    /// Which of what the effect may be, where its parameters do not say.
+    pub which: Option<String>,
     /// How to be sure.
     pub confirm_by: &'static str,
     /// What it is physically.
@@ -107,6 +109,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
                 Some(span) => format!("from {:.1} to {:.1} s", span.from, span.to),
                 None => regime::when(&feels, &energy),
             },
+            which: hypothesis.cause.effect.told(hypothesis.cause.variant),
             confirm_by: page.confirm_by,
             physics: page.physics,
         }
@@ -146,6 +149,7 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
         parameters,
         share: 2.0 * scatter.gain,
         when: "throughout".to_owned(),
+        which: scatter.effect.told(scatter.variant),
         confirm_by: page.confirm_by,
         physics: page.physics,
         is_suspicious: false,

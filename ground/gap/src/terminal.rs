@@ -242,6 +242,9 @@ fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::f
             subject.names(cause.channels.iter().copied()).join(" "),
             cause.when
         )?;
+        if let Some(which) = &cause.which {
+            writeln!(text, "        which: {which}")?;
+        }
         writeln!(text, "        confirm: {}", cause.confirm_by)?;
     }
     if !diagnosis.withdrawn.is_empty() {

@@ -2,6 +2,7 @@
 
 mod gyros;
 
+use gap::terminal;
 use gyros::{diagnosed_in, erring, rewritten};
 use tempfile::TempDir;
 use twin::effect::kin;
@@ -61,6 +62,13 @@ fn a_bit_that_sticks_is_named_beneath_what_the_calibration_took_of_it() {
         let (names, none, _) = said(&stuck, &kin("bit-fault"));
         assert!(none > 0.9, "{bit}: {names:?} {none}");
     }
+}
+
+#[test]
+fn the_screen_says_which_bit() {
+    let (subject, diagnosis) = diagnosed_in(&coded(|code, _| code | 16), &[]);
+    let screen = terminal::screen(&subject, &diagnosis, "");
+    assert!(screen.contains("which: bit 4 is always 1"), "{screen}");
 }
 
 /// Cut off, readings are low by half a step on the whole, which a calibration takes for a zero that is off, of steps that are

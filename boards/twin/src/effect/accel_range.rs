@@ -45,6 +45,13 @@ impl Effect for AccelRange {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            factor if factor > 0.0 => format!("readings are divided by {factor}"),
+            limit => format!("readings end at {:.0} m/s2", -limit),
+        })
+    }
+
     /// Factors, and limits [m/s2] negated.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         FACTORS.into_iter().chain(LIMITS).collect()

@@ -53,6 +53,20 @@ impl Effect for AxisOrder {
         chain.aim.axis_b = site.unit.channels[chip[order[place]]].axis_b * sign;
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let number = variant as u32;
+        if number >= SIGNED {
+            let gain = GAINS.get((number - SIGNED) as usize)?;
+            return Some(format!("the gain is that of {gain} counts per gauss"));
+        }
+        let (order, axes) = (ORDERS[(number / 8) as usize], ["x", "y", "z"]);
+        let reads = |place: usize| {
+            let sign = if number >> place & 1 == 1 { "-" } else { "" };
+            format!("{} reads {sign}{}", axes[place], axes[order[place]])
+        };
+        Some((0..3).map(reads).collect::<Vec<_>>().join(", "))
+    }
+
     /// All but the described order, then all but the nominal gain.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         let gains = (0..GAINS.len()).filter(|&i| GAINS[i] != NOMINAL_GAIN);

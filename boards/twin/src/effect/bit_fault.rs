@@ -121,6 +121,13 @@ impl Effect for BitFault {
         view.mean_of_codes(|code| f64::from(forced(code as i16, variant as i16)))
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant as i16 {
+            EXCHANGED => "the bytes are exchanged".to_owned(),
+            number => format!("bit {} is always {}", number / 2, number % 2),
+        })
+    }
+
     /// `2 bit` for stuck at 0, `2 bit + 1` for stuck at 1, then exchanged bytes.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         (0..=EXCHANGED).map(f64::from).collect()

@@ -121,6 +121,11 @@ impl Effect for CoarseQuantisation {
         Some(-variant)
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let how = if variant > 0.0 { "rounded" } else { "cut off" };
+        Some(format!("steps of {} counts, {how}", variant.abs().exp2()))
+    }
+
     /// Bits that are missing; negative where they are cut off instead of rounded.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         (1..=4).flat_map(|bits| [f64::from(bits), -f64::from(bits)]).collect()

@@ -53,6 +53,14 @@ impl Effect for CurrentField {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            WITH_RATE => "with the turning rate".to_owned(),
+            WHILE_TURNING => "while it turns".to_owned(),
+            onset_s => format!("from {onset_s:.0} s on"),
+        })
+    }
+
     /// With the rate, while turning, then onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         [WITH_RATE, WHILE_TURNING].into_iter().chain(onsets(starts_s)).collect()

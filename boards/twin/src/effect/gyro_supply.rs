@@ -51,6 +51,13 @@ impl Effect for GyroSupply {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            RAMP => "a ramp over the log".to_owned(),
+            onset_s => format!("a step at {onset_s:.0} s"),
+        })
+    }
+
     /// A ramp, then onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         core::iter::once(RAMP).chain(onsets(starts_s)).collect()

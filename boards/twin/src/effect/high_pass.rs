@@ -36,6 +36,10 @@ impl Effect for HighPass {
         chain.high_pass_s = Some(1.0 / (TAU * variant));
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("with a corner of {variant} Hz"))
+    }
+
     /// Corners [Hz].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         CORNERS_HZ.to_vec()

@@ -52,6 +52,13 @@ impl Effect for Hysteresis {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            onset_s if onset_s >= 0.0 => format!("a step at {onset_s:.0} s"),
+            width => format!("a play of {:.2} m/s2 to either side", -width),
+        })
+    }
+
     /// Half-widths [m/s2] of the play, negated, then onsets [s] of a step.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         HALF_WIDTHS

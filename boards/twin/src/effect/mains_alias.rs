@@ -55,6 +55,10 @@ impl Effect for MainsAlias {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("at {variant:.3} Hz"))
+    }
+
     /// Frequencies [Hz], as close as the log can tell apart.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         let span_s = starts_s.last().unwrap_or(&0.0) - starts_s.first().unwrap_or(&0.0);

@@ -222,6 +222,11 @@ pub trait Effect: Sync {
         vec![0.0]
     }
 
+    /// What a variant says, in words, where the page does not: which bit, which axis, since when.
+    fn told(&self, _variant: f64) -> Option<String> {
+        None
+    }
+
     /// The variant that these channels, in which it was found, tell together, where those tried stand too far apart or the
     /// likelihood averages over them.
     fn settled(&self, _views: &[View]) -> Option<f64> {

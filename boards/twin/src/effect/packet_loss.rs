@@ -33,6 +33,10 @@ impl Effect for PacketLoss {
         chain.read_late(move |t_s| step_s * f64::from(t_s >= variant));
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("from {variant:.0} s on"))
+    }
+
     /// Onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         onsets(starts_s).collect()

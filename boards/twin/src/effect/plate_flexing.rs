@@ -56,6 +56,15 @@ impl Effect for PlateFlexing {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let load = match variant {
+            OF_FORCE => "the specific force",
+            ON_FACE => "the specific force on its face",
+            _ => "the square of the rate",
+        };
+        Some(format!("with {load}"))
+    }
+
     /// With the square of the rate, with the force, with the force on the face.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0, OF_FORCE, ON_FACE]

@@ -43,6 +43,11 @@ impl Effect for PlateRotation {
         chain.aim.axis_b = turn * chain.aim.axis_b;
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let axis = ["x", "y", "z"].get((variant as usize).checked_sub(1)?)?;
+        Some(format!("beyond half a turn about the plate's {axis}"))
+    }
+
     /// As described, or half a turn about an axis of the plate: 1, 2, 3.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0, 1.0, 2.0, 3.0]

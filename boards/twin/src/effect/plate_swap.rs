@@ -60,6 +60,17 @@ impl Effect for PlateSwap {
         }
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let number = variant as usize;
+        let pair = [number % GROUPS, number / GROUPS % GROUPS].map(|group| group + 1);
+        let what = ["all sensors", "the accelerometers", "the gyros", "the magnetometers"];
+        let what = what[number / (GROUPS * GROUPS) % KINDS.len()];
+        Some(format!(
+            "{what} of plates {} and {}, in the order of the file",
+            pair[0], pair[1]
+        ))
+    }
+
     /// Pairs of up to four groups, whole or by kind: `first + 16 second + 256 kind`. Pairs that the unit has not change
     /// nothing.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {

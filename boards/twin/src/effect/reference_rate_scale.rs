@@ -64,6 +64,15 @@ impl Effect for ReferenceRateScale {
         }
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let of = if variant == OF_ATTITUDES {
+            "angle about the vertical"
+        } else {
+            "rates"
+        };
+        Some(format!("of the {of}"))
+    }
+
     /// A table tells no attitudes.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         match starts_s.len() <= MOST_ROWS {

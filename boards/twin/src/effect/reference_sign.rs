@@ -87,6 +87,26 @@ impl Effect for ReferenceSign {
         (variant < 0.0).then(|| truly(feel, signs(-variant as u32), environment.earth_rate_n()))
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let number = variant.abs() as u32;
+        let axes = ["x", "y", "z"].into_iter().enumerate();
+        let axes: Vec<&str> = axes
+            .filter(|(axis, _)| number >> axis & 1 == 1)
+            .map(|(_, name)| name)
+            .collect();
+        let of = if variant < 0.0 {
+            "of the attitude's quaternion"
+        } else {
+            "of the rate"
+        };
+        let row = if variant >= 8.0 {
+            format!(", in row {}", (variant / 8.0).floor())
+        } else {
+            String::new()
+        };
+        Some(format!("{} {of}{row}", axes.join(" and ")))
+    }
+
     /// Signs of the rate on all rows; then, in a table, on each, and elsewhere signs of the attitude.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         let of_rates = SIGNS.map(f64::from);

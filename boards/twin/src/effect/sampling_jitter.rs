@@ -120,6 +120,15 @@ impl Effect for SamplingJitter {
         views.iter().map(disturbed).collect()
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        let what = if variant == OF_CYCLE {
+            "a cycle as a whole"
+        } else {
+            "each reading by itself"
+        };
+        Some(format!("{what} is early or late"))
+    }
+
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![OF_READINGS, OF_CYCLE]
     }

@@ -41,6 +41,10 @@ impl Effect for Saturation {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("at {variant:.1} deg/s"))
+    }
+
     /// Limits [deg/s].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         (0..LIMITS)

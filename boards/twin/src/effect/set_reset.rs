@@ -30,6 +30,10 @@ impl Effect for SetReset {
         chain.add(move |feel, input| f64::from(feel.t_s >= variant) * (gain * input + offset));
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("from {variant:.0} s on"))
+    }
+
     /// Onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         onsets(starts_s).collect()

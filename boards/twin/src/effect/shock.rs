@@ -74,6 +74,10 @@ impl Effect for Shock {
         views.iter().map(hit).collect()
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("blows of some {variant} times the noise"))
+    }
+
     /// How many times as far they scatter.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![5.0, 20.0, 100.0]

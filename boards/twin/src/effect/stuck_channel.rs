@@ -96,6 +96,10 @@ impl Effect for StuckChannel {
         views.iter().filter_map(of).reduce(f64::max)
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("from {variant:.1} s on"))
+    }
+
     /// Onsets [s]; the first is the start of the log.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         starts_s.first().copied().into_iter().chain(onsets(starts_s)).collect()

@@ -151,6 +151,28 @@ fn what_is_mistaken_for_another_is_its_kin_whichever_page_says_so() {
 }
 
 #[test]
+fn what_a_variant_says_is_said_and_each_says_another_thing() {
+    let starts_s: Vec<f64> = (0..3000).map(|k| 0.2 * f64::from(k)).collect();
+    for effect in LIBRARY.iter().filter(|effect| effect.variants(&starts_s).len() > 2) {
+        let mut told: Vec<String> = effect
+            .variants(&starts_s)
+            .into_iter()
+            .filter_map(|v| effect.told(v))
+            .collect();
+        let count = told.len();
+        told.sort_unstable();
+        told.dedup();
+        let name = effect.page().name;
+        assert!(count >= 2 && told.len() == count, "{name}: {} of {count}", told.len());
+    }
+    assert_eq!(by_name("bit-fault").unwrap().told(7.0).unwrap(), "bit 3 is always 1");
+    assert_eq!(
+        by_name("mag-axis-order").unwrap().told(17.0).unwrap(),
+        "x reads -y, y reads x, z reads z"
+    );
+}
+
+#[test]
 fn every_page_is_written_and_its_siblings_exist() {
     for effect in LIBRARY {
         let page = effect.page();

@@ -223,6 +223,14 @@ impl Effect for Vibration {
         Some(cycles / (BLOCK as f64 * step_s(views.first()?)))
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            WANDERS => "of a frequency that wanders".to_owned(),
+            hz if hz > 0.0 => format!("at {hz:.3} Hz, as sampled"),
+            _ => return None,
+        })
+    }
+
     /// Any frequency: the likelihood averages over them, unless the variant says which [Hz]. To inject, 0 is a drawn one.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0, WANDERS]

@@ -39,6 +39,13 @@ impl Effect for VibrationRectification {
         });
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(match variant {
+            TURNING => "with the square of the rate".to_owned(),
+            onset_s => format!("from {onset_s:.0} s on"),
+        })
+    }
+
     /// With the turning rate, then onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         core::iter::once(TURNING).chain(onsets(starts_s)).collect()

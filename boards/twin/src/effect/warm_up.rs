@@ -34,6 +34,10 @@ impl Effect for WarmUp {
         chain.add(move |feel, _| amplitude * (-feel.t_s / variant).exp());
     }
 
+    fn told(&self, variant: f64) -> Option<String> {
+        Some(format!("with a time constant of {variant:.0} s"))
+    }
+
     /// Time constants [s].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![20.0, 40.0, 80.0, 160.0, 320.0]
