@@ -12,7 +12,8 @@
 //! velocity `v`: 17 error states. The bias alone does not do: on hand-moved recordings the filter without `M` ends 60 %
 //! worse, because a scale error of half a percent turns into degrees within a minute.
 //!
-//! **Propagation** is exact for the attitude: `q <- q(-earth rate dt) q q(increment)`. The error obeys
+//! **Propagation** is exact for the attitude: `q <- q(-earth rate dt - C wrong) q q(increment)` with what the gyros are
+//! known to be wrong by, in the mean attitude `C` of the step (`path`). The error obeys
 //! `da/dt = -dcm_nb (db + dM gyro)`; its integral over a window is gathered sample by sample and the covariance follows
 //! once a window.
 //!
@@ -37,6 +38,7 @@ mod field;
 mod innovation;
 mod iron;
 mod params;
+mod path;
 mod start;
 mod step;
 mod window;
@@ -82,6 +84,8 @@ pub struct Filter {
     pub aligned: bool,
     window: Window,
     rate_b: Vector3<f32>,
+    /// [rad/s] as the gyros had it at the end of the step before.
+    gyro_b: Option<Vector3<f32>>,
     last_us: Option<u64>,
     /// [s] since the gyros were last heard.
     silent_s: f32,
@@ -109,6 +113,7 @@ impl Filter {
             aligned: false,
             window: Window::default(),
             rate_b: Vector3::zeros(),
+            gyro_b: None,
             last_us: None,
             silent_s: 0.0,
             rejected_s: [0.0; 2],
@@ -182,16 +187,24 @@ impl Filter {
 
     /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
     fn propagate(&mut self, step: &Step, covered_s: f32, gap_s: f32, rotation: bool) -> Matrix3<f32> {
-        let before = dcm_nb(&self.q_nb);
         let gyro_b = if rotation { step.angle_b } else { Vector3::zeros() };
-        let turned_b = gyro_b - self.gyro_matrix * gyro_b - self.bias_b * covered_s + self.rate_b * gap_s;
-        let earth_n = self.params.earth_rate_n * -(covered_s + gap_s);
-        self.q_nb = renormalised(from_rotation_vector(earth_n) * self.q_nb * from_rotation_vector(turned_b));
+        let began_b = core::mem::replace(&mut self.gyro_b, rotation.then_some(step.rate_b));
+        let rates_b = began_b
+            .filter(|_| gap_s < HALF_A_MILLISECOND)
+            .map(|began_b| [began_b, step.rate_b]);
+        // The gap comes before what the increment covers.
+        let bridged_b = self.rate_b * gap_s;
+        if gap_s > 0.0 {
+            self.q_nb *= from_rotation_vector(bridged_b);
+        }
+        let (ended_nb, mean) = path::through(&self.q_nb, &gyro_b, rates_b, covered_s);
+        let wrong_b = self.gyro_matrix * gyro_b + self.bias_b * covered_s;
+        let moved_n = mean * wrong_b + self.params.earth_rate_n * (covered_s + gap_s);
+        self.q_nb = renormalised(from_rotation_vector(-moved_n) * ended_nb);
         let after = dcm_nb(&self.q_nb);
-        let mean = (before + after) * 0.5;
         let params = &self.params;
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
-            + params.turn_noise * params.turn_noise * turned_b.norm();
+            + params.turn_noise * params.turn_noise * (gyro_b - wrong_b + bridged_b).norm();
         // The rate missed is one and the same all through a gap, however many steps it lasts.
         let silent_s = self.silent_s + gap_s.max(0.0);
         variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
