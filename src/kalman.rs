@@ -57,7 +57,7 @@ use self::{
     covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
     innovation::Correction,
     start::UNKNOWN,
-    window::{Means, Window},
+    window::{FieldSums, MeanField, Means, Window},
 };
 use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
@@ -109,7 +109,7 @@ impl Filter {
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
             reference: params.field,
-            iron: HardIron::none(),
+            iron: HardIron::none(&params),
             aligned: false,
             window: Window::default(),
             rate_b: Vector3::zeros(),
@@ -249,6 +249,12 @@ impl Filter {
         let means = window.means(&self.params, lift_off);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
+        let iron_b = self.iron.iron_b;
+        if let Some(sums) = &means.field
+            && self.iron.learn(&self.params, means.duration_s, sums)
+        {
+            self.reference.have_other_iron(&self.params, &iron_b);
+        }
         if !self.aligned {
             self.covariance.predict(&self.params, &window, &means);
             outcome.aligned = self.align(&means, UNKNOWN);
@@ -326,10 +332,9 @@ impl Filter {
     /// disturbed for its rejection to say anything of the attitude.
     fn compare_field(&mut self, window: &Window, means: &Means, correction: &mut Correction) -> Option<bool> {
         let sums = means.field?;
-        self.iron.learn(&self.params, &sums);
         self.reference
             .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
-        let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
+        let compared = self.reference.compare(&self.params, &self.mean_field(&sums))?;
         let disturbed = compared.disturbance > self.params.field_gate;
         self.disturbed_s = if disturbed {
             self.disturbed_s + means.duration_s
@@ -345,6 +350,13 @@ impl Filter {
         }
         correction.usable = true;
         (!disturbed).then_some(accepted)
+    }
+
+    /// The mean field of a window without the iron, as far as that is known.
+    fn mean_field(&self, sums: &FieldSums) -> MeanField {
+        let mut mean = sums.mean(&self.iron.iron_b);
+        mean.white += self.iron.variance(sums);
+        mean
     }
 
     fn inject(&mut self, correction: &Correction) {

@@ -132,6 +132,21 @@ impl Reference {
         (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 
+    /// The iron is another from now on; until now it was `iron_b` [uT]. A reference that was complete stands, a younger one
+    /// is learnt afresh.
+    pub(super) fn have_other_iron(&mut self, params: &Params, iron_b: &Vector3<f32>) {
+        if self.learnt_s < params.learn_s {
+            let declination = self.declination;
+            *self = Reference {
+                declination,
+                ..Reference::unknown()
+            };
+        } else {
+            self.raw_n -= self.turned * iron_b;
+            self.turned = Matrix3::zeros();
+        }
+    }
+
     /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
     pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
         if self.learnt_s.is_infinite() {

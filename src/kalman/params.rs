@@ -75,6 +75,11 @@ pub struct Params {
     pub iron_noise_ut: f32,
     /// [1] by how much more a window counts less whose field moves.
     pub iron_per_spread: f32,
+    /// [s] iron that comes or goes is looked for in the windows of so long. Small: what passes is taken for iron of the unit;
+    /// large: a magnet is noticed late.
+    pub iron_change_s: f32,
+    /// [uT] such iron on each axis, standard deviation.
+    pub iron_change_sd_ut: f32,
     /// The field at the site, or one to be learnt in the first [`Params::learn_s`].
     pub field: Reference,
     /// [s] how long the field is learnt.
@@ -152,6 +157,8 @@ impl Params {
         iron_sd_ut: 1.5,
         iron_noise_ut: 2.0,
         iron_per_spread: 30.0,
+        iron_change_s: 4.0,
+        iron_change_sd_ut: 60.0,
         field: Reference::unknown(),
         learn_s: 20.0,
     };

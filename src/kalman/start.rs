@@ -44,7 +44,7 @@ impl Filter {
         let (Some(sums), true) = (means.field, means.near_one_g) else {
             return false;
         };
-        let mean = sums.mean(&self.iron.iron_b);
+        let mean = self.mean_field(&sums);
         let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
         let down = Sighting {
             seen_b: -means.acc_n,

@@ -108,6 +108,7 @@ fn tilted() -> UnitQuaternion<f32> {
 fn nothing(_: f32, _: &mut Step) {}
 
 mod hostile;
+mod iron;
 
 #[test]
 fn at_rest_it_aligns_within_a_window_and_stays() {

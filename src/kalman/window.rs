@@ -53,7 +53,8 @@ pub struct MeanField {
     pub mag_n: Vector3<f32>,
     /// [uT^2] mean square distance of the samples from it.
     pub spread: f32,
-    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise.
+    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise, and by what is not
+    /// known of the iron.
     pub white: f32,
 }
 
