@@ -20,11 +20,16 @@
 //! **Accelerometers** measure tilt only as far as the velocity is bounded: what a tilt `a` adds to the horizontal
 //! velocity, `dv/dt = -g (a_E, -a_N)`, goes on growing, what hand, wind or table do to it does not. So specific force is
 //! summed in n to a velocity and compared with zero, once a window. Single samples of a shaken unit are worth nothing,
-//! ten seconds of them are worth a tenth of a degree.
+//! ten seconds of them are worth a tenth of a degree. What moves too fast for the samples is seen in their second
+//! differences, or, where it is folded down to nothing that moves, along the vertical.
 //!
 //! **Magnetometers** are averaged in n over the window and compared with the reference along two axes across the field:
 //! east (heading) and in the meridian (dip), each with its own variance. What norm and dip show of a disturbance says
 //! how large it is, and a disturbance has no preferred direction: that variance is added to both.
+//!
+//! **What is wrong with both lasts** longer than a window: a corner of the room has its own north, a hand its own sway. The gain
+//! takes such windows for one witness ([`Params::field_lasts_s`]), by a variance as many times larger; the record of an
+//! innovation has the variance that its residual shows.
 //!
 //! Scalars one at a time, Joseph's form, a gate each. What is rejected for [`Params::recovery_s`] starts the attitude
 //! afresh with TRIAD, so no gate locks the filter out; so does an attitude that is no longer known to
@@ -55,7 +60,7 @@ pub use self::{
 };
 use self::{
     covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
-    innovation::Correction,
+    innovation::{Correction, Noise},
     start::UNKNOWN,
     window::{FieldSums, MeanField, Means, Window},
 };
@@ -245,7 +250,8 @@ impl Filter {
 
     /// A window is complete: covariance over it, then everything it measured.
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
-        let window = core::mem::take(&mut self.window);
+        let following = self.window.following(&self.params);
+        let window = core::mem::replace(&mut self.window, following);
         let means = window.means(&self.params, lift_off);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
@@ -272,7 +278,7 @@ impl Filter {
         let velocity = means.vertical.then(|| self.compare_velocity(&means, &mut correction));
         if velocity.is_none() {
             self.velocity_n = Vector2::zeros();
-            self.covariance.forget_velocity(self.params.velocity_sd);
+            self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
         }
         let field = self.compare_field(&window, &means, &mut correction);
         self.inject(&correction);
@@ -285,7 +291,7 @@ impl Filter {
     /// whatever was believed before.
     fn compare_rest(&mut self, means: &Means, correction: &mut Correction) {
         let earth_b = self.q_nb.inverse_transform_vector(&self.params.earth_rate_n);
-        let variance = square(self.params.rest.bias_sd) + means.rate_variance;
+        let noise = Noise::white(square(self.params.rest.bias_sd) + means.rate_variance);
         if self.bias_rejected_s >= self.params.recovery_s {
             self.bias_rejected_s = 0.0;
             self.covariance.forget_bias(self.params.bias_sd);
@@ -300,7 +306,7 @@ impl Filter {
                 self.bias_b[axis],
                 measured,
                 &rows,
-                variance,
+                noise,
             );
         }
         self.bias_rejected_s = if accepted {
@@ -312,18 +318,12 @@ impl Filter {
 
     /// The velocity is bounded: zero is measured of it.
     fn compare_velocity(&mut self, means: &Means, correction: &mut Correction) -> bool {
+        let noise = Noise::lasting(means.velocity_variance, self.params.velocity_lasts_s, means.duration_s);
         let mut accepted = true;
         for axis in 0..2 {
             let rows = [(VELOCITY + axis, 1.0)];
-            let (predicted, variance) = (self.velocity_n[axis], means.velocity_variance);
-            accepted &= correction.compare(
-                &mut self.covariance,
-                Quantity::Velocity,
-                predicted,
-                0.0,
-                &rows,
-                variance,
-            );
+            let predicted = self.velocity_n[axis];
+            accepted &= correction.compare(&mut self.covariance, Quantity::Velocity, predicted, 0.0, &rows, noise);
         }
         accepted
     }
@@ -334,7 +334,9 @@ impl Filter {
         let sums = means.field?;
         self.reference
             .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
-        let compared = self.reference.compare(&self.params, &self.mean_field(&sums))?;
+        let compared = self
+            .reference
+            .compare(&self.params, means.duration_s, &self.mean_field(&sums))?;
         let disturbed = compared.disturbance > self.params.field_gate;
         self.disturbed_s = if disturbed {
             self.disturbed_s + means.duration_s
@@ -346,7 +348,7 @@ impl Filter {
         for scalar in &compared.scalars {
             let (quantity, rows) = (scalar.quantity, &window.mean_rows(&scalar.row_n));
             let covariance = &mut self.covariance;
-            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.variance);
+            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.noise);
         }
         correction.usable = true;
         (!disturbed).then_some(accepted)

@@ -14,7 +14,9 @@
 use nalgebra::{ComplexField, Matrix3, RealField, Vector3};
 
 use super::{
-    Params, Quantity, square,
+    Params, Quantity,
+    innovation::Noise,
+    square,
     window::{FieldSums, MeanField},
 };
 use crate::attitude::sin_cos;
@@ -41,7 +43,7 @@ pub struct Scalar {
     pub residual: f32,
     /// What it sees of the attitude error, in n.
     pub row_n: Vector3<f32>,
-    pub variance: f32,
+    pub noise: Noise,
 }
 
 /// The field of a window.
@@ -74,7 +76,7 @@ impl Reference {
 
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
-    pub(super) fn compare(&self, params: &Params, mean: &MeanField) -> Option<Compared> {
+    pub(super) fn compare(&self, params: &Params, duration_s: f32, mean: &MeanField) -> Option<Compared> {
         let (north, east) = self.magnetic(&mean.mag_n);
         let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
         let dip = RealField::atan2(mean.mag_n.z, horizontal);
@@ -84,6 +86,7 @@ impl Reference {
         let (sin, cos) = sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
         let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
+        let noise = |sd: f32| Noise::lasting(square(sd), params.field_lasts_s, duration_s).and_white(seen);
         // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
         let (sin_d, cos_d) = sin_cos(self.declination);
         Some(Compared {
@@ -92,13 +95,13 @@ impl Reference {
                     quantity: Quantity::FieldEast,
                     residual: -cos * RealField::atan2(east, north),
                     row_n: Vector3::new(-sin * cos_d, -sin * sin_d, cos),
-                    variance: square(params.heading_sd * cos) + seen,
+                    noise: noise(params.heading_sd * cos),
                 },
                 Scalar {
                     quantity: Quantity::FieldMeridian,
                     residual: self.dip - dip,
                     row_n: Vector3::new(sin_d, -cos_d, 0.0),
-                    variance: square(params.dip_sd) + seen,
+                    noise: noise(params.dip_sd),
                 },
             ],
             disturbance: ComplexField::sqrt(disturbance),

@@ -37,6 +37,10 @@ fn begun_beside_a_magnet(params: Params) -> f32 {
             ..params
         },
     );
+    // A second of slow turning before: the magnet hardly averages out of it.
+    world.fly(1.0, Vector3::new(0.2, 0.1, 0.3), |_, step| {
+        step.mag.as_mut().unwrap().value_b += MAGNET_B;
+    });
     turn(&mut world, 15, MAGNET_B);
     world.off()
 }
