@@ -30,6 +30,10 @@ pub struct Reference {
     pub dip: f32,
     /// [rad] magnetic north, east of north.
     pub declination: f32,
+    /// North is where the field was found.
+    found: bool,
+    /// [rad] it was found in n.
+    found_at: f32,
     learnt_s: f32,
     /// [uT] mean in n while it was learnt, hard iron included.
     raw_n: Vector3<f32>,
@@ -60,17 +64,28 @@ impl Reference {
             norm_ut,
             dip,
             declination,
+            found: false,
+            found_at: 0.0,
             learnt_s: f32::INFINITY,
             raw_n: Vector3::new(0.0, 0.0, 0.0),
             turned: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         }
     }
 
-    /// One to be learnt; north is magnetic.
+    /// One to be learnt; north is where it is found. Iron that is learnt after that turns the field away from north, and not
+    /// north from where it was.
     pub const fn unknown() -> Self {
         Reference {
+            found: true,
+            ..Reference::at_site(0.0)
+        }
+    }
+
+    /// One to be learnt at a site whose declination [rad] is known.
+    pub const fn at_site(declination: f32) -> Self {
+        Reference {
             learnt_s: 0.0,
-            ..Reference::known(0.0, 0.0, 0.0)
+            ..Reference::known(0.0, 0.0, declination)
         }
     }
 
@@ -139,10 +154,10 @@ impl Reference {
     /// is learnt afresh.
     pub(super) fn have_other_iron(&mut self, params: &Params, iron_b: &Vector3<f32>) {
         if self.learnt_s < params.learn_s {
-            let declination = self.declination;
-            *self = Reference {
-                declination,
-                ..Reference::unknown()
+            *self = if self.found {
+                Reference::unknown()
+            } else {
+                Reference::at_site(self.declination)
             };
         } else {
             self.raw_n -= self.turned * iron_b;
@@ -150,18 +165,26 @@ impl Reference {
         }
     }
 
-    /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
+    /// The mean field so far, while the reference is young, and norm, dip and direction of it without `iron_b` \[uT\].
     pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
         if self.learnt_s.is_infinite() {
             return;
         }
-        if self.learnt_s < params.learn_s {
+        let learning = self.learnt_s < params.learn_s;
+        if learning {
             self.learnt_s += duration_s;
             let part = duration_s / self.learnt_s;
             self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
             self.turned += (sums.turned / sums.count - self.turned) * part;
         }
         let field_n = self.raw_n - self.turned * iron_b;
+        if self.found {
+            let points_at = RealField::atan2(field_n.y, field_n.x);
+            if learning {
+                self.found_at = points_at;
+            }
+            self.declination = points_at - self.found_at;
+        }
         self.norm_ut = field_n.norm();
         self.dip = RealField::atan2(field_n.z, ComplexField::sqrt(field_n.xy().norm_squared()));
     }

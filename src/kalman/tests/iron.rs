@@ -74,3 +74,24 @@ fn a_magnet_on_its_way_past_is_no_iron_of_the_unit() {
     let found_b = world.filter.iron.iron_b;
     assert!(found_b.norm() < 0.5, "{found_b}");
 }
+
+/// [deg] heading error at the end of a rest with a little iron, and after a minute of turning that shows it.
+fn headings_with_little_iron(field: Reference) -> [f32; 2] {
+    let iron_b = Vector3::new(0.0, 2.0, 0.0);
+    let mut world = World::new(UnitQuaternion::identity(), Params { field, ..params() });
+    world.fly(25.0, Vector3::zeros(), |_, step| {
+        step.mag.as_mut().unwrap().value_b += iron_b;
+    });
+    let at_first = world.off() / DEG;
+    turn(&mut world, 60, iron_b);
+    assert!((world.filter.iron.iron_b - iron_b).norm() < 0.5);
+    [at_first, world.off() / DEG]
+}
+
+#[test]
+fn north_that_was_found_stays_and_that_of_a_site_comes_true() {
+    let [at_first, found] = headings_with_little_iron(Reference::unknown());
+    assert!(at_first > 5.0 && (found - at_first).abs() < 1.0, "{at_first} {found}");
+    let [at_first, of_site] = headings_with_little_iron(Reference::at_site(0.0));
+    assert!(at_first > 5.0 && of_site < found - 1.0, "{at_first} {of_site}");
+}
