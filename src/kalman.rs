@@ -12,18 +12,24 @@
 //! velocity `v`: 17 error states. The bias alone does not do: on hand-moved recordings the filter without `M` ends 60 %
 //! worse, because a scale error of half a percent turns into degrees within a minute.
 //!
-//! **Propagation** is exact for the attitude: `q <- q(-earth rate dt) q q(increment)`. The error obeys
+//! **Propagation** is exact for the attitude: `q <- q(-earth rate dt - C wrong) q q(increment)` with what the gyros are
+//! known to be wrong by, in the mean attitude `C` of the step (`path`). The error obeys
 //! `da/dt = -dcm_nb (db + dM gyro)`; its integral over a window is gathered sample by sample and the covariance follows
 //! once a window.
 //!
 //! **Accelerometers** measure tilt only as far as the velocity is bounded: what a tilt `a` adds to the horizontal
 //! velocity, `dv/dt = -g (a_E, -a_N)`, goes on growing, what hand, wind or table do to it does not. So specific force is
 //! summed in n to a velocity and compared with zero, once a window. Single samples of a shaken unit are worth nothing,
-//! ten seconds of them are worth a tenth of a degree.
+//! ten seconds of them are worth a tenth of a degree. What moves too fast for the samples is seen in their second
+//! differences, or, where it is folded down to nothing that moves, along the vertical.
 //!
 //! **Magnetometers** are averaged in n over the window and compared with the reference along two axes across the field:
 //! east (heading) and in the meridian (dip), each with its own variance. What norm and dip show of a disturbance says
 //! how large it is, and a disturbance has no preferred direction: that variance is added to both.
+//!
+//! **What is wrong with both lasts** longer than a window: a corner of the room has its own north, a hand its own sway. The gain
+//! takes such windows for one witness ([`Params::field_lasts_s`]), by a variance as many times larger; the record of an
+//! innovation has the variance that its residual shows.
 //!
 //! Scalars one at a time, Joseph's form, a gate each. What is rejected for [`Params::recovery_s`] starts the attitude
 //! afresh with TRIAD, so no gate locks the filter out; so does an attitude that is no longer known to
@@ -37,6 +43,7 @@ mod field;
 mod innovation;
 mod iron;
 mod params;
+mod path;
 mod start;
 mod step;
 mod window;
@@ -53,9 +60,9 @@ pub use self::{
 };
 use self::{
     covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
-    innovation::Correction,
+    innovation::{Correction, Noise},
     start::UNKNOWN,
-    window::{Means, Window},
+    window::{FieldSums, MeanField, Means, Window},
 };
 use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
@@ -82,6 +89,8 @@ pub struct Filter {
     pub aligned: bool,
     window: Window,
     rate_b: Vector3<f32>,
+    /// [rad/s] as the gyros had it at the end of the step before.
+    gyro_b: Option<Vector3<f32>>,
     last_us: Option<u64>,
     /// [s] since the gyros were last heard.
     silent_s: f32,
@@ -105,10 +114,11 @@ impl Filter {
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
             reference: params.field,
-            iron: HardIron::none(),
+            iron: HardIron::none(&params),
             aligned: false,
             window: Window::default(),
             rate_b: Vector3::zeros(),
+            gyro_b: None,
             last_us: None,
             silent_s: 0.0,
             rejected_s: [0.0; 2],
@@ -182,16 +192,24 @@ impl Filter {
 
     /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
     fn propagate(&mut self, step: &Step, covered_s: f32, gap_s: f32, rotation: bool) -> Matrix3<f32> {
-        let before = dcm_nb(&self.q_nb);
         let gyro_b = if rotation { step.angle_b } else { Vector3::zeros() };
-        let turned_b = gyro_b - self.gyro_matrix * gyro_b - self.bias_b * covered_s + self.rate_b * gap_s;
-        let earth_n = self.params.earth_rate_n * -(covered_s + gap_s);
-        self.q_nb = renormalised(from_rotation_vector(earth_n) * self.q_nb * from_rotation_vector(turned_b));
+        let began_b = core::mem::replace(&mut self.gyro_b, rotation.then_some(step.rate_b));
+        let rates_b = began_b
+            .filter(|_| gap_s < HALF_A_MILLISECOND)
+            .map(|began_b| [began_b, step.rate_b]);
+        // The gap comes before what the increment covers.
+        let bridged_b = self.rate_b * gap_s;
+        if gap_s > 0.0 {
+            self.q_nb *= from_rotation_vector(bridged_b);
+        }
+        let (ended_nb, mean) = path::through(&self.q_nb, &gyro_b, rates_b, covered_s);
+        let wrong_b = self.gyro_matrix * gyro_b + self.bias_b * covered_s;
+        let moved_n = mean * wrong_b + self.params.earth_rate_n * (covered_s + gap_s);
+        self.q_nb = renormalised(from_rotation_vector(-moved_n) * ended_nb);
         let after = dcm_nb(&self.q_nb);
-        let mean = (before + after) * 0.5;
         let params = &self.params;
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
-            + params.turn_noise * params.turn_noise * turned_b.norm();
+            + params.turn_noise * params.turn_noise * (gyro_b - wrong_b + bridged_b).norm();
         // The rate missed is one and the same all through a gap, however many steps it lasts.
         let silent_s = self.silent_s + gap_s.max(0.0);
         variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
@@ -232,10 +250,17 @@ impl Filter {
 
     /// A window is complete: covariance over it, then everything it measured.
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
-        let window = core::mem::take(&mut self.window);
+        let following = self.window.following(&self.params);
+        let window = core::mem::replace(&mut self.window, following);
         let means = window.means(&self.params, lift_off);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
+        let iron_b = self.iron.iron_b;
+        if let Some(sums) = &means.field
+            && self.iron.learn(&self.params, means.duration_s, sums)
+        {
+            self.reference.have_other_iron(&self.params, &iron_b);
+        }
         if !self.aligned {
             self.covariance.predict(&self.params, &window, &means);
             outcome.aligned = self.align(&means, UNKNOWN);
@@ -253,7 +278,7 @@ impl Filter {
         let velocity = means.vertical.then(|| self.compare_velocity(&means, &mut correction));
         if velocity.is_none() {
             self.velocity_n = Vector2::zeros();
-            self.covariance.forget_velocity(self.params.velocity_sd);
+            self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
         }
         let field = self.compare_field(&window, &means, &mut correction);
         self.inject(&correction);
@@ -266,7 +291,7 @@ impl Filter {
     /// whatever was believed before.
     fn compare_rest(&mut self, means: &Means, correction: &mut Correction) {
         let earth_b = self.q_nb.inverse_transform_vector(&self.params.earth_rate_n);
-        let variance = square(self.params.rest.bias_sd) + means.rate_variance;
+        let noise = Noise::white(square(self.params.rest.bias_sd) + means.rate_variance);
         if self.bias_rejected_s >= self.params.recovery_s {
             self.bias_rejected_s = 0.0;
             self.covariance.forget_bias(self.params.bias_sd);
@@ -281,7 +306,7 @@ impl Filter {
                 self.bias_b[axis],
                 measured,
                 &rows,
-                variance,
+                noise,
             );
         }
         self.bias_rejected_s = if accepted {
@@ -293,18 +318,12 @@ impl Filter {
 
     /// The velocity is bounded: zero is measured of it.
     fn compare_velocity(&mut self, means: &Means, correction: &mut Correction) -> bool {
+        let noise = Noise::lasting(means.velocity_variance, self.params.velocity_lasts_s, means.duration_s);
         let mut accepted = true;
         for axis in 0..2 {
             let rows = [(VELOCITY + axis, 1.0)];
-            let (predicted, variance) = (self.velocity_n[axis], means.velocity_variance);
-            accepted &= correction.compare(
-                &mut self.covariance,
-                Quantity::Velocity,
-                predicted,
-                0.0,
-                &rows,
-                variance,
-            );
+            let predicted = self.velocity_n[axis];
+            accepted &= correction.compare(&mut self.covariance, Quantity::Velocity, predicted, 0.0, &rows, noise);
         }
         accepted
     }
@@ -313,10 +332,11 @@ impl Filter {
     /// disturbed for its rejection to say anything of the attitude.
     fn compare_field(&mut self, window: &Window, means: &Means, correction: &mut Correction) -> Option<bool> {
         let sums = means.field?;
-        self.iron.learn(&self.params, &sums);
         self.reference
             .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
-        let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
+        let compared = self
+            .reference
+            .compare(&self.params, means.duration_s, &self.mean_field(&sums))?;
         let disturbed = compared.disturbance > self.params.field_gate;
         self.disturbed_s = if disturbed {
             self.disturbed_s + means.duration_s
@@ -328,10 +348,17 @@ impl Filter {
         for scalar in &compared.scalars {
             let (quantity, rows) = (scalar.quantity, &window.mean_rows(&scalar.row_n));
             let covariance = &mut self.covariance;
-            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.variance);
+            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.noise);
         }
         correction.usable = true;
         (!disturbed).then_some(accepted)
+    }
+
+    /// The mean field of a window without the iron, as far as that is known.
+    fn mean_field(&self, sums: &FieldSums) -> MeanField {
+        let mut mean = sums.mean(&self.iron.iron_b);
+        mean.white += self.iron.variance(sums);
+        mean
     }
 
     fn inject(&mut self, correction: &Correction) {

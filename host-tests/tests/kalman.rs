@@ -21,8 +21,12 @@ fn params() -> Params {
         gyro_matrix_walk: 0.0,
         velocity_sd: 0.2,
         velocity_per_spread_s: 0.0,
+        velocity_lasts_s: 0.0,
+        acc_scale_error: 0.0,
+        acc_excess: 0.0,
         heading_sd: 0.05,
         dip_sd: 0.03,
+        field_lasts_s: 0.0,
         disturbance: 0.0,
         field_spread: 0.0,
         field_gate: 1.0,
@@ -77,7 +81,9 @@ struct Flight {
     bias_b: Vector3<f64>,
     matrix: Matrix3<f64>,
     velocity_n: Vector3<f64>,
-    acc_n: Vector3<f64>,
+    /// [m/s] by which the velocity changes in this window, and [m/s2] what is wrong with specific force meanwhile.
+    sway_n: Vector3<f64>,
+    wrong_n: Vector3<f64>,
     field_n: Vector3<f64>,
     step: usize,
 }
@@ -92,7 +98,8 @@ impl Flight {
             bias_b: Vector3::zeros(),
             matrix: Matrix3::zeros(),
             velocity_n: Vector3::zeros(),
-            acc_n: Vector3::zeros(),
+            sway_n: Vector3::zeros(),
+            wrong_n: Vector3::zeros(),
             field_n: Vector3::zeros(),
             step: 0,
         };
@@ -121,11 +128,19 @@ impl Flight {
             self.normal(params.velocity_sd.into()),
         );
         let next = Vector3::new(north, east, 0.0);
-        self.acc_n = (next - self.velocity_n) / f64::from(params.window_s) + self.normal3(params.acc_error.into());
+        self.sway_n = next - self.velocity_n;
+        self.wrong_n = self.normal3(params.acc_error.into());
         self.velocity_n = next;
         let heading = self.normal(params.heading_sd.into());
         let dip = DIP + self.normal(params.dip_sd.into());
         self.field_n = Vector3::new(dip.cos() * heading.cos(), dip.cos() * heading.sin(), dip.sin()) * NORM_UT;
+    }
+
+    /// [1/s] acceleration over the change of velocity that it makes in a window: half a wave, nothing at either end.
+    fn sway(&self) -> f64 {
+        let wave = |step: usize| (std::f64::consts::PI * step as f64 / STEPS_PER_WINDOW as f64).sin();
+        let whole: f64 = (1..STEPS_PER_WINDOW).map(wave).sum();
+        wave((self.step - 1) % STEPS_PER_WINDOW + 1) / (whole * STEP_S)
     }
 
     fn next(&mut self) -> Step {
@@ -139,7 +154,7 @@ impl Flight {
         // turned = (1 - matrix) gyro - bias dt, solved for what the gyros give.
         let exact = (Matrix3::identity() - self.matrix).try_inverse().expect("small") * (rate_b + self.bias_b) * STEP_S;
         let angle_b = exact + self.normal3(ANGLE_NOISE * STEP_S.sqrt());
-        let force_n = self.acc_n - Vector3::z() * GRAVITY;
+        let force_n = self.sway_n * self.sway() + self.wrong_n - Vector3::z() * GRAVITY;
         let acc_b = self.q_nb.inverse_transform_vector(&force_n) + self.normal3(ACC_NOISE);
         let mag_b = self.q_nb.inverse_transform_vector(&self.field_n) + self.normal3(MAG_NOISE);
         let sampled = |value_b: Vector3<f64>, sd: f64| {

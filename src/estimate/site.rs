@@ -49,8 +49,6 @@ impl Site {
     pub fn params(&self, set: &Set) -> Params {
         let [acc, _, gyro] = set.uncertainty;
         let (sin, cos) = ComplexField::sin_cos(self.latitude_deg.to_radians());
-        let mut field = Reference::unknown();
-        field.declination = self.declination_deg.to_radians();
         Params {
             bias_sd: gyro.bias.max(Params::ROOM.bias_sd),
             gyro_matrix_sd: gyro.scale.max(gyro.direction),
@@ -59,7 +57,7 @@ impl Site {
             delays: DELAYS,
             gravity: self.gravity,
             earth_rate_n: Vector3::new(cos, 0.0, -sin) * EARTH_RATE,
-            field,
+            field: Reference::at_site(self.declination_deg.to_radians()),
             ..Params::ROOM
         }
     }

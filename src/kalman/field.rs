@@ -14,7 +14,9 @@
 use nalgebra::{ComplexField, Matrix3, RealField, Vector3};
 
 use super::{
-    Params, Quantity, square,
+    Params, Quantity,
+    innovation::Noise,
+    square,
     window::{FieldSums, MeanField},
 };
 use crate::attitude::sin_cos;
@@ -28,6 +30,10 @@ pub struct Reference {
     pub dip: f32,
     /// [rad] magnetic north, east of north.
     pub declination: f32,
+    /// North is where the field was found.
+    found: bool,
+    /// [rad] it was found in n.
+    found_at: f32,
     learnt_s: f32,
     /// [uT] mean in n while it was learnt, hard iron included.
     raw_n: Vector3<f32>,
@@ -41,7 +47,7 @@ pub struct Scalar {
     pub residual: f32,
     /// What it sees of the attitude error, in n.
     pub row_n: Vector3<f32>,
-    pub variance: f32,
+    pub noise: Noise,
 }
 
 /// The field of a window.
@@ -58,23 +64,34 @@ impl Reference {
             norm_ut,
             dip,
             declination,
+            found: false,
+            found_at: 0.0,
             learnt_s: f32::INFINITY,
             raw_n: Vector3::new(0.0, 0.0, 0.0),
             turned: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         }
     }
 
-    /// One to be learnt; north is magnetic.
+    /// One to be learnt; north is where it is found. Iron that is learnt after that turns the field away from north, and not
+    /// north from where it was.
     pub const fn unknown() -> Self {
         Reference {
+            found: true,
+            ..Reference::at_site(0.0)
+        }
+    }
+
+    /// One to be learnt at a site whose declination [rad] is known.
+    pub const fn at_site(declination: f32) -> Self {
+        Reference {
             learnt_s: 0.0,
-            ..Reference::known(0.0, 0.0, 0.0)
+            ..Reference::known(0.0, 0.0, declination)
         }
     }
 
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
-    pub(super) fn compare(&self, params: &Params, mean: &MeanField) -> Option<Compared> {
+    pub(super) fn compare(&self, params: &Params, duration_s: f32, mean: &MeanField) -> Option<Compared> {
         let (north, east) = self.magnetic(&mean.mag_n);
         let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
         let dip = RealField::atan2(mean.mag_n.z, horizontal);
@@ -84,6 +101,7 @@ impl Reference {
         let (sin, cos) = sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
         let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
+        let noise = |sd: f32| Noise::lasting(square(sd), params.field_lasts_s, duration_s).and_white(seen);
         // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
         let (sin_d, cos_d) = sin_cos(self.declination);
         Some(Compared {
@@ -92,13 +110,13 @@ impl Reference {
                     quantity: Quantity::FieldEast,
                     residual: -cos * RealField::atan2(east, north),
                     row_n: Vector3::new(-sin * cos_d, -sin * sin_d, cos),
-                    variance: square(params.heading_sd * cos) + seen,
+                    noise: noise(params.heading_sd * cos),
                 },
                 Scalar {
                     quantity: Quantity::FieldMeridian,
                     residual: self.dip - dip,
                     row_n: Vector3::new(sin_d, -cos_d, 0.0),
-                    variance: square(params.dip_sd) + seen,
+                    noise: noise(params.dip_sd),
                 },
             ],
             disturbance: ComplexField::sqrt(disturbance),
@@ -132,18 +150,41 @@ impl Reference {
         (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 
-    /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
+    /// The iron is another from now on; until now it was `iron_b` [uT]. A reference that was complete stands, a younger one
+    /// is learnt afresh.
+    pub(super) fn have_other_iron(&mut self, params: &Params, iron_b: &Vector3<f32>) {
+        if self.learnt_s < params.learn_s {
+            *self = if self.found {
+                Reference::unknown()
+            } else {
+                Reference::at_site(self.declination)
+            };
+        } else {
+            self.raw_n -= self.turned * iron_b;
+            self.turned = Matrix3::zeros();
+        }
+    }
+
+    /// The mean field so far, while the reference is young, and norm, dip and direction of it without `iron_b` \[uT\].
     pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
         if self.learnt_s.is_infinite() {
             return;
         }
-        if self.learnt_s < params.learn_s {
+        let learning = self.learnt_s < params.learn_s;
+        if learning {
             self.learnt_s += duration_s;
             let part = duration_s / self.learnt_s;
             self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
             self.turned += (sums.turned / sums.count - self.turned) * part;
         }
         let field_n = self.raw_n - self.turned * iron_b;
+        if self.found {
+            let points_at = RealField::atan2(field_n.y, field_n.x);
+            if learning {
+                self.found_at = points_at;
+            }
+            self.declination = points_at - self.found_at;
+        }
         self.norm_ut = field_n.norm();
         self.dip = RealField::atan2(field_n.z, ComplexField::sqrt(field_n.xy().norm_squared()));
     }

@@ -44,6 +44,38 @@ pub struct Innovation {
     pub accepted: bool,
 }
 
+/// Variance of what is wrong with a measurement itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Noise {
+    /// In one window: what the residual shows.
+    pub alone: f32,
+    /// What the gain takes for it: an error that lasts is one witness, however often it is asked.
+    pub lasting: f32,
+}
+
+impl Noise {
+    /// Another one in each window.
+    pub fn white(variance: f32) -> Noise {
+        Noise::lasting(variance, 0.0, 1.0)
+    }
+
+    /// The same for `lasts_s`: white noise of as much power at low frequency.
+    pub fn lasting(variance: f32, lasts_s: f32, duration_s: f32) -> Noise {
+        Noise {
+            alone: variance,
+            lasting: variance * (lasts_s / duration_s).max(1.0),
+        }
+    }
+
+    /// Together with one that is another in each window.
+    pub fn and_white(self, variance: f32) -> Noise {
+        Noise {
+            alone: self.alone + variance,
+            lasting: self.lasting + variance,
+        }
+    }
+}
+
 /// What the scalars of a window correct together.
 pub(super) struct Correction {
     gate: f32,
@@ -73,12 +105,13 @@ impl Correction {
         predicted: f32,
         measured: f32,
         rows: &[(usize, f32)],
-        variance: f32,
+        noise: Noise,
     ) -> bool {
         let explained: f32 = rows.iter().map(|(index, factor)| self.error[*index] * factor).sum();
         let residual = measured - predicted - explained;
-        let seen = covariance.seen(rows, variance);
-        let test_ratio = residual * residual / (self.gate * self.gate * seen.variance);
+        let seen = covariance.seen(rows, noise.lasting);
+        let variance = seen.variance - noise.lasting + noise.alone;
+        let test_ratio = residual * residual / (self.gate * self.gate * variance);
         // Not greater than one, so that NaN is rejected too.
         let accepted = self.usable && test_ratio <= 1.0;
         if accepted {
@@ -91,10 +124,36 @@ impl Correction {
             predicted,
             measured,
             residual,
-            variance: seen.variance,
+            variance,
             test_ratio,
             accepted,
         });
         accepted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kalman::{Params, covariance::BIAS};
+
+    #[test]
+    fn an_error_that_lasts_is_one_witness_and_shows_once_in_the_residual() {
+        const VARIANCE: f32 = 1e-6;
+        let left = |lasts_s: f32| {
+            let mut covariance = Covariance::new(&Params::ROOM);
+            let noise = Noise::lasting(VARIANCE, lasts_s, 1.0);
+            let mut correction = Correction::new(5.0);
+            for _ in 0..60 {
+                correction.innovations.clear();
+                correction.compare(&mut covariance, Quantity::Bias, 0.0, 0.0, &[(BIAS, 1.0)], noise);
+            }
+            let known = covariance.0[(BIAS, BIAS)];
+            let shown = correction.innovations[0].variance - VARIANCE;
+            assert!(shown > 0.0 && shown < 1.2 * known, "{shown} {known}");
+            known
+        };
+        assert!((left(20.0) / left(0.0) / 20.0 - 1.0).abs() < 0.02);
+        assert_eq!(left(0.5), left(0.0));
     }
 }

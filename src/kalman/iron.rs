@@ -4,58 +4,145 @@
 //! corrected before it is compared. The field of the site is the same throughout a window, `m_n = F + R_k iron_b`, and
 //! turns of the unit within it part the two: with `F` eliminated, a window of `N` samples tells
 //!
-//! `(N - (sum R)'(sum R)/N) iron_b = sum m_b - (sum R)'(sum m_n)/N`.
+//! `(1 - (sum R)'(sum R)/N^2) iron_b = (sum m_b - (sum R)'(sum m_n)/N)/N`.
 //!
 //! The relative attitude within a window is the gyros' alone, so this needs no attitude and cannot drag one along.
 //! Windows add up with weights: one whose field goes on moving after the correction (iron outside, a gradient crossed)
 //! tells little.
+//!
+//! **Iron that comes or goes** (a magnet stuck to the unit, a battery changed) would be outside to that sum for ever. So the
+//! same equations are also kept for the latest windows alone, and where another iron makes the field stand still that the
+//! present one leaves moving, it takes its place with its own covariance. A window that no one iron explains together with
+//! those before it (a magnet on its way) begins them afresh.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Params, square, window::FieldSums};
+
+/// The latest windows are explained by one iron while the field moves by less than so many times what else moves it (as
+/// variances).
+const EXPLAINED: f32 = 4.0;
+
+/// Another iron must leave the field so many times quieter than the present one does.
+const QUIETER: f32 = 2.0;
 
 /// What has been learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HardIron {
     /// [uT] in b.
     pub iron_b: Vector3<f32>,
+    /// [uT^2] its covariance.
+    pub covariance: Matrix3<f32>,
     information: Matrix3<f32>,
     weighted: Vector3<f32>,
+    recent: Equations,
+}
+
+/// Windows added up, each by the number of its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Equations {
+    windows: f32,
+    /// [1] left side.
+    parted: Matrix3<f32>,
+    /// [uT] right side.
+    seen: Vector3<f32>,
+    /// [uT^2] mean square distance of the field in n from its mean.
+    squares: f32,
+}
+
+impl Equations {
+    fn of(sums: &FieldSums) -> Equations {
+        let turned = sums.turned.transpose() / sums.count;
+        Equations {
+            windows: 1.0,
+            parted: Matrix3::identity() - turned * sums.turned / sums.count,
+            seen: (sums.total_b - turned * sums.total_n) / sums.count,
+            squares: sums.mean(&Vector3::zeros()).spread,
+        }
+    }
+
+    fn after(&self, before: &Equations, kept: f32) -> Equations {
+        Equations {
+            windows: self.windows + before.windows * kept,
+            parted: self.parted + before.parted * kept,
+            seen: self.seen + before.seen * kept,
+            squares: self.squares + before.squares * kept,
+        }
+    }
+
+    /// [uT^2] how far the field goes on moving within a window with `iron_b` taken off.
+    fn unrest(&self, iron_b: &Vector3<f32>) -> f32 {
+        let squares = self.squares - 2.0 * iron_b.dot(&self.seen) + iron_b.dot(&(self.parted * iron_b));
+        (squares / self.windows).max(0.0)
+    }
 }
 
 impl HardIron {
     /// None yet.
-    pub fn none() -> Self {
+    pub fn none(params: &Params) -> Self {
+        let variance = square(params.iron_sd_ut);
+        let information = if variance > 0.0 { 1.0 / variance } else { 0.0 };
         HardIron {
             iron_b: Vector3::zeros(),
-            information: Matrix3::zeros(),
+            covariance: Matrix3::from_diagonal_element(variance),
+            information: Matrix3::from_diagonal_element(information),
             weighted: Vector3::zeros(),
+            recent: Equations::default(),
         }
     }
 
-    /// Learns from a window.
-    pub(super) fn learn(&mut self, params: &Params, sums: &FieldSums) {
+    /// Learns from a window. Whether the iron turned out to be another.
+    pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums) -> bool {
         if params.iron_sd_ut <= 0.0 || sums.count < 2.0 {
-            return;
+            return false;
         }
-        let unrest = sums.mean(&self.iron_b).spread;
-        let variance = square(params.iron_noise_ut) + params.iron_per_spread * unrest;
-        let weight = 1.0 / (variance * sums.count);
-        let turned = sums.turned.transpose();
-        let parted = Matrix3::from_diagonal_element(sums.count) - turned * sums.turned / sums.count;
-        self.information += parted * weight;
-        self.weighted += (sums.total_b - turned * sums.total_n / sums.count) * weight;
-        let known = self.information + Matrix3::from_diagonal_element(1.0 / square(params.iron_sd_ut));
-        if let Some(inverse) = known.try_inverse() {
-            self.iron_b = inverse * self.weighted;
+        let noise = square(params.iron_noise_ut);
+        let window = Equations::of(sums);
+        let kept = (1.0 - duration_s / params.iron_change_s).max(0.0);
+        let recent = window.after(&self.recent, kept);
+        let unknown = Matrix3::from_diagonal_element(1.0 / square(params.iron_change_sd_ut));
+        let latest = HardIron::solved(recent, recent.parted / noise + unknown, recent.seen / noise);
+        let left = latest.recent.unrest(&latest.iron_b);
+        self.recent = if left > EXPLAINED * noise { window } else { recent };
+        if left <= EXPLAINED * noise && recent.unrest(&self.iron_b) > noise + QUIETER * left {
+            *self = latest;
+            return true;
         }
+        // What the present iron leaves moving is not all the world's while it is not yet known well.
+        let unrest = window.unrest(&self.iron_b).min(left);
+        let weight = 1.0 / (noise + params.iron_per_spread * unrest);
+        let information = self.information + window.parted * weight;
+        *self = HardIron::solved(self.recent, information, self.weighted + window.seen * weight);
+        false
+    }
+
+    fn solved(recent: Equations, information: Matrix3<f32>, weighted: Vector3<f32>) -> HardIron {
+        // Information is a sum that began positive definite; rounding does not take that away.
+        let covariance = information.try_inverse().unwrap_or_else(Matrix3::zeros);
+        HardIron {
+            iron_b: covariance * weighted,
+            covariance,
+            information,
+            weighted,
+            recent,
+        }
+    }
+
+    /// [uT^2] variance of a component of a window's mean field by what is not known of the iron.
+    pub(super) fn variance(&self, sums: &FieldSums) -> f32 {
+        let turned = sums.turned / sums.count;
+        (turned * self.covariance * turned.transpose()).trace() / 3.0
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        self.iron_b
-            .iter()
-            .chain(self.information.iter())
-            .chain(self.weighted.iter())
+        let Equations {
+            parted, seen, squares, ..
+        } = &self.recent;
+        [&self.covariance, &self.information, parted]
+            .into_iter()
+            .flat_map(|matrix| matrix.iter())
+            .chain([&self.iron_b, &self.weighted, seen].into_iter().flat_map(|v| v.iter()))
+            .chain([squares])
             .all(|part| part.is_finite())
     }
 }

@@ -23,22 +23,31 @@ pub struct Params {
     pub gyro_matrix_sd: f32,
     /// [1/sqrt(s)] random walk of scale and misalignment.
     pub gyro_matrix_walk: f32,
-    /// [m/s] velocity that a moving unit has at any time, standard deviation. Small: quick acceleration is mistaken for
-    /// tilt; large: tilt is learnt slowly.
+    /// [m/s] velocity that is found of a moving unit in one window, its own and what accelerometers add, standard
+    /// deviation. Small: quick acceleration is mistaken for tilt; large: tilt is learnt slowly.
     pub velocity_sd: f32,
     /// [s] how much of the spread of specific force within a window adds to it.
     pub velocity_per_spread_s: f32,
     /// [m/s] the same at rest.
     pub velocity_rest_sd: f32,
+    /// [s] for how long it stays the same: so many windows are one witness. Zero: each window is one.
+    pub velocity_lasts_s: f32,
     /// [m/s2] error of the mean specific force of a window beside the samples' own: bias and scale of accelerometers.
     pub acc_error: f32,
-    /// [rad] error of the reference's heading in one window, as far as it is not the same in the next. Small: heading
-    /// follows every piece of iron; large: it follows the gyros.
+    /// [1] error of specific force in parts of how far it spreads: scale, misalignment, instants of the samples.
+    pub acc_scale_error: f32,
+    /// [1] how far specific force is believed to be off across the vertical, in parts of what it is off one g for seconds.
+    /// Small: vibration that slow samples fold down is taken for tilt; large: climbing and sinking cost tilt.
+    pub acc_excess: f32,
+    /// [rad] error of the reference's heading in one window. Small: heading follows every piece of iron; large: it follows
+    /// the gyros.
     pub heading_sd: f32,
     /// [rad] error of the field's direction at the start; the heading's is this over the cosine of the dip.
     pub start_field_sd: f32,
     /// [rad] error of the reference's dip in one window.
     pub dip_sd: f32,
+    /// [s] for how long both stay the same: so many windows are one witness. Zero: each window is one.
+    pub field_lasts_s: f32,
     /// [1] how far a disturbance is believed to reach across the field, in parts of what norm and dip show of it.
     pub disturbance: f32,
     /// [1] a field whose norm and dip are off by more (in parts of the norm, and radians) is not used. Small: coasts on
@@ -75,6 +84,11 @@ pub struct Params {
     pub iron_noise_ut: f32,
     /// [1] by how much more a window counts less whose field moves.
     pub iron_per_spread: f32,
+    /// [s] iron that comes or goes is looked for in the windows of so long. Small: what passes is taken for iron of the unit;
+    /// large: a magnet is noticed late.
+    pub iron_change_s: f32,
+    /// [uT] such iron on each axis, standard deviation.
+    pub iron_change_sd_ut: f32,
     /// The field at the site, or one to be learnt in the first [`Params::learn_s`].
     pub field: Reference,
     /// [s] how long the field is learnt.
@@ -110,23 +124,27 @@ const DEG: f32 = core::f32::consts::PI / 180.0;
 
 impl Params {
     /// For a unit moved by hand or machine in a room, its site unknown. Chosen on seven real recordings, on which
-    /// they leave 0.99 deg at 285 Hz; on nine others 1.63 deg.
+    /// they leave 0.74 deg at 285 Hz and 0.84 deg at 5 Hz; on nine others 1.14 and 1.53 deg.
     pub const ROOM: Params = Params {
         window_s: 1.0,
-        angle_noise: 0.15 * DEG,
-        turn_noise: 7e-4,
+        angle_noise: 0.12 * DEG,
+        turn_noise: 3.5e-4,
         bias_sd: 0.5 * DEG,
-        bias_walk: 3e-4 * DEG,
-        gyro_matrix_sd: 5e-3,
-        gyro_matrix_walk: 1e-4,
-        velocity_sd: 0.5,
-        velocity_per_spread_s: 0.1,
-        velocity_rest_sd: 0.1,
-        acc_error: 0.03,
-        heading_sd: 20.0 * DEG,
-        start_field_sd: 4.0 * DEG,
-        dip_sd: 12.0 * DEG,
-        disturbance: 0.5,
+        bias_walk: 6e-4 * DEG,
+        gyro_matrix_sd: 2e-3,
+        gyro_matrix_walk: 5e-5,
+        velocity_sd: 0.034,
+        velocity_per_spread_s: 0.05,
+        velocity_rest_sd: 0.011,
+        velocity_lasts_s: 20.0,
+        acc_error: 0.015,
+        acc_scale_error: 0.03,
+        acc_excess: 1.0,
+        heading_sd: 0.8 * DEG,
+        start_field_sd: 2.0 * DEG,
+        dip_sd: 0.6 * DEG,
+        field_lasts_s: 64.0,
+        disturbance: 0.7,
         field_gate: 0.15,
         coast_s: 60.0,
         field_spread: 0.2,
@@ -149,9 +167,11 @@ impl Params {
         },
         gravity: 9.806_65,
         earth_rate_n: Vector3::new(0.0, 0.0, 0.0),
-        iron_sd_ut: 1.5,
+        iron_sd_ut: 2.0,
         iron_noise_ut: 2.0,
-        iron_per_spread: 30.0,
+        iron_per_spread: 100.0,
+        iron_change_s: 4.0,
+        iron_change_sd_ut: 60.0,
         field: Reference::unknown(),
         learn_s: 20.0,
     };

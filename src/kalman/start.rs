@@ -33,6 +33,8 @@ impl Filter {
                 .into_iter()
                 .any(|rejected_s| rejected_s >= self.params.recovery_s)
         {
+            // What was rejected for so long may have taught the bias before, as when a gyro lied.
+            self.covariance.forget_bias(self.params.bias_sd);
             return self.align(means, UNKNOWN);
         }
         worst > square(self.params.lost_sd) && self.align(means, MUCH_BETTER * worst)
@@ -44,7 +46,7 @@ impl Filter {
         let (Some(sums), true) = (means.field, means.near_one_g) else {
             return false;
         };
-        let mean = sums.mean(&self.iron.iron_b);
+        let mean = self.mean_field(&sums);
         let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
         let down = Sighting {
             seen_b: -means.acc_n,
@@ -65,6 +67,8 @@ impl Filter {
             return false;
         }
         self.q_nb = renormalised(found.q_nb * self.q_nb);
+        // What the window that has begun still knew of the one before was in other axes.
+        self.window = Window::default();
         let dcm = dcm_nb(&found.q_nb);
         self.covariance.align(&(dcm * found.covariance_b * dcm.transpose()));
         self.covariance.forget_velocity(means.start_velocity_sd(&self.params));

@@ -107,7 +107,9 @@ fn tilted() -> UnitQuaternion<f32> {
 
 fn nothing(_: f32, _: &mut Step) {}
 
+mod force;
 mod hostile;
+mod iron;
 
 #[test]
 fn at_rest_it_aligns_within_a_window_and_stays() {
@@ -169,7 +171,11 @@ fn without_the_matrix_the_same_motion_costs_more() {
     let run = |params: Params| {
         let mut world = World::new(tilted(), params);
         world.fly(5.0, Vector3::zeros(), nothing);
-        world.fly(60.0, Vector3::new(0.3, 0.2, 1.5), |_, step| step.angle_b *= 1.01);
+        // To and fro, with pauses of another axis between: no bias does the same.
+        for turn in 0..15 {
+            let rate_b = Vector3::new(0.3, 0.2, [1.5, 0.0, -1.0][turn % 3]);
+            world.fly(4.0, rate_b, |_, step| step.angle_b *= 1.01);
+        }
         world.off()
     };
     let with = run(params());

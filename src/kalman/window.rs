@@ -5,7 +5,7 @@
 
 use nalgebra::{ComplexField, Matrix3, SMatrix, Vector2, Vector3};
 
-use super::{Params, covariance::BIAS, square};
+use super::{Params, covariance::BIAS, innovation::Noise, square};
 
 /// Gyro error states that drive the attitude: bias 3, matrix 9.
 pub const DRIVERS: usize = 12;
@@ -28,6 +28,8 @@ pub struct Window {
     rate_square: f32,
     acc: Sum,
     far_from_one_g: bool,
+    /// [m/s2] by how much specific force exceeded one g in the seconds before.
+    excess_before: f32,
     mag: FieldSums,
 }
 
@@ -53,7 +55,8 @@ pub struct MeanField {
     pub mag_n: Vector3<f32>,
     /// [uT^2] mean square distance of the samples from it.
     pub spread: f32,
-    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise.
+    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise, and by what is not
+    /// known of the iron.
     pub white: f32,
 }
 
@@ -79,12 +82,22 @@ struct Sum {
     total_n: Vector3<f32>,
     squares: f32,
     variance: f32,
+    /// Sum of the squares of what each sample is off the line through the two before it, in variances of a sample.
+    unforeseen: f32,
+    /// The two samples before, the latest first, be they of the window before.
+    before_n: [Option<Vector3<f32>>; 2],
+    /// The last sample of the window before.
+    began_n: Option<Vector3<f32>>,
 }
 
 impl Sum {
     fn take(&mut self, sample_n: &Vector3<f32>, variance: f32) {
         self.count += 1.0;
         self.total_n += sample_n;
+        if let [Some(last_n), Some(last_but_one_n)] = self.before_n {
+            self.unforeseen += (sample_n - last_n * 2.0 + last_but_one_n).norm_squared() / 6.0;
+        }
+        self.before_n = [Some(*sample_n), self.before_n[0]];
         self.squares += sample_n.norm_squared();
         self.variance += variance;
     }
@@ -101,6 +114,22 @@ impl Sum {
     /// Mean square distance from the mean, all axes, without the samples' own noise.
     fn spread(&self) -> f32 {
         (self.squares / self.count - self.mean().norm_squared() - 3.0 * self.noise()).max(0.0)
+    }
+
+    /// Variance of a component of a sample: the sensor's, or that of what moved too fast for the samples if it shows
+    /// beside it.
+    fn missed(&self) -> f32 {
+        let unforeseen = self.unforeseen / (3.0 * self.count);
+        let noise = self.noise();
+        if unforeseen > 2.0 * noise { unforeseen } else { noise }
+    }
+
+    /// Mean by trapezoids over the whole window: of the samples at its two ends half each.
+    fn integral_mean(&self) -> Vector3<f32> {
+        match (self.began_n, self.before_n[0]) {
+            (Some(began_n), Some(ended_n)) => self.mean() + (began_n - ended_n) / (2.0 * self.count),
+            _ => self.mean(),
+        }
     }
 }
 
@@ -139,6 +168,13 @@ pub struct Means {
 /// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
 /// stays within it, a climb or a fall does not.
 const MEAN_NEAR_ONE_G: f32 = 0.2;
+
+/// What may be left of shaking in that mean: so much of its root mean square.
+const SHAKEN: f32 = 0.2;
+
+/// [s] over which specific force that goes on exceeding one g is no motion: nothing that is bounded gains height for so long.
+/// It is vibration that the samples fold down, and folds down across the vertical as well.
+const EXCESS_S: f32 = 3.0;
 
 /// After lift-off every sample must be within this part of one g.
 const SAMPLE_NEAR_ONE_G: f32 = 0.1;
@@ -179,6 +215,25 @@ impl Window {
         self.acc.take(acc_n, variance);
     }
 
+    /// The window that follows this one, in the same axes.
+    pub fn following(&self, params: &Params) -> Window {
+        let mut next = Window::default();
+        next.acc.before_n = self.acc.before_n;
+        next.acc.began_n = self.acc.before_n[0];
+        next.excess_before = self.excess(params);
+        next
+    }
+
+    /// [m/s2] by how much specific force exceeds one g, this window included.
+    fn excess(&self, params: &Params) -> f32 {
+        if self.acc.count <= 0.0 {
+            return 0.0;
+        }
+        let part = (self.duration_s / EXCESS_S).min(1.0);
+        let now = self.acc.integral_mean().norm() - params.gravity;
+        self.excess_before + (now - self.excess_before) * part
+    }
+
     /// A sample of the field.
     pub fn take_mag(&mut self, mag_b: &Vector3<f32>, dcm_nb: &Matrix3<f32>, variance: f32) {
         let sums = &mut self.mag;
@@ -207,12 +262,15 @@ impl Window {
         let rate_spread = self.rate_square / covered_s - rate_b.norm_squared();
         let sampled = self.acc.count > 0.0;
         let acc_n = if sampled { self.acc.mean() } else { Vector3::zeros() };
-        let (acc_spread, acc_noise) = if sampled {
-            (self.acc.spread(), self.acc.noise())
+        let (acc_spread, gained_n, missed) = if sampled {
+            let missed = self.acc.missed() / self.acc.count;
+            (self.acc.spread(), self.acc.integral_mean(), missed)
         } else {
-            (0.0, 0.0)
+            (0.0, Vector3::zeros(), 0.0)
         };
-        let near_one_g = sampled && is_near(acc_n.norm(), params.gravity, MEAN_NEAR_ONE_G);
+        let near_one_g = sampled
+            && ComplexField::abs(acc_n.norm() - params.gravity)
+                < MEAN_NEAR_ONE_G * params.gravity + SHAKEN * ComplexField::sqrt(acc_spread);
         let vertical = near_one_g && !(lift_off && self.far_from_one_g);
         let vertical_s = if vertical { self.duration_s } else { 0.0 };
         let rest = !lift_off
@@ -220,8 +278,6 @@ impl Window {
             && rate_b.norm() < params.rest.rate
             && rate_spread < square(params.rest.rate_spread)
             && acc_spread < square(params.rest.acc_spread);
-        // Of the spread, half a part of each sample is lost between the samples.
-        let between = (acc_noise + 0.5 * acc_spread) / self.acc.count.max(1.0);
         let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
         let tilt_variance = (START_SPREAD + 1.0 / self.acc.count.max(1.0)) * acc_spread / square(params.gravity);
         Means {
@@ -233,8 +289,12 @@ impl Window {
             near_one_g,
             vertical,
             vertical_s,
-            velocity_change_n: acc_n.xy() * vertical_s,
-            velocity_change_variance: square(vertical_s) * (square(params.acc_error) + between),
+            velocity_change_n: gained_n.xy() * vertical_s,
+            velocity_change_variance: square(vertical_s)
+                * (square(params.acc_error)
+                    + square(params.acc_scale_error) * acc_spread
+                    + square(params.acc_excess * self.excess(params))
+                    + missed),
             velocity_variance: if rest { square(params.velocity_rest_sd) } else { moving },
             tilt_sd: ComplexField::sqrt(square(START_TILT_SD) + tilt_variance),
             acc_spread,
@@ -260,7 +320,8 @@ impl MeanField {
 impl Means {
     /// [m/s] velocity at the start.
     pub fn start_velocity_sd(&self, params: &Params) -> f32 {
-        ComplexField::sqrt(square(params.velocity_sd) + 0.1 * self.acc_spread)
+        let known = Noise::lasting(square(params.velocity_sd), params.velocity_lasts_s, self.duration_s);
+        ComplexField::sqrt(known.lasting + 0.1 * self.acc_spread)
     }
 }
 

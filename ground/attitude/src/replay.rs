@@ -33,6 +33,8 @@ pub struct Replay {
     pub params: Params,
     /// Noise of the sensors.
     pub noise: Noise,
+    /// [rad/s] step of the rates' codes where they were cut towards zero; 0 where they were rounded.
+    pub cut_step: f64,
     /// Rows in a period of the filter.
     pub rows_per_step: usize,
 }
@@ -40,11 +42,11 @@ pub struct Replay {
 impl Replay {
     /// The steps of the filter, each with the row that it ends at.
     pub fn steps<'a>(&self, rows: &'a [Row]) -> impl Iterator<Item = (Step, &'a Row)> + use<'a> {
-        let noise = self.noise;
+        let (noise, cut_step) = (self.noise, self.cut_step);
         let ends = (0..rows.len()).step_by(self.rows_per_step.max(1));
         ends.clone()
             .zip(ends.skip(1))
-            .map(move |(from, to)| (step(&rows[from..=to], &noise), &rows[to]))
+            .map(move |(from, to)| (step(&rows[from..=to], &noise, cut_step), &rows[to]))
     }
 
     /// Errors of the filter over `rows`.
@@ -62,10 +64,11 @@ impl Replay {
 }
 
 /// The step from the first of `rows` to the last.
-fn step(rows: &[Row], noise: &Noise) -> Step {
+fn step(rows: &[Row], noise: &Noise, cut_step: f64) -> Step {
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let turned = rows.windows(2).fold(UnitQuaternion::identity(), |turned, pair| {
-        let angle: Vector3<f64> = (pair[0].rate_b + pair[1].rate_b) * 0.5 * (pair[1].t_s - pair[0].t_s);
+        let angle: Vector3<f64> =
+            (uncut(&pair[0].rate_b, cut_step) + uncut(&pair[1].rate_b, cut_step)) * 0.5 * (pair[1].t_s - pair[0].t_s);
         turned * UnitQuaternion::from_scaled_axis(angle)
     });
     let at_us = micros(last.t_s);
@@ -82,7 +85,7 @@ fn step(rows: &[Row], noise: &Noise) -> Step {
         covered_s,
         angle_b: turned.scaled_axis().cast(),
         angle_variance: noise.angle * covered_s,
-        rate_b: last.rate_b.cast(),
+        rate_b: uncut(&last.rate_b, cut_step).cast(),
         saturated: false,
         acc: sampled(last.acc_b, noise.acc),
         mag: sampled(last.mag_b, noise.mag),
@@ -90,9 +93,42 @@ fn step(rows: &[Row], noise: &Noise) -> Step {
     }
 }
 
+/// The middle of what a code that was cut towards zero stands for: half a step further out, zero itself being the middle of
+/// both sides. Otherwise a bias looks half a step smaller at rest than it is in motion.
+fn uncut(rate_b: &Vector3<f64>, step: f64) -> Vector3<f64> {
+    rate_b.map(|rate| {
+        if rate.abs() > 0.5 * step {
+            rate + (0.5 * step).copysign(rate)
+        } else {
+            rate
+        }
+    })
+}
+
 /// [s] the filter's clock at the recording's zero: recordings may begin before theirs, the filter's clock may not.
 pub const EPOCH_S: f64 = 1e6;
 
 fn micros(t_s: f64) -> u64 {
     ((t_s + EPOCH_S) * 1e6).round() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_rate_has_the_same_mean_at_rest_and_in_motion() {
+        const STEP: f64 = 0.1;
+        let mean = |middle: f64| {
+            let cut = (0..1000).map(|k| middle + (f64::from(k) / 500.0 - 1.0) * 2.0 * STEP);
+            let codes = cut.map(|rate| (rate / STEP).trunc() * STEP);
+            let all = codes.map(|code| uncut(&Vector3::new(code, -code, 0.0), STEP));
+            all.sum::<Vector3<f64>>() / 1000.0
+        };
+        for middle in [0.0, 0.03, 0.31, -0.52] {
+            let found = mean(middle);
+            let off = (found - Vector3::new(middle, -middle, 0.0)).norm();
+            assert!(off < 0.01 * STEP, "{middle}: {found}");
+        }
+    }
 }

@@ -27,6 +27,10 @@ pub struct Mekf {
     duration_s: f64,
     acc: (f64, Vector3<f64>, f64, f64),
     mag: (f64, Vector3<f64>, f64, f64),
+    /// Samples of specific force in n: the last two of the window before, and all of the window.
+    acc_before_n: Vec<Vector3<f64>>,
+    acc_n: Vec<Vector3<f64>>,
+    rate_b: Option<Vector3<f64>>,
 }
 
 impl Mekf {
@@ -54,6 +58,9 @@ impl Mekf {
             duration_s: 0.0,
             acc: (0.0, Vector3::zeros(), 0.0, 0.0),
             mag: (0.0, Vector3::zeros(), 0.0, 0.0),
+            acc_before_n: Vec::new(),
+            acc_n: Vec::new(),
+            rate_b: None,
         }
     }
 
@@ -63,11 +70,11 @@ impl Mekf {
         let gyro: Vector3<f64> = step.angle_b.cast();
         let turned = gyro - self.gyro_matrix * gyro - self.bias_b * dt_s;
         let earth: Vector3<f64> = self.params.earth_rate_n.cast();
-        let before = self.q_nb.to_rotation_matrix().into_inner();
-        self.q_nb =
-            UnitQuaternion::from_scaled_axis(earth * -dt_s) * self.q_nb * UnitQuaternion::from_scaled_axis(turned);
+        let began_b = self.rate_b.replace(step.rate_b.cast());
+        let (ended_nb, mean) = self.through(&gyro, began_b, &step.rate_b.cast(), dt_s);
+        let moved_n = mean * (gyro - turned) + earth * dt_s;
+        self.q_nb = UnitQuaternion::from_scaled_axis(-moved_n) * ended_nb;
         let after = self.q_nb.to_rotation_matrix().into_inner();
-        let mean = (before + after) / 2.0;
         let mut f = SMatrix::<f64, N, N>::identity();
         for row in 0..3 {
             for axis in 0..3 {
@@ -96,9 +103,50 @@ impl Mekf {
                 sum.3 += f64::from(sampled.variance);
             }
         }
+        if let Some(acc) = step.acc {
+            self.acc_n.push(after * acc.value_b.cast::<f64>());
+        }
         if self.duration_s >= f64::from(self.params.window_s) - 5e-4 {
             self.close();
         }
+    }
+
+    /// Attitude at the end of a step and the mean matrix over it: Simpson's rule where the turn is long enough to matter.
+    fn through(
+        &self,
+        angle_b: &Vector3<f64>,
+        began_b: Option<Vector3<f64>>,
+        ended_b: &Vector3<f64>,
+        dt_s: f64,
+    ) -> (UnitQuaternion<f64>, Matrix3<f64>) {
+        let matrix = |q: UnitQuaternion<f64>| q.to_rotation_matrix().into_inner();
+        let ended_nb = self.q_nb * UnitQuaternion::from_scaled_axis(*angle_b);
+        let ends = matrix(self.q_nb) + matrix(ended_nb);
+        if angle_b.norm() < 0.1 {
+            return (ended_nb, ends / 2.0);
+        }
+        let bent_b = began_b.map_or(Vector3::zeros(), |began_b| {
+            let swept = angle_b.cross(ended_b);
+            (began_b - ended_b - swept / 2.0 - angle_b.cross(&swept) / 12.0) * dt_s / 8.0
+        });
+        let middle = matrix(self.q_nb * UnitQuaternion::from_scaled_axis(angle_b / 2.0 + bent_b));
+        (ended_nb, (ends + middle * 4.0) / 6.0)
+    }
+
+    /// By trapezoids, and the variance of a sample: second differences where they show more than the sensor's noise.
+    fn gained(&mut self, mean_n: Vector3<f64>, noise: f64) -> (Vector3<f64>, f64) {
+        let samples = std::mem::take(&mut self.acc_n);
+        let count = samples.len() as f64;
+        let before = std::mem::take(&mut self.acc_before_n);
+        let ended_n = samples[samples.len() - 1];
+        let gained_n = before
+            .last()
+            .map_or(mean_n, |began_n| mean_n + (began_n - ended_n) / (2.0 * count));
+        let all: Vec<_> = before.into_iter().chain(samples).collect();
+        let off = |three: &[Vector3<f64>]| (three[2] - three[1] * 2.0 + three[0]).norm_squared() / 6.0;
+        let unforeseen = all.windows(3).map(off).sum::<f64>() / (3.0 * count);
+        self.acc_before_n = all[all.len() - 2..].to_vec();
+        (gained_n, if unforeseen > 2.0 * noise { unforeseen } else { noise })
     }
 
     fn close(&mut self) {
@@ -118,6 +166,7 @@ impl Mekf {
             mean(std::mem::replace(&mut self.acc, (0.0, Vector3::zeros(), 0.0, 0.0)));
         let (mag, mag_spread, mag_noise, mag_n) =
             mean(std::mem::replace(&mut self.mag, (0.0, Vector3::zeros(), 0.0, 0.0)));
+        let (gained_n, missed) = self.gained(acc, acc_noise);
         let f = std::mem::replace(&mut self.transition, SMatrix::identity());
         let mean_f = std::mem::replace(&mut self.mean_transition, SMatrix::zeros()) / t_s;
         let mut q = SMatrix::<f64, N, N>::zeros();
@@ -140,10 +189,10 @@ impl Mekf {
             q[(axis, velocity)] += fall * angle_variance / 2.0;
         }
         for index in 15..17 {
-            q[(index, index)] += t_s * t_s * (square(p.acc_error) + (acc_noise + 0.5 * acc_spread) / acc_n);
+            q[(index, index)] += t_s * t_s * (square(p.acc_error) + missed / acc_n);
         }
         self.covariance = f * self.covariance * f.transpose() + q;
-        self.velocity_n += acc.xy() * t_s;
+        self.velocity_n += gained_n.xy() * t_s;
         let mut error = SVector::<f64, N>::zeros();
         let mut h = SMatrix::<f64, 2, N>::zeros();
         h[(0, 15)] = 1.0;
