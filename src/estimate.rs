@@ -33,8 +33,8 @@ use crate::{
     increments::Increments,
     kalman::{Filter, Outcome, Sampled, Step},
     redundancy::{Known, Solution},
-    sample::{Kind, NO_SLOT, SENSORS, Sample},
-    triad::{Sighting, triad},
+    sample::{Kind, NO_SLOT, Sample},
+    triad,
     unit::Settings,
 };
 
@@ -54,7 +54,8 @@ pub struct Estimate {
     pub triad_nb: Option<[f32; 4]>,
     /// The filter's q_nb at [`Increments::end_us`], scalar first; `None` until it has aligned itself.
     pub q_nb: Option<[f32; 4]>,
-    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD.
+    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD. As of the latest window of the
+    /// filter whose work on it is done, which is some cycles after its measurements have corrected the attitude.
     pub covariance_n: [f32; 6],
     /// [rad/s] gyro bias in b.
     pub bias_b: [f32; 3],
@@ -104,7 +105,13 @@ pub struct Estimator {
     temperatures: Temperatures,
     monitor: Monitor,
     filter: Filter,
+    /// What TRIAD knows.
+    axes_n: Matrix3<f32>,
     last_us: Option<u64>,
+    /// Of the filter's covariance when it was last looked at, with what is said of it.
+    settlements: Option<u8>,
+    covariance_n: [f32; 6],
+    bias_sd: [f32; 3],
 }
 
 impl Estimator {
@@ -115,7 +122,11 @@ impl Estimator {
             temperatures: Temperatures::default(),
             monitor: Monitor::new(&set),
             filter: Filter::new(site.params(&set)),
+            axes_n: axes_n(site.declination_deg.to_radians()),
             last_us: None,
+            settlements: None,
+            covariance_n: [0.0; 6],
+            bias_sd: [0.0; 3],
             set,
         }
     }
@@ -127,7 +138,9 @@ impl Estimator {
         self.temperatures = Temperatures::default();
         self.monitor = Monitor::new(set);
         self.filter = Filter::new(site.params(set));
+        self.axes_n = axes_n(site.declination_deg.to_radians());
         self.last_us = None;
+        self.settlements = None;
     }
 
     /// Of a unit with these settings and the compiled-in parameters.
@@ -179,16 +192,28 @@ impl Estimator {
             mag: field,
             lift_off: reading.lift_off,
         });
-        if self.filter.aligned && !outcome.innovations.is_empty() {
-            let sd = ComplexField::sqrt(self.filter.bias_covariance_b().trace() / 3.0);
-            self.monitor.know_bias(self.filter.bias_b, sd);
-        }
+        self.look_at_the_covariance();
         (self.estimate(&vectors), outcome)
     }
 
+    /// Keeps what is said of the filter's covariance, once a window's work on it is done.
+    fn look_at_the_covariance(&mut self) {
+        let Some((covariance, settlements)) = self.filter.settled() else {
+            return;
+        };
+        if core::mem::replace(&mut self.settlements, Some(settlements)) == Some(settlements) {
+            return;
+        }
+        let (p, bias) = (covariance.attitude(), covariance.bias());
+        self.covariance_n = [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33];
+        self.bias_sd = [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0)));
+        if self.filter.aligned {
+            let sd = ComplexField::sqrt(bias.trace() / 3.0);
+            self.monitor.know_bias(self.filter.bias_b, sd);
+        }
+    }
+
     fn estimate(&self, vectors: &Vectors) -> Estimate {
-        let p = self.filter.attitude_covariance_n();
-        let bias = self.filter.bias_covariance_b();
         Estimate {
             force_b: vectors.force_b.vector_b.into(),
             field_b_ut: vectors.field_b_ut.vector_b.into(),
@@ -196,9 +221,9 @@ impl Estimator {
             sensors: vectors.health,
             triad_nb: self.triad(vectors).map(parts),
             q_nb: self.filter.aligned.then(|| parts(self.filter.attitude())),
-            covariance_n: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
+            covariance_n: self.covariance_n,
             bias_b: self.filter.bias_b.into(),
-            bias_sd: [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0))),
+            bias_sd: self.bias_sd,
         }
     }
 
@@ -209,58 +234,64 @@ impl Estimator {
             return None;
         }
         let (mut slots_us, mut sensors) = (0_u64, 0_u64);
-        for (sensor, slot_us) in SENSORS.iter().zip(sample.slots_us) {
-            let used = sensor.kind == kind && solution.used >> (3 * sensor.plate) & 0b111 != 0;
-            if used && slot_us != NO_SLOT {
-                slots_us += u64::from(slot_us);
+        let mut used = solution.used;
+        for slot_us in sample.slots_of(kind) {
+            if used & 0b111 != 0 && *slot_us != NO_SLOT {
+                slots_us += u64::from(*slot_us);
                 sensors += 1;
             }
+            used >>= 3;
         }
+        let mean_us = match sensors {
+            // A division of 64 bits is a call.
+            4 => slots_us / 4,
+            _ => slots_us.checked_div(sensors).unwrap_or_default(),
+        };
         Some(Sampled {
             value_b: solution.vector_b,
             variance: white(self.set.axes(kind), solution.used),
-            at_us: sample
-                .start_us
-                .saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
+            at_us: sample.start_us.saturating_add(mean_us),
         })
     }
 
     fn triad(&self, vectors: &Vectors) -> Option<UnitQuaternion<f32>> {
+        let Vectors {
+            force_b, field_b_ut, ..
+        } = vectors;
+        if force_b.known != Known::All || field_b_ut.known != Known::All {
+            return None;
+        }
         let gravity = self.filter.params.gravity;
-        let off = ComplexField::abs(vectors.force_b.vector_b.norm() - gravity);
+        let (least, most) = ((1.0 - NEAR_ONE_G) * gravity, (1.0 + NEAR_ONE_G) * gravity);
+        let squared = force_b.vector_b.norm_squared();
         // A comparison with NaN is false.
-        let near = off < NEAR_ONE_G * gravity;
+        let near = squared > least * least && squared < most * most;
         if !near {
             return None;
         }
-        let (sin, cos) = attitude::sin_cos(self.filter.reference.declination);
-        let down = sighting(&vectors.force_b, -1.0, Vector3::z())?;
-        let north = sighting(&vectors.field_b_ut, 1.0, Vector3::new(cos, sin, 0.0))?;
-        triad(&down, &north).ok().map(|found| found.q_nb)
+        triad::attitude(-force_b.vector_b, field_b_ut.vector_b, &self.axes_n).ok()
     }
 }
 
-/// A whole vector as a direction.
-fn sighting(solution: &Solution, sign: f32, known_n: Vector3<f32>) -> Option<Sighting> {
-    let seen_b = solution.vector_b * sign;
-    (solution.known == Known::All).then(|| Sighting {
-        seen_b,
-        known_n,
-        seen_sd: ComplexField::sqrt(mean_variance(&solution.covariance_b)) / seen_b.norm(),
-        known_sd: 0.0,
-    })
+/// The axes that the vertical and a field with this declination [rad] span.
+fn axes_n(declination: f32) -> Matrix3<f32> {
+    let (sin, cos) = attitude::sin_cos(declination);
+    let north_n = Vector3::new(cos, sin, 0.0);
+    // The vertical and a horizontal are never collinear; without axes every attitude is refused.
+    triad::known_axes(Vector3::z(), north_n).unwrap_or_else(|_| Matrix3::zeros())
 }
 
 /// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.
 fn white(axes: &[Axis], used: u16) -> f32 {
-    let of = axes.iter().enumerate().filter(|(k, _)| used >> k & 1 == 1);
-    let sum: f32 = of.map(|(_, axis)| axis.noise * axis.noise).sum();
+    let (mut sum, mut left) = (0.0, used);
+    for axis in axes {
+        if left & 1 == 1 {
+            sum += axis.noise * axis.noise;
+        }
+        left >>= 1;
+    }
     let count = used.count_ones() as f32;
     3.0 * sum / (count * count)
-}
-
-fn mean_variance(covariance: &Matrix3<f32>) -> f32 {
-    covariance.trace() / 3.0
 }
 
 /// Scalar first.

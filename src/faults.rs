@@ -163,9 +163,11 @@ impl Monitor {
         let rate_b = self.gyro.step(&Cycle {
             values: &measured.gyro,
             present: present.of(Kind::Gyro),
-            frozen: frozen(&mut self.gyro_repeats, present.of(Kind::Gyro), |plate| {
-                [reading.gyro[plate]]
-            }),
+            frozen: frozen(
+                &mut self.gyro_repeats,
+                present.of(Kind::Gyro),
+                &reading.gyro.map(|counts| [counts]),
+            ),
             dt_s,
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
@@ -175,9 +177,7 @@ impl Monitor {
             &Cycle {
                 values: &values,
                 present: present.of(Kind::Accelerometer),
-                frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), |plate| {
-                    reading.acc_p[plate]
-                }),
+                frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), &reading.acc_p),
                 dt_s,
             },
             &Apart { rate, by_place: unsure },
@@ -186,9 +186,7 @@ impl Monitor {
             &Cycle {
                 values: &measured.mag,
                 present: present.of(Kind::Magnetometer),
-                frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), |plate| {
-                    reading.mag_p[plate]
-                }),
+                frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), &reading.mag_p),
                 dt_s,
             },
             &Apart { rate, by_place: 0.0 },
@@ -280,11 +278,18 @@ fn without_lever_arms(set: &Set, along: &[f32; TRIAD_AXES], turning: &Turning) -
 }
 
 /// Axes of the sensors that repeat themselves, three bits or one a sensor. At the end of its range a healthy one does.
-fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], present: u16, counts: impl Fn(usize) -> [i16; N]) -> u16 {
-    let each = repeats.iter_mut().enumerate().map(|(plate, repeats)| {
-        let axes = ((1 << N) - 1) << (N * plate);
-        let read = (present & axes == axes).then(|| counts(plate));
-        u16::from(repeats.frozen(read)) * axes
-    });
-    each.sum()
+fn frozen<const N: usize>(
+    repeats: &mut [Repeats<N>; PLATES],
+    present: u16,
+    counts: &[[i16; N]; PLATES],
+) -> u16 {
+    let (mut axes, mut found) = ((1 << N) - 1, 0);
+    for (repeats, counts) in repeats.iter_mut().zip(counts) {
+        let read = (present & axes == axes).then_some(counts);
+        if repeats.frozen(read) {
+            found |= axes;
+        }
+        axes <<= N;
+    }
+    found
 }

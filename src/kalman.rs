@@ -37,6 +37,8 @@ mod field;
 mod innovation;
 mod iron;
 mod params;
+mod passage;
+mod pending;
 mod start;
 mod step;
 mod window;
@@ -44,7 +46,7 @@ mod window;
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 pub use self::{
-    covariance::STATES,
+    covariance::{Covariance, STATES},
     field::Reference,
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
     iron::HardIron,
@@ -52,8 +54,10 @@ pub use self::{
     step::{Outcome, Refusal, Sampled, Step},
 };
 use self::{
-    covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
-    innovation::Correction,
+    covariance::{GYRO_MATRIX, State, VELOCITY, are_finite},
+    innovation::{Correction, Scalar},
+    passage::walks,
+    pending::Pending,
     start::UNKNOWN,
     window::{Means, Window},
 };
@@ -72,8 +76,14 @@ pub struct Filter {
     pub gyro_matrix: Matrix3<f32>,
     /// [m/s] velocity north and east, as far as it is bounded.
     pub velocity_n: Vector2<f32>,
-    /// Covariance of the error state.
-    pub covariance: Covariance,
+    /// Covariance of the error state, but for what is pending.
+    covariance: Covariance,
+    /// What the latest window still has to do to it.
+    pending: Pending,
+    /// How often the covariance was complete, round and round.
+    settlements: u8,
+    /// Rounding made a variance negative.
+    unsound: bool,
     /// The field that is expected.
     pub reference: Reference,
     /// Hard iron that the calibration does not know.
@@ -104,6 +114,9 @@ impl Filter {
             gyro_matrix: Matrix3::zeros(),
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
+            pending: Pending::nothing(),
+            settlements: 0,
+            unsound: false,
             reference: params.field,
             iron: HardIron::none(),
             aligned: false,
@@ -133,23 +146,45 @@ impl Filter {
         self.q_nb * from_rotation_vector(self.rate_b * self.params.delays.gyro_s)
     }
 
+    /// Covariance of the error state as of the last window; what is pending is done on a copy.
+    pub fn covariance(&self) -> Covariance {
+        let (mut covariance, mut pending) = (self.covariance.clone(), self.pending.clone());
+        while !pending.is_done() {
+            pending.work(&mut covariance);
+        }
+        covariance.keep_bounds();
+        covariance
+    }
+
     /// [rad^2] covariance of the attitude's error as a small rotation vector in n, as of the last window.
     pub fn attitude_covariance_n(&self) -> Matrix3<f32> {
-        self.covariance.attitude()
+        self.covariance().attitude()
     }
 
     /// [rad/s] bias covariance in b.
     pub fn bias_covariance_b(&self) -> Matrix3<f32> {
-        self.covariance.bias()
+        self.covariance().bias()
+    }
+
+    /// The covariance as it was when it was last complete, and how often that was so, round and round; `None` while the
+    /// work of a window is half done.
+    pub fn settled(&self) -> Option<(&Covariance, u8)> {
+        let settled = (&self.covariance, self.settlements);
+        (!self.pending.is_half_done()).then_some(settled)
     }
 
     /// Takes a step.
     pub fn step(&mut self, step: &Step) -> Outcome {
         let mut outcome = Outcome::default();
+        self.take(step, &mut outcome);
+        outcome
+    }
+
+    fn take(&mut self, step: &Step, outcome: &mut Outcome) {
         let since_s = match self.last_us {
             Some(last_us) if step.at_us <= last_us => {
                 outcome.refusal = Some(Refusal::NotLater);
-                return outcome;
+                return;
             }
             Some(last_us) => (step.at_us - last_us) as f32 * 1e-6,
             None => step.covered_s,
@@ -164,20 +199,41 @@ impl Filter {
         if self.silent_s + gap_s >= self.params.longest_gap_s {
             outcome.refusal = Some(Refusal::Gap);
             self.lose(since_s);
-            return outcome;
+            return;
         }
         let dcm_nb = self.propagate(step, covered_s, gap_s.max(0.0), rotation);
         if rotation {
             self.gather(step, &dcm_nb);
         }
         if self.window.duration_s >= self.params.window_s - HALF_A_MILLISECOND {
-            self.close(&mut outcome, step.lift_off);
+            self.settle();
+            self.close(outcome, step.lift_off);
             if !self.is_finite() {
-                // Nothing above can lead here with finite input; the radiation that flips a bit of the state can.
+                *self = Filter::new(self.params);
+            }
+        } else if !self.pending.is_done() {
+            self.work();
+        }
+    }
+
+    /// One stage of what is pending; at its end the covariance is looked at.
+    fn work(&mut self) {
+        self.pending.work(&mut self.covariance);
+        if self.pending.is_done() {
+            self.settlements = self.settlements.wrapping_add(1);
+            self.unsound = !self.covariance.keep_bounds();
+            if !self.covariance.is_finite() {
+                // Nothing can lead here with finite input; the radiation that flips a bit of the state can.
                 *self = Filter::new(self.params);
             }
         }
-        outcome
+    }
+
+    /// All that is pending.
+    fn settle(&mut self) {
+        while !self.pending.is_done() {
+            self.work();
+        }
     }
 
     /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
@@ -230,36 +286,42 @@ impl Filter {
         }
     }
 
-    /// A window is complete: covariance over it, then everything it measured.
+    /// A window is complete: everything it measured. What that does to the covariance is pending.
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
-        let window = core::mem::take(&mut self.window);
-        let means = window.means(&self.params, lift_off);
+        let means = self.window.means(&self.params, lift_off);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
         if !self.aligned {
-            self.covariance.predict(&self.params, &window, &means);
+            self.window = Window::default();
+            // Of what a window does to it nothing else lasts until there is an attitude.
+            self.covariance.drift(&walks(&self.params, means.duration_s));
             outcome.aligned = self.align(&means, UNKNOWN);
             if !outcome.aligned {
                 self.covariance.forget_attitude();
             }
+            self.settlements = self.settlements.wrapping_add(1);
             return;
         }
         self.velocity_n += means.velocity_change_n;
-        self.covariance.predict(&self.params, &window, &means);
-        let mut correction = Correction::new(self.params.gate);
+        self.pending.passage.become_of(&self.params, &self.window, &means);
+        self.pending.seen.clear();
+        self.window = Window::default();
+        let mut correction = Correction::new(self.params.gate, &mut outcome.innovations);
         if rests {
             self.compare_rest(&means, &mut correction);
         }
-        let velocity = means.vertical.then(|| self.compare_velocity(&means, &mut correction));
-        if velocity.is_none() {
+        let start = self.pending.passage.means_seen(&self.covariance);
+        let velocity = if means.vertical {
+            Some(self.compare_velocity(&means, &start, &mut correction))
+        } else {
             self.velocity_n = Vector2::zeros();
-            self.covariance.forget_velocity(self.params.velocity_sd);
-        }
-        let field = self.compare_field(&window, &means, &mut correction);
-        self.inject(&correction);
-        outcome.innovations = correction.innovations;
-        let bounded = self.covariance.keep_bounds();
-        outcome.aligned = self.recover(&means, bounded, [velocity, field]);
+            None
+        };
+        let field = self.compare_field(&means, &start, &mut correction);
+        let error = correction.error;
+        self.inject(&error);
+        self.pending.begin();
+        outcome.aligned = self.recover(&means, [velocity, field]);
     }
 
     /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
@@ -273,16 +335,16 @@ impl Filter {
         }
         let mut accepted = true;
         for axis in 0..3 {
-            let measured = means.rate_b[axis] - earth_b[axis];
-            let rows = [(BIAS + axis, 1.0)];
-            accepted &= correction.compare(
-                &mut self.covariance,
-                Quantity::Bias,
-                self.bias_b[axis],
-                measured,
-                &rows,
+            let mut row = State::default();
+            row.drivers[axis] = 1.0;
+            let scalar = Scalar {
+                quantity: Quantity::Bias,
+                predicted: self.bias_b[axis],
+                measured: means.rate_b[axis] - earth_b[axis],
+                row: &row,
                 variance,
-            );
+            };
+            accepted &= self.compare(&scalar, self.covariance.of_driver(axis), correction);
         }
         self.bias_rejected_s = if accepted {
             0.0
@@ -291,27 +353,36 @@ impl Filter {
         };
     }
 
-    /// The velocity is bounded: zero is measured of it.
-    fn compare_velocity(&mut self, means: &Means, correction: &mut Correction) -> bool {
+    /// The velocity is bounded: zero is measured of it. What it gained in the window, it gained by the mean tilt.
+    fn compare_velocity(&mut self, means: &Means, start: &[State; 3], correction: &mut Correction) -> bool {
+        let tilt = self.pending.passage.tilt;
         let mut accepted = true;
-        for axis in 0..2 {
-            let rows = [(VELOCITY + axis, 1.0)];
-            let (predicted, variance) = (self.velocity_n[axis], means.velocity_variance);
-            accepted &= correction.compare(
-                &mut self.covariance,
-                Quantity::Velocity,
-                predicted,
-                0.0,
-                &rows,
-                variance,
-            );
+        for (axis, (mean, factor)) in [(&start[1], -tilt), (&start[0], tilt)].into_iter().enumerate() {
+            let mut row = State::default();
+            row.driven[VELOCITY + axis] = 1.0;
+            let mut column = self.covariance.of_driven(VELOCITY + axis);
+            column.add(mean, factor);
+            let scalar = Scalar {
+                quantity: Quantity::Velocity,
+                predicted: self.velocity_n[axis],
+                measured: 0.0,
+                row: &row,
+                variance: means.velocity_variance,
+            };
+            accepted &= self.compare(&scalar, column, correction);
         }
         accepted
     }
 
+    /// A scalar, of whose `P h'` the passage is still to be made.
+    fn compare(&mut self, scalar: &Scalar, mut column: State, correction: &mut Correction) -> bool {
+        self.pending.passage.carry(&mut column, scalar.row);
+        correction.compare(scalar, &mut column, &mut self.pending.seen)
+    }
+
     /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
     /// disturbed for its rejection to say anything of the attitude.
-    fn compare_field(&mut self, window: &Window, means: &Means, correction: &mut Correction) -> Option<bool> {
+    fn compare_field(&mut self, means: &Means, start: &[State; 3], correction: &mut Correction) -> Option<bool> {
         let sums = means.field?;
         self.iron.learn(&self.params, &sums);
         self.reference
@@ -326,35 +397,41 @@ impl Filter {
         correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
         let mut accepted = true;
         for scalar in &compared.scalars {
-            let (quantity, rows) = (scalar.quantity, &window.mean_rows(&scalar.row_n));
-            let covariance = &mut self.covariance;
-            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.variance);
+            let row = self.pending.passage.mean_row(&scalar.row_n);
+            let mut column = State::default();
+            for (mean, part) in start.iter().zip(&scalar.row_n) {
+                column.add(mean, *part);
+            }
+            let scalar = Scalar {
+                quantity: scalar.quantity,
+                predicted: 0.0,
+                measured: scalar.residual,
+                row: &row,
+                variance: scalar.variance,
+            };
+            accepted &= self.compare(&scalar, column, correction);
         }
         correction.usable = true;
         (!disturbed).then_some(accepted)
     }
 
-    fn inject(&mut self, correction: &Correction) {
-        let error = &correction.error;
-        let rotation_n = Vector3::new(error[0], error[1], error[2]);
+    fn inject(&mut self, error: &State) {
+        let [north, east, down, to_north, to_east] = error.driven;
+        let rotation_n = Vector3::new(north, east, down);
         self.q_nb = renormalised(from_rotation_vector(rotation_n) * self.q_nb);
-        self.bias_b += error.fixed_rows::<3>(BIAS);
-        for axis in 0..3 {
-            for about in 0..3 {
-                self.gyro_matrix[(axis, about)] += error[GYRO_MATRIX + 3 * axis + about];
-            }
-        }
-        self.velocity_n += error.fixed_rows::<2>(VELOCITY);
+        let (bias, matrix) = error.drivers.split_at(GYRO_MATRIX);
+        self.bias_b += Vector3::from_row_slice(bias);
+        self.gyro_matrix += Matrix3::from_row_slice(matrix);
+        self.velocity_n += Vector2::new(to_north, to_east);
     }
 
+    /// Of the state; the covariance is looked at when its work is done.
     fn is_finite(&self) -> bool {
-        let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
-        finite(self.q_nb.as_vector().as_slice())
-            && finite(self.bias_b.as_slice())
-            && finite(self.gyro_matrix.as_slice())
-            && finite(self.velocity_n.as_slice())
+        are_finite(self.q_nb.as_vector().as_slice())
+            && are_finite(self.bias_b.as_slice())
+            && are_finite(self.gyro_matrix.as_slice())
+            && are_finite(self.velocity_n.as_slice())
             && self.iron.is_finite()
-            && self.covariance.is_finite()
     }
 }
 

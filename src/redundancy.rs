@@ -61,14 +61,16 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
     // Written out: a symmetric matrix has six elements, and this sum is most of what a cycle costs.
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut weighted = Vector3::zeros();
-    let mut used = 0;
-    for (k, ((axis_b, value), variance)) in axes_b.iter().zip(values).zip(variances).take(16).enumerate() {
-        let weight = 1.0 / variance;
+    // The bit of the axis; none beyond the sixteenth.
+    let (mut bit, mut used) = (1, 0);
+    for ((axis_b, value), variance) in axes_b.iter().zip(values).zip(variances) {
+        let (axis, weight) = (bit, 1.0 / variance);
+        bit <<= 1;
         // Comparisons with NaN are false.
-        let usable = value.is_finite() && weight > 0.0 && weight <= f32::MAX;
-        if wanted >> k & 1 == 0 || !usable {
+        if !(wanted & axis != 0 && value.abs() <= f32::MAX && weight > 0.0 && weight <= f32::MAX) {
             continue;
         }
+        used |= axis;
         let row = axis_b * weight;
         xx += row.x * axis_b.x;
         xy += row.x * axis_b.y;
@@ -77,7 +79,6 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
         yz += row.y * axis_b.z;
         zz += row.z * axis_b.z;
         weighted += row * *value;
-        used |= 1 << k;
     }
     let (covariance_b, known) = gaps::invert(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
     Solution {

@@ -143,3 +143,17 @@ pub struct Sample {
     /// [us] instant at which each sensor was sampled, after `start_us`, in reading order; [`NO_SLOT`] if it was not.
     pub slots_us: [u32; SENSOR_COUNT],
 }
+
+impl Sample {
+    /// [us] slot times of the sensors of a kind, plate 1 to 4.
+    pub fn slots_of(&self, kind: Kind) -> &[u32] {
+        // The kinds come one after another in the reading order.
+        let first = match kind {
+            Kind::Accelerometer => 0,
+            Kind::Magnetometer => 4,
+            Kind::Gyro => 8,
+            Kind::Thermometer => 12,
+        };
+        &self.slots_us[first..first + 4]
+    }
+}

@@ -52,9 +52,10 @@ pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
     /// Unit vector of the parity.
     across: [f32; PLATES],
-    /// Least squares by all four, and without each.
+    /// Least squares by all four.
     rate_from_all: SMatrix<f32, 3, PLATES>,
-    rate_without: [SMatrix<f32, 3, PLATES>; PLATES],
+    /// By how much a parity of one moves the rate when each gyro is left out.
+    without: [Vector3<f32>; PLATES],
     uncertainty: Uncertainty,
     /// [s] by how much the sampling instants are unsure.
     timing_s: f32,
@@ -82,7 +83,7 @@ impl Gyros {
             axes_b,
             across,
             rate_from_all: matrix(&axes_b, ALL),
-            rate_without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k))),
+            without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k)) * Vector4::from(across)),
             uncertainty,
             timing_s,
             parity: Watch::new((0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(), allowed),
@@ -159,8 +160,7 @@ impl Gyros {
 
     /// The parity of all four; the rate of those left.
     fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
-        let sum: f32 = (0..PLATES).map(|k| self.across[k] * cycle.values[k]).sum();
-        let parity = sum - self.parity.offset;
+        let parity = self.parity_of(cycle.values);
         let noise = self.parity.noise;
         let variance = noise + systematic + self.parity.offset_variance;
         if let Some(leapt) = self.leap(cycle, variances, parity * reciprocal_root(noise)) {
@@ -261,11 +261,22 @@ impl Gyros {
         *usual_b += (rate_b - *usual_b) / self.cycles;
     }
 
-    /// The rate without each gyro in turn; `None` unless all four are used. The parity's learned offset is taken out across
-    /// all four, which leaves the rate of all as it is and gives each of these the same bias.
+    /// The rate without each gyro in turn; `None` unless all four are used. What four gyros measure is what their rate
+    /// explains and the parity, so without one of them the rate is off from that of all by the parity alone. Its learned
+    /// offset is taken out, which gives each of these the same bias.
     pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
-        let values = Vector4::from(*values) - Vector4::from(self.across) * self.parity.offset;
-        (used == ALL).then(|| self.rate_without.map(|matrix| matrix * values))
+        if used != ALL {
+            return None;
+        }
+        let rate_b = self.rate_from_all * Vector4::from(*values);
+        let parity = self.parity_of(values);
+        Some(self.without.map(|moved_b| rate_b + moved_b * parity))
+    }
+
+    /// Parity beyond its learned offset.
+    fn parity_of(&self, values: &[f32; PLATES]) -> f32 {
+        let parts = self.across.iter().zip(values);
+        parts.fold(0.0, |sum, (across, value)| sum + across * value) - self.parity.offset
     }
 }
 

@@ -25,6 +25,11 @@ struct Cycle {
     systematic: i16,
 }
 
+const NOTHING: Cycle = Cycle {
+    disagreement: 0,
+    systematic: 0,
+};
+
 /// A window over the newest disagreements.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trace {
@@ -49,10 +54,7 @@ pub(super) struct Limits {
 
 impl Trace {
     pub(super) const EMPTY: Trace = Trace {
-        ring: [Cycle {
-            disagreement: 0,
-            systematic: 0,
-        }; LONG],
+        ring: [NOTHING; LONG],
         next: 0,
         held: 0,
         sum: 0,
@@ -66,15 +68,17 @@ impl Trace {
     pub(super) fn push(&mut self, disagreement: f32, systematic: f32) {
         let new = Cycle {
             disagreement: clipped(disagreement),
-            systematic: clipped(systematic),
+            systematic: clipped_above(systematic),
         };
-        let next = usize::from(self.next) % LONG;
-        let left = self.ring[if next < SHORT {
-            next + LONG - SHORT
+        let next = usize::from(self.next);
+        let left = if next < SHORT {
+            next + (LONG - SHORT)
         } else {
             next - SHORT
-        }];
-        let old = core::mem::replace(&mut self.ring[next], new);
+        };
+        // Both are within it.
+        let left = self.ring.get(left).copied().unwrap_or(NOTHING);
+        let old = self.ring.get_mut(next).map_or(NOTHING, |old| core::mem::replace(old, new));
         // The sums of 26 squares of 8128 stay within 32 bits; arithmetic that would check it is a tenth of the step.
         let moved = |sum: &mut i32, new: i32, old: i32| *sum = sum.wrapping_add(new).wrapping_sub(old);
         let square = |value: i16| i32::from(value).wrapping_mul(i32::from(value));
@@ -88,8 +92,8 @@ impl Trace {
             square(new.systematic),
             square(old.systematic),
         );
-        self.next = if next + 1 < LONG { next as u8 + 1 } else { 0 };
-        self.held = self.held.saturating_add(1).min(LONG as u8);
+        self.next = if next < LONG - 1 { next as u8 + 1 } else { 0 };
+        self.held = if self.held < LONG as u8 { self.held + 1 } else { self.held };
     }
 
     /// Whether it holds [`LONG`] cycles.
@@ -108,7 +112,7 @@ impl Trace {
         let [short, systematic] = self.short;
         let short = mean_squared(short, systematic, SHORT as f32) / (limits.short * limits.short);
         let long = mean_squared(self.sum, self.systematic, f32::from(self.held)) / (limits.long * limits.long);
-        spread.max(short).max(long)
+        larger(spread, larger(short, long))
     }
 
     /// Variance of a full window about its mean, and the variance that is expected.
@@ -119,14 +123,27 @@ impl Trace {
     }
 }
 
+/// The larger of two numbers; the second if either is none. `f32::max` is a call on the target.
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 fn clipped(sigmas: f32) -> i16 {
-    const MOST: i32 = (MOST_SIGMAS * PER_SIGMA) as i32;
-    if sigmas.is_nan() {
-        return MOST as i16;
+    if sigmas < 0.0 {
+        -clipped_above(-sigmas)
+    } else {
+        clipped_above(sigmas)
     }
-    // To the nearest; the cast saturates and takes off what is behind the point.
-    let half = if sigmas < 0.0 { -0.5 } else { 0.5 };
-    ((sigmas * PER_SIGMA + half) as i32).clamp(-MOST, MOST) as i16
+}
+
+/// Of a number that is not below zero, or none.
+fn clipped_above(sigmas: f32) -> i16 {
+    // To the nearest; a comparison with NaN is false.
+    if sigmas < MOST_SIGMAS {
+        (sigmas * PER_SIGMA + 0.5) as i32 as i16
+    } else {
+        (MOST_SIGMAS * PER_SIGMA) as i16
+    }
 }
 
 fn squared_sigmas(squares: i32) -> f32 {

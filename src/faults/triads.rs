@@ -14,7 +14,7 @@ use nalgebra::{ComplexField, Vector3};
 
 use super::{
     Cycle,
-    consensus::{Agreement, Values},
+    consensus::{Agreement, Disagreement, Values},
     health::Verdict,
     trace::Limits,
     watch::Watch,
@@ -105,13 +105,11 @@ impl Triads {
             let watch = &self.watches[k];
             watch.noise + systematic + watch.offset_variance
         });
-        let axes_b = self.axes_b;
         let axes = Values {
-            axes_b: &axes_b,
             values: &values,
             variances: &variances,
         };
-        let found = axes.agreed(candidates);
+        let found = axes.agreed(&self.axes_b, candidates);
         self.undecided = !found.decided;
         if found.solution.known != Known::All {
             self.last_b = None;
@@ -166,18 +164,23 @@ impl Triads {
     /// Notes what each axis disagrees by; how near each that is believed is to an alarm.
     fn watch(&mut self, present: u16, systematic: f32, axes: &Values, found: &Agreement) -> [f32; TRIAD_AXES] {
         let mut alarms = [0.0; TRIAD_AXES];
-        for (k, (watch, alarm)) in self.watches.iter_mut().zip(&mut alarms).enumerate() {
+        let each = self.watches.iter_mut().zip(&mut alarms);
+        for (k, ((watch, alarm), (off, variance))) in each.zip(found.off.iter().zip(axes.variances)).enumerate() {
             let (read, used) = (present >> k & 1 == 1, found.solution.used >> k & 1 == 1);
-            let disagreement = axes.disagreement(k, found).filter(|_| read);
+            let disagreement = if read {
+                Disagreement::of(*off, *variance, used)
+            } else {
+                None
+            };
             if let Some(disagreement) = disagreement {
                 // The parts of the disagreement's variance are in the same proportion as the axis's own.
-                watch.note(disagreement.by, disagreement.variance / axes.variances[k], systematic);
+                watch.note(disagreement.by, disagreement.share, systematic);
             }
             match disagreement {
                 Some(_) if watch.excluded() => watch.reconsider(),
                 Some(disagreement) if used => {
                     watch.strike(false);
-                    *alarm = watch.learn(disagreement.by, disagreement.variance, LIMITS);
+                    *alarm = watch.learn(disagreement.by, disagreement.share * variance, LIMITS);
                 }
                 _ if watch.excluded() => {}
                 gated => {

@@ -12,7 +12,7 @@
 use super::{
     health::Verdict,
     root::{reciprocal_root, root},
-    trace::{LONG, Limits, Trace, WILD},
+    trace::{LONG, Limits, Trace, WILD, larger},
 };
 
 /// Cycles the learned offset goes back: 200 s at 5 Hz. Large: steps are seen sharper. Small: drifts are followed.
@@ -86,7 +86,13 @@ impl Watch {
         // The root is worth its while only beyond what it is at least.
         if sigmas.abs() > WILD {
             let most = WILD * root(1.0 + systematic * systematic);
-            sigmas = sigmas.max(-most).min(most);
+            sigmas = if sigmas > most {
+                most
+            } else if sigmas < -most {
+                -most
+            } else {
+                sigmas
+            };
         }
         self.trace.push(sigmas, systematic);
     }
@@ -108,7 +114,7 @@ impl Watch {
             return loud * loud;
         }
         let crept = self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed);
-        over.max(crept)
+        larger(crept, over)
     }
 
     /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
@@ -119,7 +125,8 @@ impl Watch {
             let gain = self.offset_variance / variance;
             self.offset += gain * disagreement;
             let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
-            self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten).min(self.allowed);
+            let learnt = self.offset_variance * (1.0 - gain) + forgotten;
+            self.offset_variance = if learnt < self.allowed { learnt } else { self.allowed };
         }
         self.loudness(over)
     }

@@ -1,8 +1,6 @@
 //! One record for every scalar compared, and the correction that the scalars of a window add up to.
 
-use nalgebra::SVector;
-
-use super::covariance::{Covariance, STATES};
+use super::covariance::{Seen, State};
 
 /// Most scalars of a window: bias 3, velocity 2, field 2.
 pub const INNOVATIONS: usize = 7;
@@ -45,53 +43,76 @@ pub struct Innovation {
 }
 
 /// What the scalars of a window correct together.
-pub(super) struct Correction {
+pub(super) struct Correction<'a> {
     gate: f32,
     /// Scalars compared while this is `false` are recorded and not used.
     pub usable: bool,
     /// The error state as estimated so far.
-    pub error: SVector<f32, STATES>,
+    pub error: State,
     /// What was compared.
-    pub innovations: Innovations,
+    innovations: &'a mut Innovations,
 }
 
-impl Correction {
-    pub fn new(gate: f32) -> Self {
+/// A scalar to be compared.
+pub(super) struct Scalar<'a> {
+    pub quantity: Quantity,
+    /// As the state has it.
+    pub predicted: f32,
+    pub measured: f32,
+    /// `h`: how it depends on the error state at the end of the window.
+    pub row: &'a State,
+    /// `r`.
+    pub variance: f32,
+}
+
+impl<'a> Correction<'a> {
+    pub fn new(gate: f32, innovations: &'a mut Innovations) -> Self {
         Correction {
             gate,
             usable: true,
-            error: SVector::zeros(),
-            innovations: Innovations::new(),
+            error: State::default(),
+            innovations,
         }
     }
 
-    /// Compares a scalar that depends on the error state by `rows` (index, factor). Whether it was accepted.
+    /// Compares a scalar. Whether it was accepted. `column` is `P h'` of the covariance at the end of the window before any
+    /// of its scalars, and becomes that after the others `seen`, `P h' - sum k (p h')`; the covariance itself has their
+    /// updates later.
     pub fn compare(
         &mut self,
-        covariance: &mut Covariance,
-        quantity: Quantity,
-        predicted: f32,
-        measured: f32,
-        rows: &[(usize, f32)],
-        variance: f32,
+        scalar: &Scalar,
+        column: &mut State,
+        seen: &mut heapless::Vec<Seen, INNOVATIONS>,
     ) -> bool {
-        let explained: f32 = rows.iter().map(|(index, factor)| self.error[*index] * factor).sum();
-        let residual = measured - predicted - explained;
-        let seen = covariance.seen(rows, variance);
-        let test_ratio = residual * residual / (self.gate * self.gate * seen.variance);
-        // Not greater than one, so that NaN is rejected too.
-        let accepted = self.usable && test_ratio <= 1.0;
-        if accepted {
-            self.error += seen.column * (residual / seen.variance);
-            covariance.update(&seen);
+        let Scalar {
+            quantity,
+            predicted,
+            measured,
+            row,
+            variance,
+        } = *scalar;
+        let residual = measured - predicted - self.error.dot(row);
+        for seen in seen.iter() {
+            column.add(&seen.column, -(seen.column.dot(row) / seen.variance));
         }
-        // There are as many places as scalars.
+        let variance = column.dot(row) + variance;
+        let test_ratio = residual * residual / (self.gate * self.gate * variance);
+        // Not greater than one, so that NaN is rejected too.
+        let accepted = self.usable && variance > 0.0 && test_ratio <= 1.0;
+        if accepted {
+            self.error.add(column, residual / variance);
+            // There are as many places as scalars, here and below.
+            let _ = seen.push(Seen {
+                column: *column,
+                variance,
+            });
+        }
         let _ = self.innovations.push(Innovation {
             quantity,
             predicted,
             measured,
             residual,
-            variance: seen.variance,
+            variance,
             test_ratio,
             accepted,
         });

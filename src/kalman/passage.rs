@@ -1,0 +1,119 @@
+//! What a window did to the error state.
+//!
+//! In: the window's drive and its means. Out: `F` and `Q` applied to vectors; [`super::Covariance`] applies them to itself.
+//! With `A` the drive, `B` its mean over the window and `T` the tilt, `x <- F x` is
+//!
+//! ```text
+//! a <- a + A d        v <- v + T ((a + B d) x f)_h,  f = (0, 0, -1)        d <- d
+//! ```
+//!
+//! for attitude `a`, velocity `v` and drivers `d` (bias, gyro matrix): the velocity gains what the mean attitude error
+//! makes of gravity. A mean over the window sees `a - A d + B d` of the state at its end, so `F'` of what it sees is `r`
+//! on the attitude and `B' r` on the drivers.
+
+use nalgebra::Vector3;
+
+use super::{
+    Params,
+    covariance::{Covariance, DRIVERS, GYRO_MATRIX, State, VELOCITY, dot},
+    square,
+    window::{Means, Window},
+};
+
+/// The passage from the start of a window to its end.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Passage {
+    /// Attitude error by bias \[s\] and matrix \[rad\], a row for each axis of n: `-integral dcm_nb (1, gyro)`.
+    pub drive: [[f32; DRIVERS]; 3],
+    /// Its mean over the window.
+    pub mean_drive: [[f32; DRIVERS]; 3],
+    /// [m/s] velocity gained by an attitude error of one.
+    pub tilt: f32,
+    /// [rad^2] the attitude's random walk.
+    pub angle_variance: f32,
+    /// [rad m/s] what velocity and tilt have of it in common.
+    pub both: f32,
+    /// [m2/s2] the velocity's random walk.
+    pub velocity_variance: f32,
+    /// Random walks of bias and of gyro matrix.
+    pub walks: [f32; 2],
+    /// The velocity is not known any more ...
+    pub velocity_lost: bool,
+    /// [m/s] ... but to this.
+    pub velocity_sd: f32,
+}
+
+/// Variances that bias and gyro matrix gain by walking for so long [s].
+pub(super) fn walks(params: &Params, duration_s: f32) -> [f32; 2] {
+    [params.bias_walk, params.gyro_matrix_walk].map(|walk| square(walk) * duration_s)
+}
+
+impl Passage {
+    /// Becomes that of a window.
+    pub fn become_of(&mut self, params: &Params, window: &Window, means: &Means) {
+        let tilt = params.gravity * means.vertical_s;
+        let variance = window.angle_variance;
+        self.drive = window.drive;
+        self.mean_drive = window.mean_drive;
+        self.tilt = tilt;
+        self.angle_variance = variance;
+        // The mean of a walk has a third of the variance of its end, and half of it in common with it.
+        self.both = tilt * variance / 2.0;
+        self.velocity_variance = tilt * tilt * variance / 3.0 + means.velocity_change_variance;
+        self.walks = walks(params, means.duration_s);
+        self.velocity_lost = !means.vertical;
+        self.velocity_sd = params.velocity_sd;
+    }
+
+    /// What a mean over the window sees of the error state at its end, if at any instant it sees `row_n` of the attitude
+    /// error: less of what the gyros' errors added than there is.
+    pub fn mean_row(&self, row_n: &Vector3<f32>) -> State {
+        let [x, y, z] = [row_n.x, row_n.y, row_n.z];
+        let missed = |axis: usize, driver: usize| self.mean_drive[axis][driver] - self.drive[axis][driver];
+        State {
+            driven: [x, y, z, 0.0, 0.0],
+            drivers: core::array::from_fn(|k| x * missed(0, k) + y * missed(1, k) + z * missed(2, k)),
+        }
+    }
+
+    /// `P h'` at the end of the window for each axis of n as a mean over the window sees it, still without passage:
+    /// the covariance at its start times `(1 on the axis, B' on the drivers)`.
+    pub fn means_seen(&self, covariance: &Covariance) -> [State; 3] {
+        let [north, east, down] = &self.mean_drive;
+        [
+            covariance.times(0, north),
+            covariance.times(1, east),
+            covariance.times(2, down),
+        ]
+    }
+
+    /// Makes `P h'` at the end, for a row `h` there, of `P F' h'` at the start.
+    pub fn carry(&self, column: &mut State, row: &State) {
+        let State { driven, drivers } = column;
+        let along = *drivers;
+        let gained = self.drive.each_ref().map(|drive| dot(drive, &along));
+        let [mean_north, mean_east, _] = self.mean_drive.each_ref();
+        let (mean_north, mean_east) = (dot(mean_north, &along), dot(mean_east, &along));
+        let [north, east, down, to_north, to_east] = *driven;
+        let (noise, both) = (self.angle_variance, self.both);
+        let [n, e, d, v_n, v_e] = row.driven;
+        *driven = [
+            north + gained[0] + (noise * n + both * v_e),
+            east + gained[1] + (noise * e - both * v_n),
+            down + gained[2] + noise * d,
+            to_north - self.tilt * (east + mean_east) + (self.velocity_variance * v_n - both * e),
+            to_east + self.tilt * (north + mean_north) + (self.velocity_variance * v_e + both * n),
+        ];
+        if self.velocity_lost {
+            driven[VELOCITY..].fill(0.0);
+        }
+        let [bias, matrix] = self.walks;
+        let (bias_along, matrix_along) = drivers.split_at_mut(GYRO_MATRIX);
+        for (sum, row) in bias_along.iter_mut().zip(&row.drivers) {
+            *sum += bias * row;
+        }
+        for (sum, row) in matrix_along.iter_mut().zip(&row.drivers[GYRO_MATRIX..]) {
+            *sum += matrix * row;
+        }
+    }
+}
