@@ -62,49 +62,55 @@ impl Disagreement {
     }
 }
 
-impl Values<'_> {
-    /// With the leverage `l` a residual `r` is a disagreement of `r / sqrt(v (1 - l))` standard deviations; looked at
-    /// squared first, as the root is seldom needed.
-    fn solve(&self, axes_b: &[Vector3<f32>; 12], wanted: u16) -> Agreement {
-        let solution = solve(axes_b, self.values, self.variances, wanted);
-        let mut off = [(0.0, 0.0); 12];
+impl Agreement {
+    /// Of nothing yet.
+    pub(super) const NOTHING: Agreement = Agreement {
+        solution: Solution::NOTHING,
+        off: [(0.0, 0.0); 12],
+        worst: None,
+        decided: true,
+    };
+
+    /// Takes a solution, and holds every axis against it. With the leverage `l` a residual `r` is a disagreement of
+    /// `r / sqrt(v (1 - l))` standard deviations; looked at squared first, as the root is seldom needed.
+    fn take(&mut self, solution: Solution, axes_b: &[Vector3<f32>; 12], values: &Values) {
+        self.solution = solution;
         let mut worst = (GATE, None);
-        let axes = axes_b.iter().zip(self.values).zip(self.variances);
-        for (k, (((axis_b, value), variance), off)) in axes.zip(&mut off).enumerate() {
-            let (expected, explained) = solution.along(axis_b);
+        let axes = axes_b.iter().zip(values.values).zip(values.variances);
+        for (k, (((axis_b, value), variance), off)) in axes.zip(&mut self.off).enumerate() {
+            let (expected, explained) = self.solution.along(axis_b);
             let (residual, free) = (value - expected, variance - explained);
             *off = (residual, explained);
             // Seldom true, so asked first.
-            if residual * residual > GATE * GATE * free && free > UNCHECKED * variance && solution.used >> k & 1 == 1 {
+            if residual * residual > GATE * GATE * free
+                && free > UNCHECKED * variance
+                && self.solution.used >> k & 1 == 1
+            {
                 let sigmas = residual.abs() * reciprocal_root(free);
                 if sigmas > worst.0 {
                     worst = (sigmas, Some(k));
                 }
             }
         }
-        Agreement {
-            solution,
-            off,
-            worst: worst.1,
-            decided: true,
-        }
+        self.worst = worst.1;
     }
+}
 
+impl Values<'_> {
     /// The vector of those of `candidates` that agree.
-    pub(super) fn agreed(&self, axes_b: &[Vector3<f32>; 12], candidates: u16) -> Agreement {
-        let mut found = self.solve(axes_b, candidates);
+    pub(super) fn agree(&self, axes_b: &[Vector3<f32>; 12], candidates: u16, found: &mut Agreement) {
+        let solved = |wanted| solve(axes_b, self.values, self.variances, wanted);
+        found.take(solved(candidates), axes_b, self);
         if found.solution.known != Known::All {
-            return found;
+            return;
         }
-        for _ in 0..candidates.count_ones() {
-            let Some(worst) = found.worst else { break };
-            let fewer = self.solve(axes_b, found.solution.used & !(1 << worst));
-            if fewer.solution.known != Known::All {
+        while let Some(worst) = found.worst {
+            let fewer = solved(found.solution.used & !(1 << worst));
+            if fewer.known != Known::All {
                 found.decided = false;
                 break;
             }
-            found = fewer;
+            found.take(fewer, axes_b, self);
         }
-        found
     }
 }

@@ -21,8 +21,8 @@ use nalgebra::{ComplexField, SMatrix, Vector3, Vector4};
 use super::{
     Cycle,
     health::Verdict,
-    root::reciprocal_root,
-    trace::Limits,
+    root::{reciprocal_root, root},
+    trace::{Limits, Systematic},
     watch::{QUIET, Watch},
 };
 use crate::{
@@ -61,6 +61,9 @@ pub(super) struct Gyros {
     timing_s: f32,
     parity: Watch,
     watches: [Watch; PLATES],
+    /// What is systematic of the parity, and of each gyro.
+    of_parity: Systematic,
+    of_gyros: [Systematic; PLATES],
     /// [rad/s] rate of the cycle before.
     course_b: Option<Vector3<f32>>,
     usual_b: Option<Vector3<f32>>,
@@ -79,6 +82,7 @@ impl Gyros {
         let axes_b = core::array::from_fn(|k| axes[k].axis_b);
         let across = across(&axes_b);
         let noise: [f32; PLATES] = core::array::from_fn(|k| axes[k].noise * axes[k].noise);
+        let parity_noise = (0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum();
         Gyros {
             axes_b,
             across,
@@ -86,8 +90,10 @@ impl Gyros {
             without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k)) * Vector4::from(across)),
             uncertainty,
             timing_s,
-            parity: Watch::new((0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(), allowed),
-            watches: noise.map(|noise| Watch::new(noise, allowed)),
+            parity: Watch::new(parity_noise, allowed, parity_noise),
+            watches: noise.map(|noise| Watch::new(noise, allowed, noise)),
+            of_parity: Systematic::NONE,
+            of_gyros: [Systematic::NONE; PLATES],
             course_b: None,
             usual_b: None,
             cycles: 0.0,
@@ -165,7 +171,7 @@ impl Gyros {
         let variance = noise + systematic + self.parity.offset_variance;
         if let Some(leapt) = self.leap(cycle, variances, parity * reciprocal_root(noise)) {
             self.watches[leapt].strike(true);
-            if self.watches[leapt].alarm(LIMITS) >= 1.0 {
+            if self.watches[leapt].alarm(LIMITS, &self.of_gyros[leapt].added()) >= 1.0 {
                 self.blame(leapt, Verdict::Disagreeing);
             }
             return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
@@ -173,8 +179,10 @@ impl Gyros {
         if self.leaping.is_none() {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
-        self.parity.note(parity, 1.0, systematic);
-        let alarm = self.parity.learn(parity, variance, LIMITS);
+        let counted = (systematic + self.parity.offset_variance) / noise;
+        let place = self.of_parity.push(root(counted));
+        self.parity.note(place, parity, 1.0, counted);
+        let alarm = self.parity.learn(parity, variance, LIMITS, &self.of_parity.added());
         self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
         } else {
@@ -227,6 +235,7 @@ impl Gyros {
         let part = self.across[plate];
         let watch = &mut self.watches[plate];
         watch.exclude(verdict);
+        self.of_gyros[plate].restart();
         watch.offset = self.parity.offset / part;
         watch.offset_variance = self.parity.offset_variance / (part * part);
         if verdict == Verdict::Frozen {
@@ -237,6 +246,7 @@ impl Gyros {
         }
         self.leaping = None;
         self.parity.restart();
+        self.of_parity.restart();
         self.suspect = false;
     }
 
@@ -248,8 +258,10 @@ impl Gyros {
             let share = (variances[k] + variance) / variances[k];
             let watch = &mut self.watches[k];
             let disagreement = cycle.values[k] - watch.offset - expected;
-            watch.note(disagreement, share, systematic);
-            watch.reconsider();
+            let counted = (systematic + watch.offset_variance / share) / watch.noise;
+            let place = self.of_gyros[k].push(root(counted));
+            watch.note(place, disagreement, share, counted);
+            watch.reconsider(&self.of_gyros[k].added());
         }
     }
 

@@ -1,10 +1,13 @@
 //! The last five seconds of a disagreement: its mean over one second and over five, and its spread.
 //!
 //! In, each cycle: a disagreement, and the standard deviation of what in it is systematic, both in standard deviations of
-//! its noise. Out: how far the sums over the last [`SHORT`] and [`LONG`] cycles, and the sum of squares, are on the way to
+//! noise. Out: how far the sums over the last [`SHORT`] and [`LONG`] cycles, and the sum of squares, are on the way to
 //! their limits. Over `n` cycles noise of 1 adds to a variance of `n`; what is systematic may have the same sign all along and
 //! adds to `(sum s)^2`. Kept as integers of 1/64, so that running sums are exact for ever, and clipped at 127, so that one
 //! wild sample does not fill the window alone.
+//!
+//! What is systematic is the same for all sensors of a kind, so it is kept once for all their axes ([`Systematic`]), and
+//! every axis keeps its disagreements in the same [`Place`]s.
 
 /// Cycles: those within one second of the first faulty one at 5 Hz, itself included.
 pub(super) const SHORT: usize = 6;
@@ -18,30 +21,101 @@ pub(super) const WILD: f32 = 4.5;
 /// Variances the systematic part may reach in the sum of squares: one value of it alone is no alarm.
 const SYSTEMATIC_SQUARES: f32 = WILD * WILD;
 
-/// One cycle in 1/64 of the noise.
+/// Where the cycle stands in a window: the newest place, which held the oldest, and that of the one [`SHORT`] before it.
 #[derive(Clone, Copy, Debug)]
-struct Cycle {
-    disagreement: i16,
-    systematic: i16,
+pub(super) struct Place {
+    newest: usize,
+    left: usize,
 }
 
-const NOTHING: Cycle = Cycle {
-    disagreement: 0,
-    systematic: 0,
-};
-
-/// A window over the newest disagreements.
+/// A window over the newest values, in 1/64, with its sums.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Trace {
-    ring: [Cycle; LONG],
-    next: u8,
-    held: u8,
+struct Window {
+    ring: [i16; LONG],
+    short: i32,
     sum: i32,
     squares: i32,
-    systematic: i32,
-    systematic_squares: i32,
-    /// Sums of disagreement and systematic part over the newest [`SHORT`].
-    short: [i32; 2],
+}
+
+impl Window {
+    const EMPTY: Window = Window {
+        ring: [0; LONG],
+        short: 0,
+        sum: 0,
+        squares: 0,
+    };
+
+    fn push(&mut self, place: Place, value: i16) {
+        // Both are within it.
+        let left = self.ring.get(place.left).copied().unwrap_or_default();
+        let Some(newest) = self.ring.get_mut(place.newest) else {
+            return;
+        };
+        let (new, left, old) = (i32::from(value), i32::from(left), i32::from(*newest));
+        *newest = value;
+        // The sums of 26 squares of 8128 stay within 32 bits; arithmetic that would check it is a tenth of the step.
+        self.short = self.short.wrapping_add(new).wrapping_sub(left);
+        self.sum = self.sum.wrapping_add(new).wrapping_sub(old);
+        let squares = self.squares.wrapping_add(new.wrapping_mul(new));
+        self.squares = squares.wrapping_sub(old.wrapping_mul(old));
+    }
+}
+
+/// What is systematic of each of the newest cycles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Systematic {
+    window: Window,
+    next: u8,
+}
+
+/// What it adds to the variances of the three figures, in noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Added {
+    short: f32,
+    long: f32,
+    squares: f32,
+}
+
+impl Systematic {
+    pub(super) const NONE: Systematic = Systematic {
+        window: Window::EMPTY,
+        next: 0,
+    };
+
+    /// Takes a cycle; where that stands.
+    pub(super) fn push(&mut self, sigmas: f32) -> Place {
+        let newest = usize::from(self.next);
+        let left = if newest < SHORT {
+            newest + (LONG - SHORT)
+        } else {
+            newest - SHORT
+        };
+        self.next = if newest < LONG - 1 { newest as u8 + 1 } else { 0 };
+        let place = Place { newest, left };
+        self.window.push(place, clipped(sigmas));
+        place
+    }
+
+    pub(super) fn added(&self) -> Added {
+        let squared = |sum: i32| (sum as f32) * (sum as f32);
+        Added {
+            short: squared(self.window.short),
+            long: squared(self.window.sum),
+            squares: squared_sigmas(self.window.squares),
+        }
+    }
+
+    /// Begins anew.
+    pub(super) fn restart(&mut self) {
+        self.window = Window::EMPTY;
+    }
+}
+
+/// A window over the newest disagreements of an axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trace {
+    window: Window,
+    held: u8,
 }
 
 /// Limits of a window: means in standard deviations, and the sum of squares.
@@ -54,45 +128,13 @@ pub(super) struct Limits {
 
 impl Trace {
     pub(super) const EMPTY: Trace = Trace {
-        ring: [NOTHING; LONG],
-        next: 0,
+        window: Window::EMPTY,
         held: 0,
-        sum: 0,
-        squares: 0,
-        systematic: 0,
-        systematic_squares: 0,
-        short: [0; 2],
     };
 
     /// Takes a cycle; what is not a number is as wild as can be.
-    pub(super) fn push(&mut self, disagreement: f32, systematic: f32) {
-        let new = Cycle {
-            disagreement: clipped(disagreement),
-            systematic: clipped_above(systematic),
-        };
-        let next = usize::from(self.next);
-        let left = if next < SHORT {
-            next + (LONG - SHORT)
-        } else {
-            next - SHORT
-        };
-        // Both are within it.
-        let left = self.ring.get(left).copied().unwrap_or(NOTHING);
-        let old = self.ring.get_mut(next).map_or(NOTHING, |old| core::mem::replace(old, new));
-        // The sums of 26 squares of 8128 stay within 32 bits; arithmetic that would check it is a tenth of the step.
-        let moved = |sum: &mut i32, new: i32, old: i32| *sum = sum.wrapping_add(new).wrapping_sub(old);
-        let square = |value: i16| i32::from(value).wrapping_mul(i32::from(value));
-        moved(&mut self.short[0], new.disagreement.into(), left.disagreement.into());
-        moved(&mut self.short[1], new.systematic.into(), left.systematic.into());
-        moved(&mut self.sum, new.disagreement.into(), old.disagreement.into());
-        moved(&mut self.squares, square(new.disagreement), square(old.disagreement));
-        moved(&mut self.systematic, new.systematic.into(), old.systematic.into());
-        moved(
-            &mut self.systematic_squares,
-            square(new.systematic),
-            square(old.systematic),
-        );
-        self.next = if next < LONG - 1 { next as u8 + 1 } else { 0 };
+    pub(super) fn push(&mut self, place: Place, disagreement: f32) {
+        self.window.push(place, clipped(disagreement));
         self.held = if self.held < LONG as u8 { self.held + 1 } else { self.held };
     }
 
@@ -101,25 +143,28 @@ impl Trace {
         usize::from(self.held) == LONG
     }
 
-    /// Square of the largest of its three figures, in parts of their limits: roots cost more than all the rest. The means
-    /// count from [`SHORT`] cycles on.
-    pub(super) fn over_squared(&self, limits: Limits) -> f32 {
-        let allowed = limits.squares + SYSTEMATIC_SQUARES * squared_sigmas(self.systematic_squares);
-        let spread = squared_sigmas(self.squares) / allowed;
+    /// Square of the largest of its three figures, in parts of their limits: roots cost more than all the rest. What is
+    /// systematic has `relative` of its variance in the noise of this axis. The means count from [`SHORT`] cycles on.
+    pub(super) fn over_squared(&self, limits: Limits, added: &Added, relative: f32) -> f32 {
+        let allowed = limits.squares + SYSTEMATIC_SQUARES * relative * added.squares;
+        let spread = squared_sigmas(self.window.squares) / allowed;
         if usize::from(self.held) < SHORT {
             return spread;
         }
-        let [short, systematic] = self.short;
-        let short = mean_squared(short, systematic, SHORT as f32) / (limits.short * limits.short);
-        let long = mean_squared(self.sum, self.systematic, f32::from(self.held)) / (limits.long * limits.long);
+        let mean_squared = |sum: i32, cycles: f32, added: f32, limit: f32| {
+            let sum = sum as f32;
+            sum * sum / ((limit * limit) * (PER_SIGMA * PER_SIGMA * cycles + relative * added))
+        };
+        let short = mean_squared(self.window.short, SHORT as f32, added.short, limits.short);
+        let long = mean_squared(self.window.sum, f32::from(self.held), added.long, limits.long);
         larger(spread, larger(short, long))
     }
 
     /// Variance of a full window about its mean, and the variance that is expected.
-    pub(super) fn variance(&self) -> (f32, f32) {
-        let mean = self.sum as f32 / (PER_SIGMA * LONG as f32);
-        let expected = 1.0 + squared_sigmas(self.systematic_squares) / LONG as f32;
-        (squared_sigmas(self.squares) / LONG as f32 - mean * mean, expected)
+    pub(super) fn variance(&self, added: &Added, relative: f32) -> (f32, f32) {
+        let mean = self.window.sum as f32 / (PER_SIGMA * LONG as f32);
+        let expected = 1.0 + relative * added.squares / LONG as f32;
+        (squared_sigmas(self.window.squares) / LONG as f32 - mean * mean, expected)
     }
 }
 
@@ -129,31 +174,24 @@ pub(super) fn larger(a: f32, b: f32) -> f32 {
 }
 
 fn clipped(sigmas: f32) -> i16 {
+    const MOST: i16 = (MOST_SIGMAS * PER_SIGMA) as i16;
+    // To the nearest: the cast takes off what is behind the point. A comparison with NaN is false.
     if sigmas < 0.0 {
-        -clipped_above(-sigmas)
-    } else {
-        clipped_above(sigmas)
+        return if sigmas > -MOST_SIGMAS {
+            (sigmas * PER_SIGMA - 0.5) as i32 as i16
+        } else {
+            -MOST
+        };
     }
-}
-
-/// Of a number that is not below zero, or none.
-fn clipped_above(sigmas: f32) -> i16 {
-    // To the nearest; a comparison with NaN is false.
     if sigmas < MOST_SIGMAS {
         (sigmas * PER_SIGMA + 0.5) as i32 as i16
     } else {
-        (MOST_SIGMAS * PER_SIGMA) as i16
+        MOST
     }
 }
 
 fn squared_sigmas(squares: i32) -> f32 {
-    squares as f32 / (PER_SIGMA * PER_SIGMA)
-}
-
-/// Square of a sum in its standard deviations.
-fn mean_squared(sum: i32, systematic: i32, cycles: f32) -> f32 {
-    let (sum, systematic) = (sum as f32, systematic as f32);
-    sum * sum / (PER_SIGMA * PER_SIGMA * cycles + systematic * systematic)
+    squares as f32 * (1.0 / (PER_SIGMA * PER_SIGMA))
 }
 
 #[cfg(test)]
@@ -166,14 +204,27 @@ mod tests {
         squares: 1e9,
     };
 
-    fn over(trace: &Trace, limits: Limits) -> f32 {
-        trace.over_squared(limits).sqrt()
+    /// A disagreement and what is systematic of it.
+    struct Both(Trace, Systematic);
+
+    impl Both {
+        fn over_squared(&self, limits: Limits) -> f32 {
+            self.0.over_squared(limits, &self.1.added(), 1.0)
+        }
+
+        fn variance(&self) -> (f32, f32) {
+            self.0.variance(&self.1.added(), 1.0)
+        }
     }
 
-    fn filled(with: impl Iterator<Item = (f32, f32)>) -> Trace {
-        let mut trace = Trace::EMPTY;
-        with.for_each(|(disagreement, systematic)| trace.push(disagreement, systematic));
-        trace
+    fn over(both: &Both, limits: Limits) -> f32 {
+        both.over_squared(limits).sqrt()
+    }
+
+    fn filled(with: impl Iterator<Item = (f32, f32)>) -> Both {
+        let (mut trace, mut of_all) = (Trace::EMPTY, Systematic::NONE);
+        with.for_each(|(disagreement, systematic)| trace.push(of_all.push(systematic), disagreement));
+        Both(trace, of_all)
     }
 
     #[test]

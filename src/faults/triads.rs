@@ -16,7 +16,8 @@ use super::{
     Cycle,
     consensus::{Agreement, Disagreement, Values},
     health::Verdict,
-    trace::Limits,
+    root::root,
+    trace::{Limits, Systematic, larger},
     watch::Watch,
 };
 use crate::{
@@ -57,6 +58,10 @@ pub(super) struct Triads {
     /// [s] by how much the sensors' sampling instants are unsure.
     timing_s: f32,
     watches: [Watch; TRIAD_AXES],
+    /// What is systematic of all of them, counted in the noise of the least noisy.
+    of_all: Systematic,
+    /// [1/unit2] one over the variance of that.
+    per_noise: f32,
     /// Squared differences from what it should be, its negative, the next and the one after next axis of its sensor.
     likeness: [[f32; 4]; TRIAD_AXES],
     /// The vector the offsets were learned at.
@@ -69,11 +74,15 @@ pub(super) struct Triads {
 
 impl Triads {
     pub(super) fn new(axes: &[Axis; TRIAD_AXES], uncertainty: Uncertainty, timing_s: f32) -> Self {
+        let least = axes.iter().fold(f32::MAX, |least, axis| least.min(axis.noise));
+        let (noise, allowed) = (least * least, uncertainty.bias * uncertainty.bias);
         Triads {
             axes_b: core::array::from_fn(|k| axes[k].axis_b),
             uncertainty,
             timing_s,
-            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, uncertainty.bias * uncertainty.bias)),
+            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, allowed, noise)),
+            of_all: Systematic::NONE,
+            per_noise: 1.0 / noise,
             likeness: [[0.0; 4]; TRIAD_AXES],
             usual_b: None,
             last_b: None,
@@ -84,8 +93,14 @@ impl Triads {
 
     /// Axes that are not believed.
     pub(super) fn excluded(&self) -> u16 {
-        let each = self.watches.iter().enumerate();
-        each.fold(0, |axes, (k, watch)| axes | u16::from(watch.excluded()) << k)
+        let (mut bit, mut excluded) = (1, 0);
+        for watch in &self.watches {
+            if watch.excluded() {
+                excluded |= bit;
+            }
+            bit <<= 1;
+        }
+        excluded
     }
 
     /// What is held of axis `k`.
@@ -95,27 +110,33 @@ impl Triads {
 
     /// Takes a cycle.
     pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) -> Solution {
-        for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
-            self.watches[k].exclude(Verdict::Frozen);
+        if cycle.frozen != 0 {
+            for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
+                self.watches[k].exclude(Verdict::Frozen);
+            }
         }
-        let values = core::array::from_fn(|k| cycle.values[k] - self.watches[k].offset);
         let candidates = cycle.present & !self.excluded();
+        let (mut values, mut variances, mut most) = (*cycle.values, [0.0; TRIAD_AXES], 0.0);
+        for ((watch, value), variance) in self.watches.iter().zip(&mut values).zip(&mut variances) {
+            *value -= watch.offset;
+            *variance = watch.noise + watch.offset_variance;
+            most = larger(watch.offset_variance, most);
+        }
         let systematic = self.systematic(cycle.dt_s, apart, &values, candidates);
-        let variances = core::array::from_fn(|k| {
-            let watch = &self.watches[k];
-            watch.noise + systematic + watch.offset_variance
-        });
+        for variance in &mut variances {
+            *variance += systematic;
+        }
         let axes = Values {
             values: &values,
             variances: &variances,
         };
-        let found = axes.agreed(&self.axes_b, candidates);
+        let mut found = Agreement::NOTHING;
+        axes.agree(&self.axes_b, candidates, &mut found);
         self.undecided = !found.decided;
         if found.solution.known != Known::All {
             self.last_b = None;
         } else if found.decided {
-            let alarms = self.watch(cycle.present, systematic, &axes, &found);
-            self.judge(&alarms, &axes, &found.solution);
+            self.watch(cycle.present, systematic, most, &axes, &found);
             self.remember(&found.solution);
         }
         found.solution
@@ -161,49 +182,61 @@ impl Triads {
         }
     }
 
-    /// Notes what each axis disagrees by; how near each that is believed is to an alarm.
-    fn watch(&mut self, present: u16, systematic: f32, axes: &Values, found: &Agreement) -> [f32; TRIAD_AXES] {
-        let mut alarms = [0.0; TRIAD_AXES];
+    /// Notes what each axis disagrees by; judges if one that is believed raises an alarm. `most` is the greatest variance
+    /// of an offset.
+    fn watch(&mut self, present: u16, systematic: f32, most: f32, axes: &Values, found: &Agreement) {
+        let counted = (systematic + most) * self.per_noise;
+        let place = self.of_all.push(root(counted));
+        let added = self.of_all.added();
+        let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
+        let (mut read, mut used) = (present, found.solution.used);
         let each = self.watches.iter_mut().zip(&mut alarms);
-        for (k, ((watch, alarm), (off, variance))) in each.zip(found.off.iter().zip(axes.variances)).enumerate() {
-            let (read, used) = (present >> k & 1 == 1, found.solution.used >> k & 1 == 1);
-            let disagreement = if read {
-                Disagreement::of(*off, *variance, used)
+        for ((watch, alarm), (off, variance)) in each.zip(found.off.iter().zip(axes.variances)) {
+            let disagreement = if read & 1 == 1 {
+                Disagreement::of(*off, *variance, used & 1 == 1)
             } else {
                 None
             };
-            if let Some(disagreement) = disagreement {
+            match disagreement {
                 // The parts of the disagreement's variance are in the same proportion as the axis's own.
-                watch.note(disagreement.by, disagreement.share, systematic);
+                Some(Disagreement { by, share }) => watch.note(place, by, share, counted),
+                None => watch.miss(place),
             }
             match disagreement {
-                Some(_) if watch.excluded() => watch.reconsider(),
-                Some(disagreement) if used => {
-                    watch.strike(false);
-                    *alarm = watch.learn(disagreement.by, disagreement.share * variance, LIMITS);
+                _ if watch.excluded() => {
+                    doubted = true;
+                    if disagreement.is_some() {
+                        watch.reconsider(&added);
+                    }
                 }
-                _ if watch.excluded() => {}
+                Some(Disagreement { by, share }) if used & 1 == 1 => {
+                    watch.strike(false);
+                    *alarm = watch.learn(by, share * variance, LIMITS, &added);
+                }
                 gated => {
                     if gated.is_some() {
                         watch.strike(true);
                     }
-                    *alarm = watch.alarm(LIMITS);
+                    *alarm = watch.alarm(LIMITS, &added);
                 }
             }
+            loudest = larger(*alarm, loudest);
+            (read, used) = (read >> 1, used >> 1);
         }
-        let doubted = present & self.excluded();
-        for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
-            self.resemble(k, axes, &found.solution);
+        if doubted {
+            let doubted = present & self.excluded();
+            for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
+                self.resemble(k, axes, &found.solution);
+            }
         }
-        alarms
+        if loudest >= 1.0 {
+            self.judge(&alarms, axes, &found.solution);
+        }
     }
 
-    /// Excludes the axis with the loudest alarm, if there is one.
+    /// Excludes the axis with the loudest alarm.
     fn judge(&mut self, alarms: &[f32; TRIAD_AXES], axes: &Values, solution: &Solution) {
         let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
-        if alarms[worst] < 1.0 {
-            return;
-        }
         if self.has_double(worst, axes, solution) {
             self.undecided = true;
             return;
@@ -221,6 +254,7 @@ impl Triads {
         for watch in self.watches.iter_mut().filter(|watch| !watch.excluded()) {
             watch.restart();
         }
+        self.of_all.restart();
     }
 
     /// Whether a fault of another used axis would look the same as one of `k`.
