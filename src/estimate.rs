@@ -158,12 +158,17 @@ impl Estimator {
 
     /// Takes a cycle.
     pub fn step(&mut self, sample: &Sample, increments: &Increments) -> Estimate {
-        self.step_in_full(sample, increments).0
+        self.take(sample, increments, &mut Outcome::default())
     }
 
     /// Takes a cycle; the filter's records of it too.
-    #[inline(never)]
     pub fn step_in_full(&mut self, sample: &Sample, increments: &Increments) -> (Estimate, Outcome) {
+        let mut outcome = Outcome::default();
+        (self.take(sample, increments, &mut outcome), outcome)
+    }
+
+    #[inline(never)]
+    fn take(&mut self, sample: &Sample, increments: &Increments, outcome: &mut Outcome) -> Estimate {
         let reading = &sample.reading;
         self.temperatures.note(reading);
         let measured = self.set.apply(reading, &self.temperatures);
@@ -176,7 +181,7 @@ impl Estimator {
         let turned = turn::turn(&self.set, &self.temperatures, increments, believed);
         let force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
         let field = self.sampled(sample, Kind::Magnetometer, &vectors.field_b_ut);
-        let outcome = self.filter.step(&Step {
+        let step = Step {
             // Without a fast sample since the cycle before, the cycle itself is when the rotation is missing.
             at_us: if turned.covered_s > 0.0 {
                 increments.end_us
@@ -191,9 +196,10 @@ impl Estimator {
             acc: force,
             mag: field,
             lift_off: reading.lift_off,
-        });
+        };
+        self.filter.take(&step, outcome);
         self.look_at_the_covariance();
-        (self.estimate(&vectors), outcome)
+        self.estimate(&vectors)
     }
 
     /// Keeps what is said of the filter's covariance, once a window's work on it is done.

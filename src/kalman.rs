@@ -180,7 +180,8 @@ impl Filter {
         outcome
     }
 
-    fn take(&mut self, step: &Step, outcome: &mut Outcome) {
+    /// Takes a step, and adds what it led to to an outcome that is empty yet: moving one costs as much as some steps.
+    pub fn take(&mut self, step: &Step, outcome: &mut Outcome) {
         let since_s = match self.last_us {
             Some(last_us) if step.at_us <= last_us => {
                 outcome.refusal = Some(Refusal::NotLater);

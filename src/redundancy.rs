@@ -58,12 +58,21 @@ impl Solution {
 /// The vector behind `values`, one along each of `axes_b` with the variance beside it; axes whose bit in `wanted` is
 /// clear are left out, as are those beyond the shortest of the three.
 pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted: u16) -> Solution {
+    let each = axes_b.iter().zip(values).zip(variances);
+    solve_each(
+        each.map(|((axis_b, value), variance)| (axis_b, *value, *variance)),
+        wanted,
+    )
+}
+
+/// [`solve`] for axes that come one by one, each with its value and the variance of that.
+pub fn solve_each<'a>(each: impl Iterator<Item = (&'a Vector3<f32>, f32, f32)>, wanted: u16) -> Solution {
     // Written out: a symmetric matrix has six elements, and this sum is most of what a cycle costs.
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut weighted = Vector3::zeros();
     // The bit of the axis; none beyond the sixteenth.
     let (mut bit, mut used) = (1, 0);
-    for ((axis_b, value), variance) in axes_b.iter().zip(values).zip(variances) {
+    for (axis_b, value, variance) in each {
         let (axis, weight) = (bit, 1.0 / variance);
         bit <<= 1;
         // Comparisons with NaN are false.
@@ -78,7 +87,7 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
         yy += row.y * axis_b.y;
         yz += row.y * axis_b.z;
         zz += row.z * axis_b.z;
-        weighted += row * *value;
+        weighted += row * value;
     }
     let (covariance_b, known) = gaps::invert(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
     Solution {

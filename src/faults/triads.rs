@@ -14,7 +14,7 @@ use nalgebra::{ComplexField, Vector3};
 
 use super::{
     Cycle,
-    consensus::{Agreement, Disagreement, Values},
+    consensus::{Disagreement, Seen, agreed},
     health::Verdict,
     root::root,
     trace::{Limits, Systematic, larger},
@@ -22,8 +22,8 @@ use super::{
 };
 use crate::{
     calibration::{Axis, Uncertainty},
-    geometry::{PLATES, TRIAD_AXES},
-    redundancy::{Known, Solution, solve},
+    geometry::TRIAD_AXES,
+    redundancy::{Known, Solution, solve_each},
 };
 
 /// Means over one and five seconds, for less than one false alarm of 24 axes in ten hours of simulated rest. Sum of squares:
@@ -116,27 +116,21 @@ impl Triads {
             }
         }
         let candidates = cycle.present & !self.excluded();
-        let (mut values, mut variances, mut most) = (*cycle.values, [0.0; TRIAD_AXES], 0.0);
-        for ((watch, value), variance) in self.watches.iter().zip(&mut values).zip(&mut variances) {
-            *value -= watch.offset;
-            *variance = watch.noise + watch.offset_variance;
-            most = larger(watch.offset_variance, most);
+        let mut seen: [Seen; TRIAD_AXES] = core::array::from_fn(|k| Seen {
+            value: cycle.values[k] - self.watches[k].offset,
+            variance: self.watches[k].noise + self.watches[k].offset_variance,
+            off: (0.0, 0.0),
+        });
+        let systematic = self.systematic(cycle.dt_s, apart, &seen, candidates);
+        for seen in &mut seen {
+            seen.variance += systematic;
         }
-        let systematic = self.systematic(cycle.dt_s, apart, &values, candidates);
-        for variance in &mut variances {
-            *variance += systematic;
-        }
-        let axes = Values {
-            values: &values,
-            variances: &variances,
-        };
-        let mut found = Agreement::NOTHING;
-        axes.agree(&self.axes_b, candidates, &mut found);
+        let found = agreed(&self.axes_b, &mut seen, candidates);
         self.undecided = !found.decided;
         if found.solution.known != Known::All {
             self.last_b = None;
         } else if found.decided {
-            self.watch(cycle.present, systematic, most, &axes, &found);
+            self.watch(cycle.present, systematic, &seen, &found.solution);
             self.remember(&found.solution);
         }
         found.solution
@@ -144,8 +138,8 @@ impl Triads {
 
     /// [unit2] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
     /// motion within the uncertainty of the sampling instants, and what differs by place.
-    fn systematic(&self, dt_s: Option<f32>, apart: &Apart, values: &[f32; TRIAD_AXES], candidates: u16) -> f32 {
-        let rough_b = self.rough(values, candidates);
+    fn systematic(&self, dt_s: Option<f32>, apart: &Apart, seen: &[Seen; TRIAD_AXES], candidates: u16) -> f32 {
+        let rough_b = self.rough(seen, candidates);
         let Uncertainty { scale, direction, .. } = self.uncertainty;
         let relative = scale * scale + direction * direction;
         let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
@@ -160,40 +154,40 @@ impl Triads {
 
     /// A vector good enough to say how uncertain it is: that of the complete plate nearest to the last one, as wild values
     /// are not; before there is a last one, or without a complete plate, that of all.
-    fn rough(&self, values: &[f32; TRIAD_AXES], candidates: u16) -> Vector3<f32> {
-        let of_plate = |plate: usize| {
-            // Near enough to rotations, whatever the calibration.
-            let axes = 3 * plate..3 * plate + 3;
-            let sum = axes.fold(Vector3::zeros(), |sum, k| sum + self.axes_b[k] * values[k]);
-            (candidates >> (3 * plate) & 0b111 == 0b111).then_some(sum)
-        };
-        let mut nearest = None;
+    fn rough(&self, seen: &[Seen; TRIAD_AXES], candidates: u16) -> Vector3<f32> {
+        let (mut nearest, mut least) = (None, f32::INFINITY);
         if let Some(last_b) = self.last_b {
-            for vector_b in (0..PLATES).filter_map(of_plate) {
-                let off = (vector_b - last_b).norm_squared();
-                if nearest.is_none_or(|(least, _)| off < least) {
-                    nearest = Some((off, vector_b));
+            let (axes, seen) = (self.axes_b.as_chunks::<3>().0, seen.as_chunks::<3>().0);
+            let mut left = candidates;
+            for ([x_b, y_b, z_b], [x, y, z]) in axes.iter().zip(seen) {
+                if left & 0b111 == 0b111 {
+                    // Near enough to rotations, whatever the calibration.
+                    let vector_b = x_b * x.value + y_b * y.value + z_b * z.value;
+                    let off = (vector_b - last_b).norm_squared();
+                    if off < least {
+                        (nearest, least) = (Some(vector_b), off);
+                    }
                 }
+                left >>= 3;
             }
         }
-        match nearest {
-            Some((_, vector_b)) => vector_b,
-            None => solve(&self.axes_b, values, &[1.0; TRIAD_AXES], candidates).vector_b,
-        }
+        nearest.unwrap_or_else(|| {
+            let each = self.axes_b.iter().zip(seen);
+            solve_each(each.map(|(axis_b, seen)| (axis_b, seen.value, 1.0)), candidates).vector_b
+        })
     }
 
-    /// Notes what each axis disagrees by; judges if one that is believed raises an alarm. `most` is the greatest variance
-    /// of an offset.
-    fn watch(&mut self, present: u16, systematic: f32, most: f32, axes: &Values, found: &Agreement) {
-        let counted = (systematic + most) * self.per_noise;
+    /// Notes what each axis disagrees by; judges if one that is believed raises an alarm.
+    fn watch(&mut self, present: u16, systematic: f32, seen: &[Seen; TRIAD_AXES], solution: &Solution) {
+        let offsets = self.watches.iter().map(|watch| watch.offset_variance);
+        let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
         let place = self.of_all.push(root(counted));
         let added = self.of_all.added();
         let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
-        let (mut read, mut used) = (present, found.solution.used);
-        let each = self.watches.iter_mut().zip(&mut alarms);
-        for ((watch, alarm), (off, variance)) in each.zip(found.off.iter().zip(axes.variances)) {
+        let (mut read, mut used) = (present, solution.used);
+        for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(seen) {
             let disagreement = if read & 1 == 1 {
-                Disagreement::of(*off, *variance, used & 1 == 1)
+                Disagreement::of(seen, used & 1 == 1)
             } else {
                 None
             };
@@ -211,7 +205,7 @@ impl Triads {
                 }
                 Some(Disagreement { by, share }) if used & 1 == 1 => {
                     watch.strike(false);
-                    *alarm = watch.learn(by, share * variance, LIMITS, &added);
+                    *alarm = watch.learn(by, share * seen.variance, LIMITS, &added);
                 }
                 gated => {
                     if gated.is_some() {
@@ -226,18 +220,18 @@ impl Triads {
         if doubted {
             let doubted = present & self.excluded();
             for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
-                self.resemble(k, axes, &found.solution);
+                self.resemble(k, seen, solution);
             }
         }
         if loudest >= 1.0 {
-            self.judge(&alarms, axes, &found.solution);
+            self.judge(&alarms, seen, solution);
         }
     }
 
     /// Excludes the axis with the loudest alarm.
-    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], axes: &Values, solution: &Solution) {
+    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], seen: &[Seen; TRIAD_AXES], solution: &Solution) {
         let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
-        if self.has_double(worst, axes, solution) {
+        if self.has_double(worst, seen, solution) {
             self.undecided = true;
             return;
         }
@@ -258,9 +252,9 @@ impl Triads {
     }
 
     /// Whether a fault of another used axis would look the same as one of `k`.
-    fn has_double(&self, k: usize, axes: &Values, solution: &Solution) -> bool {
+    fn has_double(&self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) -> bool {
         let moved_b = solution.covariance_b * self.axes_b[k];
-        let free = |j: usize| axes.variances[j] - solution.along(&self.axes_b[j]).1;
+        let free = |j: usize| seen[j].variance - solution.along(&self.axes_b[j]).1;
         (0..TRIAD_AXES)
             .filter(|j| *j != k && solution.used >> j & solution.used >> k & 1 == 1)
             .any(|j| {
@@ -270,17 +264,17 @@ impl Triads {
     }
 
     /// Compares an excluded axis with its negative and with its sensor's other axes.
-    fn resemble(&mut self, k: usize, axes: &Values, solution: &Solution) {
+    fn resemble(&mut self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) {
         let expected = |k: usize| solution.along(&self.axes_b[k]).0;
         let plate = k / 3 * 3;
         let (next, after) = (plate + (k + 1) % 3, plate + (k + 2) % 3);
-        let measured = axes.values[k] + self.watches[k].offset;
+        let measured = seen[k].value + self.watches[k].offset;
         for (kept, other) in
             self.likeness[k]
                 .iter_mut()
                 .zip([expected(k), -expected(k), expected(next), expected(after)])
         {
-            let off = (measured - other) * (measured - other) / axes.variances[k];
+            let off = (measured - other) * (measured - other) / seen[k].variance;
             *kept = if *kept == 0.0 {
                 off
             } else {

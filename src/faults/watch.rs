@@ -82,6 +82,7 @@ impl Watch {
 
     /// Takes a cycle's disagreement beyond the offset, whose noise has `share` times the variance of the axis's own.
     /// `systematic` is the variance of what is systematic, in the noise that is counted in.
+    #[inline(always)]
     pub(super) fn note(&mut self, place: Place, disagreement: f32, share: f32, systematic: f32) {
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
         let mut sigmas = disagreement * reciprocal_root(self.noise * share);
@@ -130,6 +131,7 @@ impl Watch {
 
     /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
     /// [`Watch::alarm`] has it.
+    #[inline(always)]
     pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits, added: &Added) -> f32 {
         let over = self.trace.over_squared(limits, added, self.relative);
         if larger(self.crept(), over) <= QUIET || !self.trace.full() {
