@@ -9,6 +9,8 @@
 //! What is systematic is the same for all sensors of a kind, so it is kept once for all their axes ([`Systematic`]), and
 //! every axis keeps its disagreements in the same [`Place`]s.
 
+use super::root::root;
+
 /// Cycles: those within one second of the first faulty one at 5 Hz, itself included.
 pub(super) const SHORT: usize = 6;
 /// Cycles: those within five seconds.
@@ -105,10 +107,33 @@ impl Systematic {
         }
     }
 
+    /// What the sums of a full window are below whose figures are all below `part` of their limits, squared, if at least
+    /// `relative` of the variance of what is systematic is in it: the roots that no axis then has to be asked for.
+    pub(super) fn bounds(&self, limits: Limits, added: &Added, part: f32, relative: f32) -> Bounds {
+        let mean = |limit: f32, cycles: usize, added: f32| {
+            let variance = PER_SIGMA * PER_SIGMA * cycles as f32 + relative * added;
+            // A root is within a millionth, and the sums are integers.
+            (limit * root(part * variance)) as i32
+        };
+        Bounds {
+            short: mean(limits.short, SHORT, added.short),
+            long: mean(limits.long, LONG, added.long),
+            squares: (PER_SIGMA * PER_SIGMA * part * limits.squares) as i32,
+        }
+    }
+
     /// Begins anew.
     pub(super) fn restart(&mut self) {
         self.window = Window::EMPTY;
     }
+}
+
+/// What sums of a window may reach.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    short: i32,
+    long: i32,
+    squares: i32,
 }
 
 /// A window over the newest disagreements of an axis.
@@ -141,6 +166,15 @@ impl Trace {
     /// Whether it holds [`LONG`] cycles.
     pub(super) fn full(&self) -> bool {
         usize::from(self.held) == LONG
+    }
+
+    /// Whether it is full and surely below `bounds`.
+    pub(super) fn is_within(&self, bounds: &Bounds) -> bool {
+        let Window {
+            short, sum, squares, ..
+        } = self.window;
+        let within = |sum: i32, most: i32| sum < most && -sum < most;
+        self.full() && within(sum, bounds.long) && within(short, bounds.short) && squares < bounds.squares
     }
 
     /// Square of the largest of its three figures, in parts of their limits: roots cost more than all the rest. What is
@@ -242,6 +276,29 @@ mod tests {
             1.0
         );
         assert!(trace.variance().0.abs() < 1e-5);
+    }
+
+    #[test]
+    fn what_is_within_the_bounds_is_below_the_limits_and_little_else_is_not() {
+        const LIMITS: Limits = Limits {
+            short: 5.0,
+            long: 4.0,
+            squares: 90.0,
+        };
+        let mut surely = 0;
+        for n in 0..2_000_u32 {
+            let random = |k: u32| (n.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) % 997) as f32 / 997.0;
+            let size = 3.0 * random(1);
+            let both = filled((0..LONG as u32).map(|k| (size * random(k) - 0.2, 0.3 * random(n))));
+            let added = both.1.added();
+            let within = both.0.is_within(&both.1.bounds(LIMITS, &added, 0.5, 1.0));
+            let over = both.over_squared(LIMITS);
+            assert!(!within || over < 0.5, "{n}: {over}");
+            // Without what is systematic in the squares, which are few.
+            assert!(within || over > 0.3, "{n}: {over}");
+            surely += u32::from(within);
+        }
+        assert!(surely > 200 && surely < 1_800, "{surely}");
     }
 
     #[test]

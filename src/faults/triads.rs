@@ -18,7 +18,7 @@ use super::{
     health::Verdict,
     root::root,
     trace::{Limits, Systematic, larger},
-    watch::Watch,
+    watch::{QUIET, Watch},
 };
 use crate::{
     calibration::{Axis, Uncertainty},
@@ -62,6 +62,8 @@ pub(super) struct Triads {
     of_all: Systematic,
     /// [1/unit2] one over the variance of that.
     per_noise: f32,
+    /// [1] that variance in the noise of the noisiest.
+    least_relative: f32,
     /// Squared differences from what it should be, its negative, the next and the one after next axis of its sensor.
     likeness: [[f32; 4]; TRIAD_AXES],
     /// The vector the offsets were learned at.
@@ -75,6 +77,7 @@ pub(super) struct Triads {
 impl Triads {
     pub(super) fn new(axes: &[Axis; TRIAD_AXES], uncertainty: Uncertainty, timing_s: f32) -> Self {
         let least = axes.iter().fold(f32::MAX, |least, axis| least.min(axis.noise));
+        let most = axes.iter().fold(0.0_f32, |most, axis| most.max(axis.noise));
         let (noise, allowed) = (least * least, uncertainty.bias * uncertainty.bias);
         Triads {
             axes_b: core::array::from_fn(|k| axes[k].axis_b),
@@ -83,6 +86,7 @@ impl Triads {
             watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, allowed, noise)),
             of_all: Systematic::NONE,
             per_noise: 1.0 / noise,
+            least_relative: noise / (most * most),
             likeness: [[0.0; 4]; TRIAD_AXES],
             usual_b: None,
             last_b: None,
@@ -183,6 +187,7 @@ impl Triads {
         let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
         let place = self.of_all.push(root(counted));
         let added = self.of_all.added();
+        let bounds = self.of_all.bounds(LIMITS, &added, QUIET, self.least_relative);
         let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
         let (mut read, mut used) = (present, solution.used);
         for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(seen) {
@@ -205,16 +210,20 @@ impl Triads {
                 }
                 Some(Disagreement { by, share }) if used & 1 == 1 => {
                     watch.strike(false);
-                    *alarm = watch.learn(by, share * seen.variance, LIMITS, &added);
+                    let variance = share * seen.variance;
+                    if watch.learn_quietly(by, variance, &bounds).is_none() {
+                        *alarm = watch.learn(by, variance, LIMITS, &added);
+                        loudest = larger(*alarm, loudest);
+                    }
                 }
                 gated => {
                     if gated.is_some() {
                         watch.strike(true);
                     }
                     *alarm = watch.alarm(LIMITS, &added);
+                    loudest = larger(*alarm, loudest);
                 }
             }
-            loudest = larger(*alarm, loudest);
             (read, used) = (read >> 1, used >> 1);
         }
         if doubted {

@@ -12,7 +12,7 @@
 use super::{
     health::Verdict,
     root::{reciprocal_root, root},
-    trace::{Added, LONG, Limits, Place, Trace, WILD, larger},
+    trace::{Added, Bounds, LONG, Limits, Place, Trace, WILD, larger},
 };
 
 /// Cycles the learned offset goes back: 200 s at 5 Hz. Large: steps are seen sharper. Small: drifts are followed.
@@ -129,17 +129,28 @@ impl Watch {
         self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed)
     }
 
+    /// As [`Watch::learn`] of an axis whose window is within `bounds`, those of [`QUIET`], which most are; `None` of others.
+    #[inline(always)]
+    pub(super) fn learn_quietly(&mut self, disagreement: f32, variance: f32, bounds: &Bounds) -> Option<()> {
+        let crept = self.offset * self.offset;
+        let quiet = self.trace.is_within(bounds) && crept <= QUIET * OFFSET_LIMIT * OFFSET_LIMIT * self.allowed;
+        quiet.then(|| self.learn_from(disagreement, variance))
+    }
+
+    fn learn_from(&mut self, disagreement: f32, variance: f32) {
+        let gain = self.offset_variance / variance;
+        self.offset += gain * disagreement;
+        let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
+        let learnt = self.offset_variance * (1.0 - gain) + forgotten;
+        self.offset_variance = if learnt < self.allowed { learnt } else { self.allowed };
+    }
+
     /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
     /// [`Watch::alarm`] has it.
-    #[inline(always)]
     pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits, added: &Added) -> f32 {
         let over = self.trace.over_squared(limits, added, self.relative);
         if larger(self.crept(), over) <= QUIET || !self.trace.full() {
-            let gain = self.offset_variance / variance;
-            self.offset += gain * disagreement;
-            let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
-            let learnt = self.offset_variance * (1.0 - gain) + forgotten;
-            self.offset_variance = if learnt < self.allowed { learnt } else { self.allowed };
+            self.learn_from(disagreement, variance);
         }
         self.loudness(over)
     }

@@ -243,13 +243,17 @@ impl Covariance {
         gain.add(p, per_variance);
         let mut rest = *p;
         rest.add(&gain, -half);
-        for (k, (row, across)) in self.driven.iter_mut().zip(&mut self.across).enumerate() {
-            take_off(row, (gain.driven[k], &rest.driven), (rest.driven[k], &gain.driven));
-            take_off(across, (gain.driven[k], &rest.drivers), (rest.driven[k], &gain.drivers));
-        }
-        for (k, row) in self.drivers.iter_mut().enumerate() {
-            take_off(row, (gain.drivers[k], &rest.drivers), (rest.drivers[k], &gain.drivers));
-        }
+        take_off(&mut self.driven, [&gain.driven, &rest.driven], [&gain.driven, &rest.driven]);
+        take_off(
+            &mut self.across,
+            [&gain.driven, &rest.driven],
+            [&gain.drivers, &rest.drivers],
+        );
+        take_off(
+            &mut self.drivers,
+            [&gain.drivers, &rest.drivers],
+            [&gain.drivers, &rest.drivers],
+        );
     }
 
     /// Attitude known afresh with this covariance \[rad^2\], in n, and independent of the rest.
@@ -347,10 +351,25 @@ impl Covariance {
     }
 }
 
-/// Takes the sum of two rows, each times its factor, off a row.
-fn take_off<const N: usize>(row: &mut [f32; N], (a, x): (f32, &[f32; N]), (b, y): (f32, &[f32; N])) {
-    for ((element, x), y) in row.iter_mut().zip(x).zip(y) {
-        *element -= a * x + b * y;
+/// Takes `k u' + u k'` off a block, `[k, u]` being given for its rows and for its columns. Four rows at a time, so that
+/// what belongs to a column is loaded once for four.
+fn take_off<const N: usize>(block: &mut [[f32; N]], [k, u]: [&[f32]; 2], [k_c, u_c]: [&[f32; N]; 2]) {
+    let (fours, left) = block.as_chunks_mut::<4>();
+    let (k_fours, k_left) = k.as_chunks::<4>();
+    let (u_fours, u_left) = u.as_chunks::<4>();
+    for (([a, b, c, d], k), u) in fours.iter_mut().zip(k_fours).zip(u_fours) {
+        for column in 0..N {
+            let (x, y) = (u_c[column], k_c[column]);
+            a[column] -= k[0] * x + u[0] * y;
+            b[column] -= k[1] * x + u[1] * y;
+            c[column] -= k[2] * x + u[2] * y;
+            d[column] -= k[3] * x + u[3] * y;
+        }
+    }
+    for ((row, k), u) in left.iter_mut().zip(k_left).zip(u_left) {
+        for column in 0..N {
+            row[column] -= k * u_c[column] + u * k_c[column];
+        }
     }
 }
 
