@@ -54,7 +54,7 @@ pub use self::{
     step::{Outcome, Refusal, Sampled, Step},
 };
 use self::{
-    covariance::{GYRO_MATRIX, State, VELOCITY, are_finite},
+    covariance::{GYRO_MATRIX, Row, State, VELOCITY, are_finite},
     innovation::{Correction, Scalar},
     passage::walks,
     pending::Pending,
@@ -182,27 +182,32 @@ impl Filter {
 
     /// Takes a step, and adds what it led to to an outcome that is empty yet: moving one costs as much as some steps.
     pub fn take(&mut self, step: &Step, outcome: &mut Outcome) {
+        let rotation = step.is_a_rotation();
         let since_s = match self.last_us {
             Some(last_us) if step.at_us <= last_us => {
                 outcome.refusal = Some(Refusal::NotLater);
                 return;
             }
-            Some(last_us) => (step.at_us - last_us) as f32 * 1e-6,
-            None => step.covered_s,
+            Some(last_us) => seconds(step.at_us - last_us),
+            None if rotation => step.covered_s,
+            None => 0.0,
         };
         self.last_us = Some(step.at_us);
-        let rotation = step.is_a_rotation();
         if !rotation {
             outcome.refusal = Some(Refusal::NotARotation);
         }
-        let covered_s = if rotation { step.covered_s.min(since_s) } else { 0.0 };
+        let covered_s = match rotation {
+            true if step.covered_s < since_s => step.covered_s,
+            true => since_s,
+            false => 0.0,
+        };
         let gap_s = since_s - covered_s;
         if self.silent_s + gap_s >= self.params.longest_gap_s {
             outcome.refusal = Some(Refusal::Gap);
             self.lose(since_s);
             return;
         }
-        let dcm_nb = self.propagate(step, covered_s, gap_s.max(0.0), rotation);
+        let dcm_nb = self.propagate(step, covered_s, gap_s, rotation);
         if rotation {
             self.gather(step, &dcm_nb);
         }
@@ -250,7 +255,7 @@ impl Filter {
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
             + params.turn_noise * params.turn_noise * turned_b.norm();
         // The rate missed is one and the same all through a gap, however many steps it lasts.
-        let silent_s = self.silent_s + gap_s.max(0.0);
+        let silent_s = self.silent_s + gap_s;
         variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
         self.silent_s = if rotation { 0.0 } else { silent_s };
         if rotation {
@@ -273,7 +278,11 @@ impl Filter {
         let (rate_b, window_s) = (self.rate_b, self.params.window_s);
         let carried = |sampled: Option<Sampled>, delay_s: f32| {
             let sampled = sampled.filter(Sampled::is_believable)?;
-            let late_s = (sampled.at_us as i64).wrapping_sub(step.at_us as i64) as f32 * 1e-6;
+            let late_s = if sampled.at_us < step.at_us {
+                -seconds(step.at_us - sampled.at_us)
+            } else {
+                seconds(sampled.at_us - step.at_us)
+            };
             let offset_s = late_s + delays.gyro_s - delay_s;
             let near = offset_s > -window_s && offset_s < window_s;
             near.then(|| (sampled, dcm * dcm_nb(&from_rotation_vector(rate_b * offset_s))))
@@ -293,7 +302,6 @@ impl Filter {
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
         if !self.aligned {
-            self.window = Window::default();
             // Of what a window does to it nothing else lasts until there is an attitude.
             self.covariance.drift(&walks(&self.params, means.duration_s));
             outcome.aligned = self.align(&means, UNKNOWN);
@@ -301,12 +309,12 @@ impl Filter {
                 self.covariance.forget_attitude();
             }
             self.settlements = self.settlements.wrapping_add(1);
+            self.window = Window::default();
             return;
         }
         self.velocity_n += means.velocity_change_n;
         self.pending.passage.become_of(&self.params, &self.window, &means);
         self.pending.seen.clear();
-        self.window = Window::default();
         let mut correction = Correction::new(self.params.gate, &mut outcome.innovations);
         if rests {
             self.compare_rest(&means, &mut correction);
@@ -323,6 +331,7 @@ impl Filter {
         self.inject(&error);
         self.pending.begin();
         outcome.aligned = self.recover(&means, [velocity, field]);
+        self.window = Window::default();
     }
 
     /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
@@ -336,13 +345,11 @@ impl Filter {
         }
         let mut accepted = true;
         for axis in 0..3 {
-            let mut row = State::default();
-            row.drivers[axis] = 1.0;
             let scalar = Scalar {
                 quantity: Quantity::Bias,
                 predicted: self.bias_b[axis],
                 measured: means.rate_b[axis] - earth_b[axis],
-                row: &row,
+                row: Row::Driver(axis),
                 variance,
             };
             accepted &= self.compare(&scalar, self.covariance.of_driver(axis), correction);
@@ -359,15 +366,13 @@ impl Filter {
         let tilt = self.pending.passage.tilt;
         let mut accepted = true;
         for (axis, (mean, factor)) in [(&start[1], -tilt), (&start[0], tilt)].into_iter().enumerate() {
-            let mut row = State::default();
-            row.driven[VELOCITY + axis] = 1.0;
             let mut column = self.covariance.of_driven(VELOCITY + axis);
             column.add(mean, factor);
             let scalar = Scalar {
                 quantity: Quantity::Velocity,
                 predicted: self.velocity_n[axis],
                 measured: 0.0,
-                row: &row,
+                row: Row::Velocity(axis),
                 variance: means.velocity_variance,
             };
             accepted &= self.compare(&scalar, column, correction);
@@ -377,17 +382,17 @@ impl Filter {
 
     /// A scalar, of whose `P h'` the passage is still to be made.
     fn compare(&mut self, scalar: &Scalar, mut column: State, correction: &mut Correction) -> bool {
-        self.pending.passage.carry(&mut column, scalar.row);
+        self.pending.passage.carry(&mut column, &scalar.row);
         correction.compare(scalar, &mut column, &mut self.pending.seen)
     }
 
     /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
     /// disturbed for its rejection to say anything of the attitude.
     fn compare_field(&mut self, means: &Means, start: &[State; 3], correction: &mut Correction) -> Option<bool> {
-        let sums = means.field?;
-        self.iron.learn(&self.params, &sums);
+        let sums = self.window.field()?;
+        self.iron.learn(&self.params, sums);
         self.reference
-            .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
+            .learn(&self.params, means.duration_s, sums, &self.iron.iron_b);
         let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
         let disturbed = compared.disturbance > self.params.field_gate;
         self.disturbed_s = if disturbed {
@@ -399,15 +404,12 @@ impl Filter {
         let mut accepted = true;
         for scalar in &compared.scalars {
             let row = self.pending.passage.mean_row(&scalar.row_n);
-            let mut column = State::default();
-            for (mean, part) in start.iter().zip(&scalar.row_n) {
-                column.add(mean, *part);
-            }
+            let column = State::combined(start, &scalar.row_n);
             let scalar = Scalar {
                 quantity: scalar.quantity,
                 predicted: 0.0,
                 measured: scalar.residual,
-                row: &row,
+                row: Row::Of(&row),
                 variance: scalar.variance,
             };
             accepted &= self.compare(&scalar, column, correction);
@@ -438,6 +440,15 @@ impl Filter {
 
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;
+
+/// Of microseconds. A conversion of 64 bits is a call on the target, and intervals seldom have them.
+pub(crate) fn seconds(us: u64) -> f32 {
+    let us = match u32::try_from(us) {
+        Ok(us) => us as f32,
+        Err(_) => us as f32,
+    };
+    us * 1e-6
+}
 
 fn square(x: f32) -> f32 {
     x * x

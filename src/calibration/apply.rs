@@ -110,10 +110,10 @@ fn values(axes: &[Axis], counts: &[i16], above_c: &[f32; PLATES], ends: &Ends, v
         present: 0,
         saturated: 0,
     };
-    let mut bit = 1;
-    let (a_plate, mut left) = (axes.len() / PLATES, axes.iter().zip(counts).zip(values));
-    for above_c in above_c {
-        for ((axis, &counts), value) in left.by_ref().take(a_plate) {
+    let (mut bit, a_plate) = (1, axes.len() / PLATES);
+    let plates = axes.chunks_exact(a_plate).zip(counts.chunks_exact(a_plate));
+    for (((axes, counts), values), above_c) in plates.zip(values.chunks_exact_mut(a_plate)).zip(above_c) {
+        for ((axis, &counts), value) in axes.iter().zip(counts).zip(values) {
             if counts > ends.least && counts < ends.most {
                 seen.present |= bit;
                 *value = axis.value(counts, *above_c);

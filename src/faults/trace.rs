@@ -170,11 +170,13 @@ impl Trace {
 
     /// Whether it is full and surely below `bounds`.
     pub(super) fn is_within(&self, bounds: &Bounds) -> bool {
-        let Window {
-            short, sum, squares, ..
-        } = self.window;
-        let within = |sum: i32, most: i32| sum < most && -sum < most;
-        self.full() && within(sum, bounds.long) && within(short, bounds.short) && squares < bounds.squares
+        // Above the lower bound and below the upper one, in one comparison.
+        let within = |sum: i32, most: i32| (sum.wrapping_add(most) as u32) < (most as u32).wrapping_mul(2);
+        let window = &self.window;
+        self.full()
+            && within(window.short, bounds.short)
+            && within(window.sum, bounds.long)
+            && window.squares < bounds.squares
     }
 
     /// Square of the largest of its three figures, in parts of their limits: roots cost more than all the rest. What is

@@ -11,7 +11,7 @@
 //! `u = p - k s/2`: the same for any `k`, so an error of `k` is of second order in it, where the short `P - k p'` goes
 //! indefinite in f32. Both products of a pair are added before they are taken off, so it stays symmetric to the bit.
 
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::{Params, passage::Passage, square};
 
@@ -45,6 +45,15 @@ impl State {
         dot(&self.driven, &other.driven) + dot(&self.drivers, &other.drivers)
     }
 
+    /// Three, each times its factor.
+    pub fn combined([a, b, c]: &[State; 3], factors: &Vector3<f32>) -> Self {
+        let [x, y, z] = [factors.x, factors.y, factors.z];
+        State {
+            driven: core::array::from_fn(|k| a.driven[k] * x + b.driven[k] * y + c.driven[k] * z),
+            drivers: core::array::from_fn(|k| a.drivers[k] * x + b.drivers[k] * y + c.drivers[k] * z),
+        }
+    }
+
     /// Adds `factor` times another.
     pub fn add(&mut self, other: &State, factor: f32) {
         for (sum, part) in self.driven.iter_mut().zip(&other.driven) {
@@ -52,6 +61,28 @@ impl State {
         }
         for (sum, part) in self.drivers.iter_mut().zip(&other.drivers) {
             *sum += part * factor;
+        }
+    }
+}
+
+/// What a scalar sees of the error state.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Row<'a> {
+    /// A component of the velocity alone.
+    Velocity(usize),
+    /// A driver alone.
+    Driver(usize),
+    /// All of it.
+    Of(&'a State),
+}
+
+impl Row<'_> {
+    /// What it sees of this one.
+    pub fn of(&self, state: &State) -> f32 {
+        match *self {
+            Row::Velocity(axis) => state.driven[VELOCITY + axis],
+            Row::Driver(k) => state.drivers[k],
+            Row::Of(row) => row.dot(state),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! One record for every scalar compared, and the correction that the scalars of a window add up to.
 
-use super::covariance::{Seen, State};
+use super::covariance::{Row, Seen, State};
 
 /// Most scalars of a window: bias 3, velocity 2, field 2.
 pub const INNOVATIONS: usize = 7;
@@ -60,7 +60,7 @@ pub(super) struct Scalar<'a> {
     pub predicted: f32,
     pub measured: f32,
     /// `h`: how it depends on the error state at the end of the window.
-    pub row: &'a State,
+    pub row: Row<'a>,
     /// `r`.
     pub variance: f32,
 }
@@ -91,11 +91,11 @@ impl<'a> Correction<'a> {
             row,
             variance,
         } = *scalar;
-        let residual = measured - predicted - self.error.dot(row);
+        let residual = measured - predicted - row.of(&self.error);
         for seen in seen.iter() {
-            column.add(&seen.column, -(seen.column.dot(row) / seen.variance));
+            column.add(&seen.column, -(row.of(&seen.column) / seen.variance));
         }
-        let variance = column.dot(row) + variance;
+        let variance = row.of(column) + variance;
         let test_ratio = residual * residual / (self.gate * self.gate * variance);
         // Not greater than one, so that NaN is rejected too.
         let accepted = self.usable && variance > 0.0 && test_ratio <= 1.0;

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use super::{
     Params,
-    covariance::{Covariance, DRIVERS, GYRO_MATRIX, State, VELOCITY, dot},
+    covariance::{Covariance, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
     square,
     window::{Means, Window},
 };
@@ -88,32 +88,52 @@ impl Passage {
     }
 
     /// Makes `P h'` at the end, for a row `h` there, of `P F' h'` at the start.
-    pub fn carry(&self, column: &mut State, row: &State) {
+    pub fn carry(&self, column: &mut State, row: &Row) {
         let State { driven, drivers } = column;
+        // A copy stays in registers.
         let along = *drivers;
         let gained = self.drive.each_ref().map(|drive| dot(drive, &along));
         let [mean_north, mean_east, _] = self.mean_drive.each_ref();
         let (mean_north, mean_east) = (dot(mean_north, &along), dot(mean_east, &along));
         let [north, east, down, to_north, to_east] = *driven;
-        let (noise, both) = (self.angle_variance, self.both);
-        let [n, e, d, v_n, v_e] = row.driven;
         *driven = [
-            north + gained[0] + (noise * n + both * v_e),
-            east + gained[1] + (noise * e - both * v_n),
-            down + gained[2] + noise * d,
-            to_north - self.tilt * (east + mean_east) + (self.velocity_variance * v_n - both * e),
-            to_east + self.tilt * (north + mean_north) + (self.velocity_variance * v_e + both * n),
+            north + gained[0],
+            east + gained[1],
+            down + gained[2],
+            to_north - self.tilt * (east + mean_east),
+            to_east + self.tilt * (north + mean_north),
         ];
+        self.add_noise(column, row);
         if self.velocity_lost {
-            driven[VELOCITY..].fill(0.0);
+            column.driven[VELOCITY..].fill(0.0);
         }
+    }
+
+    /// `Q h'`.
+    fn add_noise(&self, column: &mut State, row: &Row) {
+        let (noise, both) = (self.angle_variance, self.both);
         let [bias, matrix] = self.walks;
-        let (bias_along, matrix_along) = drivers.split_at_mut(GYRO_MATRIX);
-        for (sum, row) in bias_along.iter_mut().zip(&row.drivers) {
-            *sum += bias * row;
-        }
-        for (sum, row) in matrix_along.iter_mut().zip(&row.drivers[GYRO_MATRIX..]) {
-            *sum += matrix * row;
+        match *row {
+            Row::Velocity(axis) => {
+                column.driven[VELOCITY + axis] += self.velocity_variance;
+                column.driven[1 - axis] += if axis == 0 { -both } else { both };
+            }
+            Row::Driver(k) => column.drivers[k] += if k < GYRO_MATRIX { bias } else { matrix },
+            // No row of the whole sees the velocity.
+            Row::Of(row) => {
+                let [north, east, down, ..] = row.driven;
+                let noises = [noise * north, noise * east, noise * down, -both * east, both * north];
+                for (sum, noise) in column.driven.iter_mut().zip(noises) {
+                    *sum += noise;
+                }
+                let (along_bias, along_matrix) = column.drivers.split_at_mut(GYRO_MATRIX);
+                for (sum, row) in along_bias.iter_mut().zip(&row.drivers) {
+                    *sum += bias * row;
+                }
+                for (sum, row) in along_matrix.iter_mut().zip(&row.drivers[GYRO_MATRIX..]) {
+                    *sum += matrix * row;
+                }
+            }
         }
     }
 }

@@ -46,7 +46,7 @@ impl Filter {
     /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could, with no
     /// variance above `most` \[rad^2\].
     pub(super) fn align(&mut self, means: &Means, most: f32) -> bool {
-        let (Some(sums), true) = (means.field, means.near_one_g) else {
+        let (Some(sums), true) = (self.window.field(), means.near_one_g) else {
             return false;
         };
         let mean = sums.mean(&self.iron.iron_b);

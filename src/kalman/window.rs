@@ -131,8 +131,6 @@ pub struct Means {
     /// [rad2] of the direction of mean specific force as the vertical.
     pub tilt_variance: f32,
     acc_spread: f32,
-    /// The field, if it was sampled.
-    pub field: Option<FieldSums>,
 }
 
 /// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
@@ -198,6 +196,11 @@ impl Window {
         sums.variance += variance;
     }
 
+    /// The field, if it was sampled.
+    pub fn field(&self) -> Option<&FieldSums> {
+        (self.mag.count > 0.0).then_some(&self.mag)
+    }
+
     /// What it all says.
     pub fn means(&self, params: &Params, lift_off: bool) -> Means {
         let covered_s = self.covered_s.max(f32::MIN_POSITIVE);
@@ -237,7 +240,6 @@ impl Window {
             angle_variance: self.angle_variance,
             tilt_variance: square(START_TILT_SD) + tilt_variance,
             acc_spread,
-            field: (self.mag.count > 0.0).then_some(self.mag),
         }
     }
 }

@@ -68,12 +68,14 @@ impl Unit {
 
     fn cycle(&mut self) -> (Sample, Increments) {
         let (acc, mag, gyro) = (self.set.acc, self.set.mag, self.set.gyro);
-        let (mut force_b, mut field_b, mut rate_b) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+        let place_b = self.set.place_b;
+        let (mut force_b, mut field_b) = (Vector3::zeros(), Vector3::zeros());
+        let (mut rate_b, mut before_b) = (Vector3::zeros(), Vector3::zeros());
         for _ in 0..FAST {
             if self.turns {
-                // The motion's step is 20 ms; taken for 10, it tumbles half as fast.
-                let sample = motion(self.fast, &mut self.q_nb);
-                rate_b = sample.rate_b * 2.0;
+                // A step of the motion is 20 ms; taken for 10, it tumbles twice as fast.
+                before_b = rate_b;
+                rate_b = motion(self.fast, &mut self.q_nb).rate_b * 2.0;
             }
             force_b = self.q_nb.inverse_transform_vector(&super::counted::FORCE_N);
             field_b = self.q_nb.inverse_transform_vector(&super::counted::FIELD_N_UT);
@@ -84,14 +86,19 @@ impl Unit {
                 counts,
             });
         }
-        let triads = |unit: &mut Unit, axes: &[Axis; 12], vector_b: &Vector3<f32>| -> [[i16; 3]; 4] {
-            core::array::from_fn(|plate| core::array::from_fn(|k| unit.counts(&axes[3 * plate + k], vector_b)))
-        };
         let start_us = FAST_US * self.fast as u64;
+        let acceleration_b = (rate_b - before_b) / (FAST_US as f32 * 1e-6);
+        let at_place =
+            |place_b: Vector3<f32>| force_b + acceleration_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b));
+        let acc_p = core::array::from_fn(|plate| {
+            let at_place = at_place(place_b[plate]);
+            core::array::from_fn(|k| self.counts(&acc[3 * plate + k], &at_place))
+        });
+        let mag_p = core::array::from_fn(|plate| core::array::from_fn(|k| self.counts(&mag[3 * plate + k], &field_b)));
         let reading = Reading {
             errors: Errors(0),
-            acc_p: triads(self, &acc, &force_b),
-            mag_p: triads(self, &mag, &field_b),
+            acc_p,
+            mag_p,
             gyro: gyro.map(|axis| self.counts(&axis, &rate_b)),
             gyro_temperature: [0; 4],
             temperature: [400; 4],
