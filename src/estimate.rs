@@ -105,6 +105,7 @@ pub struct Estimator {
     temperatures: Temperatures,
     monitor: Monitor,
     filter: Filter,
+    turn_solver: turn::Solver,
     /// What TRIAD knows.
     axes_n: Matrix3<f32>,
     last_us: Option<u64>,
@@ -122,6 +123,7 @@ impl Estimator {
             temperatures: Temperatures::default(),
             monitor: Monitor::new(&set),
             filter: Filter::new(site.params(&set)),
+            turn_solver: turn::Solver::default(),
             axes_n: axes_n(site.declination_deg.to_radians()),
             last_us: None,
             settlements: None,
@@ -138,6 +140,7 @@ impl Estimator {
         self.temperatures = Temperatures::default();
         self.monitor = Monitor::new(set);
         self.filter = Filter::new(site.params(set));
+        self.turn_solver = turn::Solver::default();
         self.axes_n = axes_n(site.declination_deg.to_radians());
         self.last_us = None;
         self.settlements = None;
@@ -178,7 +181,13 @@ impl Estimator {
         let dt_s = since_us.unwrap_or_default() as f32 * 1e-6;
         let vectors = self.monitor.step(&self.set, reading, &measured, dt_s);
         let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
-        let turned = turn::turn(&self.set, &self.temperatures, increments, believed);
+        let turned = turn::turn(
+            &self.set,
+            &self.temperatures,
+            increments,
+            believed,
+            &mut self.turn_solver,
+        );
         let force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
         let field = self.sampled(sample, Kind::Magnetometer, &vectors.field_b_ut);
         let step = Step {

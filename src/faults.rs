@@ -237,6 +237,11 @@ impl Monitor {
     }
 
     fn settle_gyros(&mut self, measured: &Measured, rate: f32, dt_s: Option<f32>, found: [&Solution; 3]) {
+        // The vectors are asked which gyro it is once the parity says that it may be one: what was before says nothing.
+        if !self.gyro.is_doubted() {
+            self.vector_rate.pause();
+            return;
+        }
         let [force_b, field_b_ut, rate_b] = found;
         let still_gravity = GRAVITY.contains(&length(&force_b.vector_b));
         let directions = [

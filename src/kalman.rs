@@ -314,7 +314,7 @@ impl Filter {
         }
         self.velocity_n += means.velocity_change_n;
         self.pending.passage.become_of(&self.params, &self.window, &means);
-        self.pending.seen.clear();
+        self.pending.clear();
         let mut correction = Correction::new(self.params.gate, &mut outcome.innovations);
         if rests {
             self.compare_rest(&means, &mut correction);
@@ -383,7 +383,15 @@ impl Filter {
     /// A scalar, of whose `P h'` the passage is still to be made.
     fn compare(&mut self, scalar: &Scalar, mut column: State, correction: &mut Correction) -> bool {
         self.pending.passage.carry(&mut column, &scalar.row);
-        correction.compare(scalar, &mut column, &mut self.pending.seen)
+        let Some((before, own)) = self.pending.next() else {
+            return true;
+        };
+        own.column = column;
+        let accepted = correction.compare(scalar, before, own);
+        if accepted {
+            self.pending.keep();
+        }
+        accepted
     }
 
     /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
@@ -394,7 +402,7 @@ impl Filter {
         self.reference
             .learn(&self.params, means.duration_s, sums, &self.iron.iron_b);
         let compared = self.reference.compare(&self.params, &sums.mean(&self.iron.iron_b))?;
-        let disturbed = compared.disturbance > self.params.field_gate;
+        let disturbed = compared.disturbance > square(self.params.field_gate);
         self.disturbed_s = if disturbed {
             self.disturbed_s + means.duration_s
         } else {

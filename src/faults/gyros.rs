@@ -16,7 +16,7 @@
 //!
 //! [`vector_rate`]: super::vector_rate
 
-use nalgebra::{ComplexField, SMatrix, Vector3, Vector4};
+use nalgebra::{ComplexField, Matrix3, SMatrix, Vector3, Vector4};
 
 use super::{
     Cycle,
@@ -52,8 +52,11 @@ pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
     /// Unit vector of the parity.
     across: [f32; PLATES],
-    /// Least squares by all four.
+    /// Least squares by all four, and its covariance for a variance of one.
     rate_from_all: SMatrix<f32, 3, PLATES>,
+    of_one: Matrix3<f32>,
+    /// All four have the same noise, so that these are the weighted ones too.
+    alike: bool,
     /// By how much a parity of one moves the rate when each gyro is left out.
     without: [Vector3<f32>; PLATES],
     uncertainty: Uncertainty,
@@ -69,6 +72,8 @@ pub(super) struct Gyros {
     usual_b: Option<Vector3<f32>>,
     cycles: f32,
     quiet_for: u8,
+    /// Cycles for which the parity is still doubted.
+    doubted_for: u8,
     /// Parity of the cycle before, in standard deviations of the noise.
     last_sigmas: f32,
     leaping: Option<usize>,
@@ -87,6 +92,8 @@ impl Gyros {
             axes_b,
             across,
             rate_from_all: matrix(&axes_b, ALL),
+            of_one: solve(&axes_b, &[0.0; PLATES], &[1.0; PLATES], ALL).covariance_b,
+            alike: noise.iter().all(|other| *other == noise[0]),
             without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k)) * Vector4::from(across)),
             uncertainty,
             timing_s,
@@ -98,10 +105,17 @@ impl Gyros {
             usual_b: None,
             cycles: 0.0,
             quiet_for: 0,
+            doubted_for: 0,
             last_sigmas: 0.0,
             leaping: None,
             suspect: false,
         }
+    }
+
+    /// Whether the parity is on its way to an alarm, or was not long ago; to be asked once a cycle.
+    pub(super) fn is_doubted(&mut self) -> bool {
+        self.doubted_for = self.doubted_for.saturating_sub(1);
+        self.doubted_for > 0 || self.suspect
     }
 
     /// Gyros that are not believed.
@@ -123,7 +137,17 @@ impl Gyros {
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle, candidates);
         let variances = core::array::from_fn(|k| self.watches[k].noise + systematic);
-        let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
+        let finite = cycle.values.iter().all(|value| value.abs() <= f32::MAX);
+        let mut solution = if candidates == ALL && self.alike && finite {
+            Solution {
+                vector_b: self.rate_from_all * Vector4::from(*cycle.values),
+                covariance_b: self.of_one * variances[0],
+                known: Known::All,
+                used: ALL,
+            }
+        } else {
+            solve(&self.axes_b, cycle.values, &variances, candidates)
+        };
         if candidates == ALL {
             solution = self.check(cycle, &variances, systematic, solution);
         } else {
@@ -188,6 +212,9 @@ impl Gyros {
         } else {
             0
         };
+        if alarm > QUIET {
+            self.doubted_for = QUIET_CYCLES;
+        }
         self.suspect = alarm > 1.0 || (self.suspect && self.quiet_for < QUIET_CYCLES);
         let widened = if self.suspect {
             1.0 + parity * parity / variance

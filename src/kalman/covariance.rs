@@ -104,7 +104,7 @@ pub struct Covariance {
 }
 
 /// What a scalar saw of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Seen {
     /// `p = P h'`.
     pub column: State,
@@ -175,16 +175,13 @@ impl Covariance {
 
     /// Times a vector that is one at a driven state and `drivers` at the drivers.
     pub(super) fn times(&self, driven: usize, drivers: &[f32; DRIVERS]) -> State {
-        let mut product = self.of_driven(driven);
         // A copy stays in registers.
         let drivers = *drivers;
-        for (sum, row) in product.driven.iter_mut().zip(&self.across) {
-            *sum += dot(row, &drivers);
+        let (own, across) = (&self.driven[driven], &self.across[driven]);
+        State {
+            driven: core::array::from_fn(|k| own[k] + dot(&self.across[k], &drivers)),
+            drivers: core::array::from_fn(|k| across[k] + dot(&self.drivers[k], &drivers)),
         }
-        for (sum, row) in product.drivers.iter_mut().zip(&self.drivers) {
-            *sum += dot(row, &drivers);
-        }
-        product
     }
 
     /// Over a window.

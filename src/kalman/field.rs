@@ -47,7 +47,7 @@ pub struct Scalar {
 /// The field of a window.
 pub struct Compared {
     pub scalars: [Scalar; 2],
-    /// [1] what norm and dip show of a disturbance.
+    /// [1] square of what norm and dip show of a disturbance.
     pub disturbance: f32,
 }
 
@@ -101,7 +101,7 @@ impl Reference {
                     variance: square(params.dip_sd) + seen,
                 },
             ],
-            disturbance: ComplexField::sqrt(disturbance),
+            disturbance,
         })
     }
 

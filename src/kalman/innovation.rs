@@ -75,15 +75,10 @@ impl<'a> Correction<'a> {
         }
     }
 
-    /// Compares a scalar. Whether it was accepted. `column` is `P h'` of the covariance at the end of the window before any
-    /// of its scalars, and becomes that after the others `seen`, `P h' - sum k (p h')`; the covariance itself has their
-    /// updates later.
-    pub fn compare(
-        &mut self,
-        scalar: &Scalar,
-        column: &mut State,
-        seen: &mut heapless::Vec<Seen, INNOVATIONS>,
-    ) -> bool {
+    /// Compares a scalar. Whether it was accepted. The column of `own` is `P h'` of the covariance at the end of the window
+    /// before any of its scalars, and becomes that after the ones `before`, `P h' - sum k (p h')`; the covariance itself has
+    /// their updates later.
+    pub fn compare(&mut self, scalar: &Scalar, before: &[Seen], own: &mut Seen) -> bool {
         let Scalar {
             quantity,
             predicted,
@@ -92,21 +87,18 @@ impl<'a> Correction<'a> {
             variance,
         } = *scalar;
         let residual = measured - predicted - row.of(&self.error);
-        for seen in seen.iter() {
-            column.add(&seen.column, -(row.of(&seen.column) / seen.variance));
+        for seen in before {
+            own.column.add(&seen.column, -(row.of(&seen.column) / seen.variance));
         }
-        let variance = row.of(column) + variance;
+        let variance = row.of(&own.column) + variance;
+        own.variance = variance;
         let test_ratio = residual * residual / (self.gate * self.gate * variance);
         // Not greater than one, so that NaN is rejected too.
         let accepted = self.usable && variance > 0.0 && test_ratio <= 1.0;
         if accepted {
-            self.error.add(column, residual / variance);
-            // There are as many places as scalars, here and below.
-            let _ = seen.push(Seen {
-                column: *column,
-                variance,
-            });
+            self.error.add(&own.column, residual / variance);
         }
+        // There are as many places as scalars.
         let _ = self.innovations.push(Innovation {
             quantity,
             predicted,

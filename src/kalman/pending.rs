@@ -19,7 +19,9 @@ const A_STAGE: usize = 3;
 pub(super) struct Pending {
     pub passage: Passage,
     /// What the scalars of the window saw, in their order.
-    pub seen: heapless::Vec<Seen, INNOVATIONS>,
+    seen: [Seen; INNOVATIONS],
+    /// How many there are.
+    scalars: usize,
     /// The next stage: the passage, then the scalars.
     stage: Option<usize>,
 }
@@ -28,9 +30,26 @@ impl Pending {
     pub fn nothing() -> Self {
         Pending {
             passage: Passage::default(),
-            seen: heapless::Vec::new(),
+            seen: [Seen::default(); INNOVATIONS],
+            scalars: 0,
             stage: None,
         }
+    }
+
+    /// Forgets the scalars.
+    pub fn clear(&mut self) {
+        self.scalars = 0;
+    }
+
+    /// What the scalars so far saw, and the place for the next; `None` if there are as many as may be.
+    pub fn next(&mut self) -> Option<(&[Seen], &mut Seen)> {
+        let (seen, free) = self.seen.split_at_mut_checked(self.scalars)?;
+        Some((seen, free.first_mut()?))
+    }
+
+    /// Keeps what was put in that place.
+    pub fn keep(&mut self) {
+        self.scalars += 1;
     }
 
     /// All of its passage and its scalars.
@@ -54,11 +73,11 @@ impl Pending {
         if stage == 0 {
             covariance.predict(&self.passage);
         } else {
-            let stages = self.seen.chunks(A_STAGE);
-            for seen in stages.skip(stage - 1).take(1).flatten() {
+            let seen = self.seen.iter().take(self.scalars);
+            for seen in seen.skip(A_STAGE * (stage - 1)).take(A_STAGE) {
                 covariance.update(seen);
             }
         }
-        self.stage = (A_STAGE * stage < self.seen.len()).then_some(stage + 1);
+        self.stage = (A_STAGE * stage < self.scalars).then_some(stage + 1);
     }
 }
