@@ -106,6 +106,8 @@ pub struct Estimator {
     monitor: Monitor,
     filter: Filter,
     turn_solver: turn::Solver,
+    /// The step before completed a window of the filter.
+    closed: bool,
     /// What TRIAD knows.
     axes_n: Matrix3<f32>,
     last_us: Option<u64>,
@@ -124,6 +126,7 @@ impl Estimator {
             monitor: Monitor::new(&set),
             filter: Filter::new(site.params(&set)),
             turn_solver: turn::Solver::default(),
+            closed: false,
             axes_n: axes_n(site.declination_deg.to_radians()),
             last_us: None,
             settlements: None,
@@ -141,6 +144,7 @@ impl Estimator {
         self.monitor = Monitor::new(set);
         self.filter = Filter::new(site.params(set));
         self.turn_solver = turn::Solver::default();
+        self.closed = false;
         self.axes_n = axes_n(site.declination_deg.to_radians());
         self.last_us = None;
         self.settlements = None;
@@ -179,7 +183,12 @@ impl Estimator {
         self.last_us = Some(sample.start_us);
         // Zero is a gap to the monitor: there is no cycle before the first.
         let dt_s = since_us.unwrap_or_default() as f32 * 1e-6;
-        let vectors = self.monitor.step(&self.set, reading, &measured, dt_s);
+        // The step that completes a window leaves what can wait to the next one, and that leaves its own to the one after.
+        let closes = self.filter.closes_at(increments.end_us);
+        if core::mem::replace(&mut self.closed, closes) {
+            self.filter.spare();
+        }
+        let vectors = self.monitor.take(&self.set, reading, &measured, dt_s, closes);
         let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
         let turned = turn::turn(
             &self.set,

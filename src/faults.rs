@@ -84,6 +84,8 @@ struct Cycle<'a, const N: usize> {
     frozen: u16,
     /// [s] since the cycle before; `None` after a gap.
     dt_s: Option<f32>,
+    /// Its disagreements are looked at in the next cycle.
+    watched_later: bool,
 }
 
 /// All 28 axes under watch.
@@ -158,6 +160,19 @@ impl Monitor {
 
     /// Takes a cycle: `measured` is what `set` made of `reading`, `dt_s` [s] the time since the one before.
     pub fn step(&mut self, set: &Set, reading: &Reading, measured: &Measured, dt_s: f32) -> Vectors {
+        self.take(set, reading, measured, dt_s, false)
+    }
+
+    /// The same; `watched_later` leaves a third of the work to the next cycle. What accelerometers and magnetometers disagree
+    /// by is then looked at before that cycle's vectors, which are the first it may change: only the health word is late.
+    pub fn take(
+        &mut self,
+        set: &Set,
+        reading: &Reading,
+        measured: &Measured,
+        dt_s: f32,
+        watched_later: bool,
+    ) -> Vectors {
         let dt_s = (dt_s > 0.0 && dt_s < LONGEST_S).then_some(dt_s);
         let present = measured.present;
         let rate_b = self.gyro.step(&Cycle {
@@ -169,6 +184,7 @@ impl Monitor {
                 &reading.gyro.map(|counts| [counts]),
             ),
             dt_s,
+            watched_later: false,
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
@@ -179,6 +195,7 @@ impl Monitor {
                 present: present.of(Kind::Accelerometer),
                 frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), &reading.acc_p),
                 dt_s,
+                watched_later,
             },
             &Apart { rate, by_place: unsure },
         );
@@ -188,6 +205,7 @@ impl Monitor {
                 present: present.of(Kind::Magnetometer),
                 frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), &reading.mag_p),
                 dt_s,
+                watched_later,
             },
             &Apart { rate, by_place: 0.0 },
         );

@@ -57,7 +57,7 @@ use self::{
     covariance::{GYRO_MATRIX, Row, State, VELOCITY, are_finite},
     innovation::{Correction, Scalar},
     passage::walks,
-    pending::Pending,
+    pending::{Pace, Pending},
     start::UNKNOWN,
     window::{Means, Window},
 };
@@ -80,6 +80,8 @@ pub struct Filter {
     covariance: Covariance,
     /// What the latest window still has to do to it.
     pending: Pending,
+    /// Nothing of it is to be done in the next step.
+    spared: bool,
     /// How often the covariance was complete, round and round.
     settlements: u8,
     /// Rounding made a variance negative.
@@ -115,6 +117,7 @@ impl Filter {
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
             pending: Pending::nothing(),
+            spared: false,
             settlements: 0,
             unsound: false,
             reference: params.field,
@@ -150,7 +153,7 @@ impl Filter {
     pub fn covariance(&self) -> Covariance {
         let (mut covariance, mut pending) = (self.covariance.clone(), self.pending.clone());
         while !pending.is_done() {
-            pending.work(&mut covariance);
+            pending.work(&mut covariance, Pace::Large);
         }
         covariance.keep_bounds();
         covariance
@@ -217,14 +220,26 @@ impl Filter {
             if !self.is_finite() {
                 *self = Filter::new(self.params);
             }
-        } else if !self.pending.is_done() {
-            self.work();
+        } else if !self.pending.is_done() && !self.spared {
+            self.work(if since_s < LONG_STEP_S { Pace::Small } else { Pace::Large });
         }
+        self.spared = false;
+    }
+
+    /// Whether a step that ends then completes a window. If the gyros were heard.
+    pub fn closes_at(&self, at_us: u64) -> bool {
+        let since_s = self.last_us.map_or(0.0, |last_us| seconds(at_us.saturating_sub(last_us)));
+        self.window.duration_s + since_s >= self.params.window_s - HALF_A_MILLISECOND
+    }
+
+    /// Leaves the next step to others: what is pending waits for the one after it.
+    pub fn spare(&mut self) {
+        self.spared = true;
     }
 
     /// One stage of what is pending; at its end the covariance is looked at.
-    fn work(&mut self) {
-        self.pending.work(&mut self.covariance);
+    fn work(&mut self, pace: Pace) {
+        self.pending.work(&mut self.covariance, pace);
         if self.pending.is_done() {
             self.settlements = self.settlements.wrapping_add(1);
             self.unsound = !self.covariance.keep_bounds();
@@ -238,7 +253,7 @@ impl Filter {
     /// All that is pending.
     fn settle(&mut self) {
         while !self.pending.is_done() {
-            self.work();
+            self.work(Pace::Large);
         }
     }
 
@@ -445,6 +460,9 @@ impl Filter {
             && self.iron.is_finite()
     }
 }
+
+/// [s] steps of this length or more take large stages of what is pending.
+const LONG_STEP_S: f32 = 0.1;
 
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;

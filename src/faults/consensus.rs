@@ -17,7 +17,7 @@ pub(super) const GATE: f32 = 6.0;
 const UNCHECKED: f32 = 0.05;
 
 /// A value along an axis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
     pub(super) value: f32,
     pub(super) variance: f32,

@@ -70,6 +70,10 @@ pub(super) struct Triads {
     usual_b: Option<Vector3<f32>>,
     last_b: Option<Vector3<f32>>,
     cycles: f32,
+    /// What the axes measured in the latest cycle, and how far that was from its vector.
+    seen: [Seen; TRIAD_AXES],
+    /// Axes present, what was systematic, and the vector of the cycle before, if it is still to be watched.
+    late: Option<(u16, f32, Solution)>,
     /// It is not decidable which axis is at fault.
     pub(super) undecided: bool,
 }
@@ -91,6 +95,8 @@ impl Triads {
             usual_b: None,
             last_b: None,
             cycles: 0.0,
+            seen: [Seen::default(); TRIAD_AXES],
+            late: None,
             undecided: false,
         }
     }
@@ -114,30 +120,44 @@ impl Triads {
 
     /// Takes a cycle.
     pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) -> Solution {
+        let doubled = self.catch_up();
         if cycle.frozen != 0 {
             for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
                 self.watches[k].exclude(Verdict::Frozen);
             }
         }
         let candidates = cycle.present & !self.excluded();
-        let mut seen: [Seen; TRIAD_AXES] = core::array::from_fn(|k| Seen {
-            value: cycle.values[k] - self.watches[k].offset,
-            variance: self.watches[k].noise + self.watches[k].offset_variance,
-            off: (0.0, 0.0),
-        });
-        let systematic = self.systematic(cycle.dt_s, apart, &seen, candidates);
-        for seen in &mut seen {
+        for ((seen, value), watch) in self.seen.iter_mut().zip(cycle.values).zip(&self.watches) {
+            seen.value = value - watch.offset;
+            seen.variance = watch.noise + watch.offset_variance;
+        }
+        let systematic = self.systematic(cycle.dt_s, apart, &self.seen, candidates);
+        for seen in &mut self.seen {
             seen.variance += systematic;
         }
-        let found = agreed(&self.axes_b, &mut seen, candidates);
-        self.undecided = !found.decided;
+        let found = agreed(&self.axes_b, &mut self.seen, candidates);
+        self.undecided = !found.decided || doubled;
         if found.solution.known != Known::All {
             self.last_b = None;
         } else if found.decided {
-            self.watch(cycle.present, systematic, &seen, &found.solution);
+            if cycle.watched_later {
+                self.late = Some((cycle.present, systematic, found.solution));
+            } else {
+                self.watch(cycle.present, systematic, &found.solution);
+            }
             self.remember(&found.solution);
         }
         found.solution
+    }
+
+    /// Watches the cycle before, if that was put off: nothing has asked since. Whether it was not isolable then.
+    fn catch_up(&mut self) -> bool {
+        let Some((present, systematic, solution)) = self.late.take() else {
+            return false;
+        };
+        self.undecided = false;
+        self.watch(present, systematic, &solution);
+        self.undecided
     }
 
     /// [unit2] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
@@ -182,7 +202,8 @@ impl Triads {
     }
 
     /// Notes what each axis disagrees by; judges if one that is believed raises an alarm.
-    fn watch(&mut self, present: u16, systematic: f32, seen: &[Seen; TRIAD_AXES], solution: &Solution) {
+    #[inline(never)]
+    fn watch(&mut self, present: u16, systematic: f32, solution: &Solution) {
         let offsets = self.watches.iter().map(|watch| watch.offset_variance);
         let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
         let place = self.of_all.push(root(counted));
@@ -190,7 +211,7 @@ impl Triads {
         let bounds = self.of_all.bounds(LIMITS, &added, QUIET, self.least_relative);
         let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
         let (mut read, mut used) = (present, solution.used);
-        for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(seen) {
+        for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(&self.seen) {
             let disagreement = if read & 1 == 1 {
                 Disagreement::of(seen, used & 1 == 1)
             } else {
@@ -226,6 +247,10 @@ impl Triads {
             }
             (read, used) = (read >> 1, used >> 1);
         }
+        if !doubted && loudest < 1.0 {
+            return;
+        }
+        let seen = &{ self.seen };
         if doubted {
             let doubted = present & self.excluded();
             for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {

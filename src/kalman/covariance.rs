@@ -9,7 +9,7 @@
 //! A scalar `z = h x + noise` updates in Joseph's form, `P <- (1 - k h) P (1 - k h)' + k r k'`. With `p = P h'`,
 //! `s = h p + r` and `k = p/s` its terms collect to `P - k p' - p k' + s k k'`, and that to `P - k u' - u k'` with
 //! `u = p - k s/2`: the same for any `k`, so an error of `k` is of second order in it, where the short `P - k p'` goes
-//! indefinite in f32. Both products of a pair are added before they are taken off, so it stays symmetric to the bit.
+//! indefinite in f32. It is computed above the diagonal and mirrored below it.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -174,47 +174,57 @@ impl Covariance {
     }
 
     /// Times a vector that is one at a driven state and `drivers` at the drivers.
-    pub(super) fn times(&self, driven: usize, drivers: &[f32; DRIVERS]) -> State {
+    pub(super) fn times(&self, driven: usize, drivers: &[f32; DRIVERS], product: &mut State) {
         // A copy stays in registers.
         let drivers = *drivers;
-        let (own, across) = (&self.driven[driven], &self.across[driven]);
-        State {
-            driven: core::array::from_fn(|k| own[k] + dot(&self.across[k], &drivers)),
-            drivers: core::array::from_fn(|k| across[k] + dot(&self.drivers[k], &drivers)),
+        let parts = self.driven[driven].iter().zip(&self.across);
+        for (sum, (own, row)) in product.driven.iter_mut().zip(parts) {
+            *sum = own + dot(row, &drivers);
+        }
+        let parts = self.across[driven].iter().zip(&self.drivers);
+        for (sum, (own, row)) in product.drivers.iter_mut().zip(parts) {
+            *sum = own + dot(row, &drivers);
         }
     }
 
-    /// Over a window.
-    pub(super) fn predict(&mut self, passage: &Passage) {
+    /// Over a window: attitude and bias, gyro matrix. The velocity has [`Covariance::predict_velocity`] after it.
+    pub(super) fn predict_attitude(&mut self, passage: &Passage) {
         // The true horizontal force is left out of F: it is known only as well as its noisy samples, and a filter that
         // believes them sees heading in the noise.
         let tilt = passage.tilt;
         self.add_driven(VELOCITY, 1, -tilt);
         self.add_driven(VELOCITY + 1, 0, tilt);
-        let drive: [[f32; DRIVERS]; DRIVEN] = [
-            passage.drive[0],
-            passage.drive[1],
-            passage.drive[2],
-            passage.mean_drive[1].map(|part| part * -tilt),
-            passage.mean_drive[0].map(|part| part * tilt),
-        ];
-        // Driven k gains drive[k] times the drivers: first with the drivers, then among themselves, old and new.
-        for (k, row) in drive.iter().enumerate() {
-            let old = self.across[k];
-            for (l, other) in drive.iter().enumerate().take(k + 1) {
-                self.driven[k][l] += dot(&old, other);
-            }
-            for (sum, column) in self.across[k].iter_mut().zip(&self.drivers) {
-                *sum += dot(column, row);
-            }
-            let new = self.across[k];
-            for (l, other) in drive.iter().enumerate().skip(k) {
-                self.driven[l][k] += dot(&new, other);
-            }
+        for (k, drive) in passage.drives().iter().enumerate().take(VELOCITY) {
+            self.gain(k, drive, passage);
         }
-        self.mirror();
+    }
+
+    /// Over a window: the rest of it.
+    pub(super) fn predict_velocity(&mut self, passage: &Passage) {
+        for (k, drive) in passage.drives().iter().enumerate().skip(VELOCITY) {
+            self.gain(k, drive, passage);
+        }
+        mirror(&mut self.driven);
         self.wander(passage);
         self.drift(&passage.walks);
+    }
+
+    /// Driven state `k` gains `drive` times the drivers: with those, and in the upper triangle with the other driven, old
+    /// and new.
+    fn gain(&mut self, k: usize, drive: &[f32; DRIVERS], passage: &Passage) {
+        let drives = passage.drives();
+        let old = self.across[k];
+        for (l, other) in drives.iter().enumerate().take(k + 1) {
+            self.driven[l][k] += dot(&old, other);
+        }
+        let row = *drive;
+        for (sum, column) in self.across[k].iter_mut().zip(&self.drivers) {
+            *sum += dot(column, &row);
+        }
+        let new = self.across[k];
+        for (l, other) in drives.iter().enumerate().skip(k) {
+            self.driven[k][l] += dot(&new, other);
+        }
     }
 
     /// The attitude's random walk over the window, what it does to the velocity meanwhile, and the velocity's own.
@@ -254,15 +264,6 @@ impl Covariance {
         self.driven[row][row] = own;
     }
 
-    /// The upper triangle of the driven after the lower one.
-    fn mirror(&mut self) {
-        for row in 1..DRIVEN {
-            for column in 0..row {
-                self.driven[column][row] = self.driven[row][column];
-            }
-        }
-    }
-
     /// After a scalar: Joseph's form.
     pub(super) fn update(&mut self, seen: &Seen) {
         let p = &seen.column;
@@ -271,17 +272,24 @@ impl Covariance {
         gain.add(p, per_variance);
         let mut rest = *p;
         rest.add(&gain, -half);
-        take_off(&mut self.driven, [&gain.driven, &rest.driven], [&gain.driven, &rest.driven]);
-        take_off(
-            &mut self.across,
-            [&gain.driven, &rest.driven],
-            [&gain.drivers, &rest.drivers],
-        );
-        take_off(
-            &mut self.drivers,
-            [&gain.drivers, &rest.drivers],
-            [&gain.drivers, &rest.drivers],
-        );
+        let (driven, drivers) = ([&gain.driven, &rest.driven], [&gain.drivers, &rest.drivers]);
+        for (k, row) in self.driven.iter_mut().enumerate() {
+            take_off(row, driven.map(|part| part[k]), driven);
+        }
+        let (fours, last) = self.across.as_chunks_mut::<4>();
+        for four in fours {
+            take_off_four::<DRIVERS, 0>(four, driven.map(|part| fours_of(part, 0)), drivers);
+        }
+        for row in last {
+            take_off(row, driven.map(|part| part[DRIVEN - 1]), drivers);
+        }
+        if let ([first, second, third], _) = self.drivers.as_chunks_mut::<4>() {
+            take_off_four::<DRIVERS, 0>(first, drivers.map(|part| fours_of(part, 0)), drivers);
+            take_off_four::<DRIVERS, 4>(second, drivers.map(|part| fours_of(part, 1)), drivers);
+            take_off_four::<DRIVERS, 8>(third, drivers.map(|part| fours_of(part, 2)), drivers);
+        }
+        mirror(&mut self.driven);
+        mirror(&mut self.drivers);
     }
 
     /// Attitude known afresh with this covariance \[rad^2\], in n, and independent of the rest.
@@ -379,24 +387,42 @@ impl Covariance {
     }
 }
 
-/// Takes `k u' + u k'` off a block, `[k, u]` being given for its rows and for its columns. Four rows at a time, so that
-/// what belongs to a column is loaded once for four.
-fn take_off<const N: usize>(block: &mut [[f32; N]], [k, u]: [&[f32]; 2], [k_c, u_c]: [&[f32; N]; 2]) {
-    let (fours, left) = block.as_chunks_mut::<4>();
-    let (k_fours, k_left) = k.as_chunks::<4>();
-    let (u_fours, u_left) = u.as_chunks::<4>();
-    for (([a, b, c, d], k), u) in fours.iter_mut().zip(k_fours).zip(u_fours) {
-        for column in 0..N {
-            let (x, y) = (u_c[column], k_c[column]);
-            a[column] -= k[0] * x + u[0] * y;
-            b[column] -= k[1] * x + u[1] * y;
-            c[column] -= k[2] * x + u[2] * y;
-            d[column] -= k[3] * x + u[3] * y;
-        }
+/// The `n`-th four of them.
+fn fours_of<const N: usize>(parts: &[f32; N], n: usize) -> [f32; 4] {
+    parts.as_chunks::<4>().0.get(n).copied().unwrap_or_default()
+}
+
+/// Takes `k u' + u k'` off a row: `[k, u]` for the row and for its columns.
+fn take_off<const N: usize>(row: &mut [f32; N], [k, u]: [f32; 2], [k_c, u_c]: [&[f32; N]; 2]) {
+    for ((element, x), y) in row.iter_mut().zip(u_c).zip(k_c) {
+        *element = *element - k * x - u * y;
     }
-    for ((row, k), u) in left.iter_mut().zip(k_left).zip(u_left) {
-        for column in 0..N {
-            row[column] -= k * u_c[column] + u * k_c[column];
+}
+
+/// The same of four rows from column `FIRST` on, so that what belongs to a column is loaded once for four.
+#[inline(never)]
+fn take_off_four<const N: usize, const FIRST: usize>(
+    [a, b, c, d]: &mut [[f32; N]; 4],
+    [k, u]: [[f32; 4]; 2],
+    [k_c, u_c]: [&[f32; N]; 2],
+) {
+    for column in FIRST..N {
+        let (x, y) = (u_c[column], k_c[column]);
+        a[column] = a[column] - k[0] * x - u[0] * y;
+        b[column] = b[column] - k[1] * x - u[1] * y;
+        c[column] = c[column] - k[2] * x - u[2] * y;
+        d[column] = d[column] - k[3] * x - u[3] * y;
+    }
+}
+
+/// The lower triangle after the upper one.
+fn mirror<const N: usize>(block: &mut [[f32; N]]) {
+    for row in 1..block.len() {
+        let (above, below) = block.split_at_mut(row);
+        if let Some(below) = below.first_mut() {
+            for (below, above) in below.iter_mut().zip(above) {
+                *below = above[row];
+            }
         }
     }
 }

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use super::{
     Params,
-    covariance::{Covariance, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
+    covariance::{Covariance, DRIVEN, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
     square,
     window::{Means, Window},
 };
@@ -27,6 +27,8 @@ pub(super) struct Passage {
     pub drive: [[f32; DRIVERS]; 3],
     /// Its mean over the window.
     pub mean_drive: [[f32; DRIVERS]; 3],
+    /// Velocity by the drivers, north and east: the tilt times the mean drive across it.
+    tilting: [[f32; DRIVERS]; 2],
     /// [m/s] velocity gained by an attitude error of one.
     pub tilt: f32,
     /// [rad^2] the attitude's random walk.
@@ -55,6 +57,8 @@ impl Passage {
         let variance = window.angle_variance;
         self.drive = window.drive;
         self.mean_drive = window.mean_drive;
+        let [north, east, _] = &self.mean_drive;
+        self.tilting = [east.map(|part| part * -tilt), north.map(|part| part * tilt)];
         self.tilt = tilt;
         self.angle_variance = variance;
         // The mean of a walk has a third of the variance of its end, and half of it in common with it.
@@ -63,6 +67,12 @@ impl Passage {
         self.walks = walks(params, means.duration_s);
         self.velocity_lost = !means.vertical;
         self.velocity_sd = params.velocity_sd;
+    }
+
+    /// What the drivers make of each driven state.
+    pub fn drives(&self) -> [&[f32; DRIVERS]; DRIVEN] {
+        let ([north, east, down], [to_north, to_east]) = (&self.drive, &self.tilting);
+        [north, east, down, to_north, to_east]
     }
 
     /// What a mean over the window sees of the error state at its end, if at any instant it sees `row_n` of the attitude
@@ -79,12 +89,11 @@ impl Passage {
     /// `P h'` at the end of the window for each axis of n as a mean over the window sees it, still without passage:
     /// the covariance at its start times `(1 on the axis, B' on the drivers)`.
     pub fn means_seen(&self, covariance: &Covariance) -> [State; 3] {
-        let [north, east, down] = &self.mean_drive;
-        [
-            covariance.times(0, north),
-            covariance.times(1, east),
-            covariance.times(2, down),
-        ]
+        let mut seen = [State::default(); 3];
+        for (axis, (drive, seen)) in self.mean_drive.iter().zip(&mut seen).enumerate() {
+            covariance.times(axis, drive, seen);
+        }
+        seen
     }
 
     /// Makes `P h'` at the end, for a row `h` there, of `P F' h'` at the start.
@@ -92,17 +101,12 @@ impl Passage {
         let State { driven, drivers } = column;
         // A copy stays in registers.
         let along = *drivers;
-        let gained = self.drive.each_ref().map(|drive| dot(drive, &along));
-        let [mean_north, mean_east, _] = self.mean_drive.each_ref();
-        let (mean_north, mean_east) = (dot(mean_north, &along), dot(mean_east, &along));
-        let [north, east, down, to_north, to_east] = *driven;
-        *driven = [
-            north + gained[0],
-            east + gained[1],
-            down + gained[2],
-            to_north - self.tilt * (east + mean_east),
-            to_east + self.tilt * (north + mean_north),
-        ];
+        let [north, east, ..] = *driven;
+        for (sum, drive) in driven.iter_mut().zip(self.drives()) {
+            *sum += dot(drive, &along);
+        }
+        driven[VELOCITY] -= self.tilt * east;
+        driven[VELOCITY + 1] += self.tilt * north;
         self.add_noise(column, row);
         if self.velocity_lost {
             column.driven[VELOCITY..].fill(0.0);

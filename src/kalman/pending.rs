@@ -2,8 +2,9 @@
 //!
 //! In: a window's [`Passage`] and what its scalars saw. Out, a stage a step: the covariance over the window and after the
 //! scalars. The state has all of them at once, because gains need only products of the covariance with what the scalars
-//! see ([`super::innovation`]); nothing asks for the covariance itself before the next window. At most four stages, so
-//! that at 5 Hz they are done before it closes; if not, what is left is done then.
+//! see ([`super::innovation`]); nothing asks for the covariance itself before the next window. Steps that are long take
+//! more of it, so that at 5 Hz it is done three steps after the window; if it is not when the next one closes, what is left
+//! is done then.
 
 use super::{
     covariance::{Covariance, Seen},
@@ -11,8 +12,24 @@ use super::{
     passage::Passage,
 };
 
-/// Scalars that one stage takes.
-const A_STAGE: usize = 3;
+/// How much of it a stage takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pace {
+    /// Attitude, velocity, or three scalars: steps of 20 ms come so often.
+    Small,
+    /// Attitude and velocity, or half of the scalars.
+    Large,
+}
+
+/// What comes next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Attitude,
+    Velocity,
+    /// The scalars from this one on.
+    Scalars(usize),
+    Done,
+}
 
 /// What is still to be done.
 #[derive(Clone, Debug)]
@@ -22,8 +39,7 @@ pub(super) struct Pending {
     seen: [Seen; INNOVATIONS],
     /// How many there are.
     scalars: usize,
-    /// The next stage: the passage, then the scalars.
-    stage: Option<usize>,
+    stage: Stage,
 }
 
 impl Pending {
@@ -32,7 +48,7 @@ impl Pending {
             passage: Passage::default(),
             seen: [Seen::default(); INNOVATIONS],
             scalars: 0,
-            stage: None,
+            stage: Stage::Done,
         }
     }
 
@@ -54,30 +70,54 @@ impl Pending {
 
     /// All of its passage and its scalars.
     pub fn begin(&mut self) {
-        self.stage = Some(0);
+        self.stage = Stage::Attitude;
     }
 
     /// Whether there is nothing to be done.
     pub fn is_done(&self) -> bool {
-        self.stage.is_none()
+        self.stage == Stage::Done
     }
 
     /// Whether the covariance is neither that of the window before nor that of this one.
     pub fn is_half_done(&self) -> bool {
-        self.stage.is_some_and(|stage| stage > 0)
+        matches!(self.stage, Stage::Velocity | Stage::Scalars(_))
     }
 
     /// One stage.
-    pub fn work(&mut self, covariance: &mut Covariance) {
-        let Some(stage) = self.stage else { return };
-        if stage == 0 {
-            covariance.predict(&self.passage);
-        } else {
-            let seen = self.seen.iter().take(self.scalars);
-            for seen in seen.skip(A_STAGE * (stage - 1)).take(A_STAGE) {
-                covariance.update(seen);
+    pub fn work(&mut self, covariance: &mut Covariance, pace: Pace) {
+        if self.stage == Stage::Attitude {
+            covariance.predict_attitude(&self.passage);
+            self.stage = Stage::Velocity;
+            if pace == Pace::Small {
+                return;
             }
         }
-        self.stage = (A_STAGE * stage < self.scalars).then_some(stage + 1);
+        self.stage = match self.stage {
+            Stage::Velocity => {
+                covariance.predict_velocity(&self.passage);
+                self.scalars_from(0)
+            }
+            Stage::Scalars(first) => {
+                let most = if pace == Pace::Small {
+                    3
+                } else {
+                    self.scalars.div_ceil(2)
+                };
+                let last = first + most;
+                for seen in self.seen.iter().take(self.scalars.min(last)).skip(first) {
+                    covariance.update(seen);
+                }
+                self.scalars_from(last)
+            }
+            Stage::Attitude | Stage::Done => Stage::Done,
+        };
+    }
+
+    fn scalars_from(&self, first: usize) -> Stage {
+        if first < self.scalars {
+            Stage::Scalars(first)
+        } else {
+            Stage::Done
+        }
     }
 }
