@@ -98,6 +98,9 @@ impl Estimate {
 /// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.
 const NEAR_ONE_G: f32 = 0.1;
 
+/// Bits of twelve axes.
+const ALL_AXES: u16 = 0xFFF;
+
 /// Everything the step remembers.
 #[derive(Clone, Debug)]
 pub struct Estimator {
@@ -106,10 +109,12 @@ pub struct Estimator {
     monitor: Monitor,
     filter: Filter,
     turn_solver: turn::Solver,
+    /// White variance of a component of force, in (m/s2)^2, and of field, in uT2, by all axes.
+    white: [f32; 2],
     /// The step before completed a window of the filter.
     closed: bool,
     /// What TRIAD knows.
-    axes_n: Matrix3<f32>,
+    axes_n: Option<Matrix3<f32>>,
     last_us: Option<u64>,
     /// Of the filter's covariance when it was last looked at, with what is said of it.
     settlements: Option<u8>,
@@ -127,6 +132,7 @@ impl Estimator {
             filter: Filter::new(site.params(&set)),
             turn_solver: turn::Solver::default(),
             closed: false,
+            white: [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)],
             axes_n: axes_n(site.declination_deg.to_radians()),
             last_us: None,
             settlements: None,
@@ -145,6 +151,7 @@ impl Estimator {
         self.filter = Filter::new(site.params(set));
         self.turn_solver = turn::Solver::default();
         self.closed = false;
+        self.white = [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)];
         self.axes_n = axes_n(site.declination_deg.to_radians());
         self.last_us = None;
         self.settlements = None;
@@ -254,6 +261,7 @@ impl Estimator {
     /// A whole vector at the mean of its sensors' slot times, with its white noise: what is systematic is the filter's own
     /// business.
     fn sampled(&self, sample: &Sample, kind: Kind, solution: &Solution) -> Option<Sampled> {
+        let whole_white = self.white[usize::from(kind == Kind::Magnetometer)];
         if solution.known != Known::All {
             return None;
         }
@@ -273,7 +281,11 @@ impl Estimator {
         };
         Some(Sampled {
             value_b: solution.vector_b,
-            variance: white(self.set.axes(kind), solution.used),
+            variance: if solution.used == ALL_AXES {
+                whole_white
+            } else {
+                white(self.set.axes(kind), solution.used)
+            },
             at_us: sample.start_us.saturating_add(mean_us),
         })
     }
@@ -293,16 +305,14 @@ impl Estimator {
         if !near {
             return None;
         }
-        triad::attitude(-force_b.vector_b, field_b_ut.vector_b, &self.axes_n).ok()
+        triad::attitude(-force_b.vector_b, field_b_ut.vector_b, self.axes_n.as_ref()?).ok()
     }
 }
 
-/// The axes that the vertical and a field with this declination [rad] span.
-fn axes_n(declination: f32) -> Matrix3<f32> {
+/// The axes that the vertical and a field with this declination [rad] span, which are never collinear.
+fn axes_n(declination: f32) -> Option<Matrix3<f32>> {
     let (sin, cos) = attitude::sin_cos(declination);
-    let north_n = Vector3::new(cos, sin, 0.0);
-    // The vertical and a horizontal are never collinear; without axes every attitude is refused.
-    triad::known_axes(Vector3::z(), north_n).unwrap_or_else(|_| Matrix3::zeros())
+    triad::known_axes(Vector3::z(), Vector3::new(cos, sin, 0.0)).ok()
 }
 
 /// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.

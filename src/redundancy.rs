@@ -49,8 +49,8 @@ impl Solution {
     pub fn along(&self, axis_b: &Vector3<f32>) -> (f32, f32) {
         let [x, y, z] = [axis_b.x, axis_b.y, axis_b.z];
         let p = &self.covariance_b;
-        let (two_x, two_y) = (x + x, y + y);
-        let variance = x * x * p.m11 + y * y * p.m22 + z * z * p.m33 + two_x * (y * p.m12 + z * p.m13) + two_y * z * p.m23;
+        let variance =
+            x * (x * p.m11 + 2.0 * (y * p.m12 + z * p.m13)) + y * (y * p.m22 + 2.0 * z * p.m23) + z * z * p.m33;
         (axis_b.dot(&self.vector_b), variance)
     }
 }

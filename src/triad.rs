@@ -73,7 +73,7 @@ pub fn triad(first: &Sighting, second: &Sighting) -> Result<Observation, Unobser
         return Err(Unobservable::NotADirection);
     }
     let (w1, w2) = (direction(first.seen_b)?, direction(second.seen_b)?);
-    let q_nb = turned(axes(w1, w2)?, &known_axes(first.known_n, second.known_n)?)?;
+    let q_nb = turned(axes(w1, w2)?, &known_axes(first.known_n, second.known_n)?);
     let (w1_w2, cross) = (w1 * w2.transpose(), w1.cross(&w2).norm_squared());
     let coupled = (w1_w2 + w1_w2.transpose()) * (variance_1 * w1.dot(&w2));
     let about_first = w1 * w1.transpose() * (variance_2 - variance_1);
@@ -92,11 +92,11 @@ pub fn attitude(
     second_b: Vector3<f32>,
     known_axes_n: &Matrix3<f32>,
 ) -> Result<UnitQuaternion<f32>, Unobservable> {
-    turned(axes(direction(first_b)?, direction(second_b)?)?, known_axes_n)
+    Ok(turned(axes(direction(first_b)?, direction(second_b)?)?, known_axes_n))
 }
 
-fn turned(axes_b: Matrix3<f32>, axes_n: &Matrix3<f32>) -> Result<UnitQuaternion<f32>, Unobservable> {
-    attitude::from_dcm_bn(&(axes_b * axes_n.transpose())).ok_or(Unobservable::NotADirection)
+fn turned(axes_b: Matrix3<f32>, axes_n: &Matrix3<f32>) -> UnitQuaternion<f32> {
+    attitude::from_rotation(&(axes_b * axes_n.transpose()))
 }
 
 /// A vector's direction. The scale is taken out first, since squares of f32 leave its range at 1e19.

@@ -77,24 +77,20 @@ impl Set {
             beyond_validity,
         };
         let (acc, mag) = (reading.acc_p.as_flattened(), reading.mag_p.as_flattened());
-        for (kind, found) in [
-            (
-                Kind::Accelerometer,
-                values(&self.acc, acc, &plates_c, &ACC_ENDS, &mut measured.acc),
-            ),
-            (
-                Kind::Magnetometer,
-                values(&self.mag, mag, &plates_c, &MAG_ENDS, &mut measured.mag),
-            ),
-            (
-                Kind::Gyro,
-                values(&self.gyro, &reading.gyro, &gyros_c, &GYRO_ENDS, &mut measured.gyro),
-            ),
-        ] {
-            measured.present = measured.present.with(kind, found.present);
-            measured.saturated = measured.saturated.with(kind, found.saturated);
-        }
+        let found = values(&self.acc, acc, &plates_c, &ACC_ENDS, &mut measured.acc);
+        measured.take(Kind::Accelerometer, &found);
+        let found = values(&self.mag, mag, &plates_c, &MAG_ENDS, &mut measured.mag);
+        measured.take(Kind::Magnetometer, &found);
+        let found = values(&self.gyro, &reading.gyro, &gyros_c, &GYRO_ENDS, &mut measured.gyro);
+        measured.take(Kind::Gyro, &found);
         measured
+    }
+}
+
+impl Measured {
+    fn take(&mut self, kind: Kind, found: &Seen) {
+        self.present = self.present.with(kind, found.present);
+        self.saturated = self.saturated.with(kind, found.saturated);
     }
 }
 

@@ -16,8 +16,8 @@ const GUESS: u32 = 0x5F37_5A86;
 
 /// `1 / sqrt(x)`.
 pub(super) fn reciprocal_root(x: f32) -> f32 {
-    // Above zero and below infinity in one comparison; NaN goes on.
-    if x.to_bits().wrapping_sub(1) >= f32::INFINITY.to_bits() - 1 && !x.is_nan() {
+    // NaN goes on.
+    if x <= 0.0 || x > f32::MAX {
         return 0.0;
     }
     let half = 0.5 * x;

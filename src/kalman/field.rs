@@ -75,7 +75,10 @@ impl Reference {
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
     pub(super) fn compare(&self, params: &Params, mean: &MeanField) -> Option<Compared> {
-        let (north, east) = self.magnetic(&mean.mag_n);
+        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
+        let (sin_d, cos_d) = sin_cos(self.declination);
+        let (x, y) = (mean.mag_n.x, mean.mag_n.y);
+        let (north, east) = (cos_d * x + sin_d * y, cos_d * y - sin_d * x);
         let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
         let dip = RealField::atan2(mean.mag_n.z, horizontal);
         if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
@@ -84,8 +87,6 @@ impl Reference {
         let (sin, cos) = sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
         let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
-        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
-        let (sin_d, cos_d) = sin_cos(self.declination);
         Some(Compared {
             scalars: [
                 Scalar {
@@ -124,12 +125,6 @@ impl Reference {
 
     fn deviation(&self, norm_ut: f32, dip: f32) -> f32 {
         square(norm_ut / self.norm_ut - 1.0) + square(dip - self.dip)
-    }
-
-    /// Components along magnetic north and magnetic east.
-    fn magnetic(&self, v_n: &Vector3<f32>) -> (f32, f32) {
-        let (sin, cos) = sin_cos(self.declination);
-        (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 
     /// The mean field so far, while the reference is young, and norm and dip of it without `iron_b` \[uT\].
