@@ -301,11 +301,7 @@ fn without_lever_arms(set: &Set, along: &[f32; TRIAD_AXES], turning: &Turning) -
 }
 
 /// Axes of the sensors that repeat themselves, three bits or one a sensor. At the end of its range a healthy one does.
-fn frozen<const N: usize>(
-    repeats: &mut [Repeats<N>; PLATES],
-    present: u16,
-    counts: &[[i16; N]; PLATES],
-) -> u16 {
+fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], present: u16, counts: &[[i16; N]; PLATES]) -> u16 {
     let (mut axes, mut found) = ((1 << N) - 1, 0);
     for (repeats, counts) in repeats.iter_mut().zip(counts) {
         let read = (present & axes == axes).then_some(counts);

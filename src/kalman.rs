@@ -221,14 +221,20 @@ impl Filter {
                 *self = Filter::new(self.params);
             }
         } else if !self.pending.is_done() && !self.spared {
-            self.work(if since_s < LONG_STEP_S { Pace::Small } else { Pace::Large });
+            self.work(if since_s < LONG_STEP_S {
+                Pace::Small
+            } else {
+                Pace::Large
+            });
         }
         self.spared = false;
     }
 
     /// Whether a step that ends then completes a window. If the gyros were heard.
     pub fn closes_at(&self, at_us: u64) -> bool {
-        let since_s = self.last_us.map_or(0.0, |last_us| seconds(at_us.saturating_sub(last_us)));
+        let since_s = self
+            .last_us
+            .map_or(0.0, |last_us| seconds(at_us.saturating_sub(last_us)));
         self.window.duration_s + since_s >= self.params.window_s - HALF_A_MILLISECOND
     }
 
@@ -342,8 +348,7 @@ impl Filter {
             None
         };
         let field = self.compare_field(&means, &start, &mut correction);
-        let error = correction.error;
-        self.inject(&error);
+        self.inject(&correction.error);
         self.pending.begin();
         outcome.aligned = self.recover(&means, [velocity, field]);
         self.window = Window::default();
@@ -367,7 +372,7 @@ impl Filter {
                 row: Row::Driver(axis),
                 variance,
             };
-            accepted &= self.compare(&scalar, self.covariance.of_driver(axis), correction);
+            accepted &= self.compare(&scalar, &self.covariance.of_driver(axis), correction);
         }
         self.bias_rejected_s = if accepted {
             0.0
@@ -390,18 +395,16 @@ impl Filter {
                 row: Row::Velocity(axis),
                 variance: means.velocity_variance,
             };
-            accepted &= self.compare(&scalar, column, correction);
+            accepted &= self.compare(&scalar, &column, correction);
         }
         accepted
     }
 
     /// A scalar, of whose `P h'` the passage is still to be made.
-    fn compare(&mut self, scalar: &Scalar, mut column: State, correction: &mut Correction) -> bool {
-        self.pending.passage.carry(&mut column, &scalar.row);
-        let Some((before, own)) = self.pending.next() else {
+    fn compare(&mut self, scalar: &Scalar, start: &State, correction: &mut Correction) -> bool {
+        let Some((before, own)) = self.pending.next(start, &scalar.row) else {
             return true;
         };
-        own.column = column;
         let accepted = correction.compare(scalar, before, own);
         if accepted {
             self.pending.keep();
@@ -435,7 +438,7 @@ impl Filter {
                 row: Row::Of(&row),
                 variance: scalar.variance,
             };
-            accepted &= self.compare(&scalar, column, correction);
+            accepted &= self.compare(&scalar, &column, correction);
         }
         correction.usable = true;
         (!disturbed).then_some(accepted)

@@ -76,7 +76,9 @@ pub fn solve_each<'a>(each: impl Iterator<Item = (&'a Vector3<f32>, f32, f32)>, 
         let (axis, weight) = (bit, 1.0 / variance);
         bit <<= 1;
         // Comparisons with NaN are false.
-        if !(wanted & axis != 0 && value.abs() <= f32::MAX && weight > 0.0 && weight <= f32::MAX) {
+        // Above zero and below infinity in one comparison.
+        let weighs = weight.to_bits().wrapping_sub(1) < f32::MAX.to_bits();
+        if !(wanted & axis != 0 && value.abs() <= f32::MAX && weighs) {
             continue;
         }
         used |= axis;

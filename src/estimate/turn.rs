@@ -193,7 +193,13 @@ mod tests {
     }
 
     fn turned(set: &Set, increments: &Increments, believed: u16) -> Turn {
-        turn(set, &Temperatures::default(), increments, believed, &mut Solver::default())
+        turn(
+            set,
+            &Temperatures::default(),
+            increments,
+            believed,
+            &mut Solver::default(),
+        )
     }
 
     #[test]

@@ -160,7 +160,11 @@ impl Trace {
     /// Takes a cycle; what is not a number is as wild as can be.
     pub(super) fn push(&mut self, place: Place, disagreement: f32) {
         self.window.push(place, clipped(disagreement));
-        self.held = if self.held < LONG as u8 { self.held + 1 } else { self.held };
+        self.held = if self.held < LONG as u8 {
+            self.held + 1
+        } else {
+            self.held
+        };
     }
 
     /// Whether it holds [`LONG`] cycles.
@@ -200,7 +204,10 @@ impl Trace {
     pub(super) fn variance(&self, added: &Added, relative: f32) -> (f32, f32) {
         let mean = self.window.sum as f32 / (PER_SIGMA * LONG as f32);
         let expected = 1.0 + relative * added.squares / LONG as f32;
-        (squared_sigmas(self.window.squares) / LONG as f32 - mean * mean, expected)
+        (
+            squared_sigmas(self.window.squares) / LONG as f32 - mean * mean,
+            expected,
+        )
     }
 }
 

@@ -121,23 +121,33 @@ impl Covariance {
             drivers: [[0.0; DRIVERS]; DRIVERS],
         };
         for k in 0..DRIVEN {
-            let sd = if k < VELOCITY { core::f32::consts::PI } else { params.velocity_sd };
+            let sd = if k < VELOCITY {
+                core::f32::consts::PI
+            } else {
+                params.velocity_sd
+            };
             p.driven[k][k] = square(sd);
         }
         for k in 0..DRIVERS {
-            p.drivers[k][k] = square(if k < GYRO_MATRIX { params.bias_sd } else { params.gyro_matrix_sd });
+            p.drivers[k][k] = square(if k < GYRO_MATRIX {
+                params.bias_sd
+            } else {
+                params.gyro_matrix_sd
+            });
         }
         p
     }
 
     /// All of it: attitude, velocity, bias, gyro matrix.
     pub fn matrix(&self) -> SMatrix<f32, STATES, STATES> {
-        SMatrix::from_fn(|row, column| match (row.checked_sub(DRIVEN), column.checked_sub(DRIVEN)) {
-            (None, None) => self.driven[row][column],
-            (None, Some(driver)) => self.across[row][driver],
-            (Some(driver), None) => self.across[column][driver],
-            (Some(row), Some(column)) => self.drivers[row][column],
-        })
+        SMatrix::from_fn(
+            |row, column| match (row.checked_sub(DRIVEN), column.checked_sub(DRIVEN)) {
+                (None, None) => self.driven[row][column],
+                (None, Some(driver)) => self.across[row][driver],
+                (Some(driver), None) => self.across[column][driver],
+                (Some(row), Some(column)) => self.drivers[row][column],
+            },
+        )
     }
 
     /// [rad^2] of the attitude, in n.

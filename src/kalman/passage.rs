@@ -56,7 +56,12 @@ impl Passage {
         let tilt = params.gravity * means.vertical_s;
         let variance = window.angle_variance;
         self.drive = window.drive;
-        self.mean_drive = window.mean_drive;
+        let per_second = 1.0 / window.duration_s.max(f32::MIN_POSITIVE);
+        for (mean, integral) in self.mean_drive.iter_mut().zip(&window.drive_integral) {
+            for (mean, integral) in mean.iter_mut().zip(integral) {
+                *mean = integral * per_second;
+            }
+        }
         let [north, east, _] = &self.mean_drive;
         self.tilting = [east.map(|part| part * -tilt), north.map(|part| part * tilt)];
         self.tilt = tilt;
@@ -97,16 +102,17 @@ impl Passage {
     }
 
     /// Makes `P h'` at the end, for a row `h` there, of `P F' h'` at the start.
-    pub fn carry(&self, column: &mut State, row: &Row) {
-        let State { driven, drivers } = column;
+    pub fn carry(&self, start: &State, row: &Row, column: &mut State) {
         // A copy stays in registers.
-        let along = *drivers;
-        let [north, east, ..] = *driven;
-        for (sum, drive) in driven.iter_mut().zip(self.drives()) {
-            *sum += dot(drive, &along);
+        let along = start.drivers;
+        column.drivers = along;
+        let drives = start.driven.iter().zip(self.drives());
+        for (sum, (start, drive)) in column.driven.iter_mut().zip(drives) {
+            *sum = start + dot(drive, &along);
         }
-        driven[VELOCITY] -= self.tilt * east;
-        driven[VELOCITY + 1] += self.tilt * north;
+        let [north, east, ..] = start.driven;
+        column.driven[VELOCITY] -= self.tilt * east;
+        column.driven[VELOCITY + 1] += self.tilt * north;
         self.add_noise(column, row);
         if self.velocity_lost {
             column.driven[VELOCITY..].fill(0.0);

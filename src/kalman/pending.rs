@@ -7,7 +7,7 @@
 //! is done then.
 
 use super::{
-    covariance::{Covariance, Seen},
+    covariance::{Covariance, Row, Seen, State},
     innovation::INNOVATIONS,
     passage::Passage,
 };
@@ -57,10 +57,13 @@ impl Pending {
         self.scalars = 0;
     }
 
-    /// What the scalars so far saw, and the place for the next; `None` if there are as many as may be.
-    pub fn next(&mut self) -> Option<(&[Seen], &mut Seen)> {
+    /// What the scalars so far saw, and the place for the next with `P h'` as the passage leaves it; `None` if there are
+    /// as many as may be.
+    pub fn next(&mut self, start: &State, row: &Row) -> Option<(&[Seen], &mut Seen)> {
         let (seen, free) = self.seen.split_at_mut_checked(self.scalars)?;
-        Some((seen, free.first_mut()?))
+        let own = free.first_mut()?;
+        self.passage.carry(start, row, &mut own.column);
+        Some((seen, own))
     }
 
     /// Keeps what was put in that place.

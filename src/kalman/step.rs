@@ -83,6 +83,7 @@ impl Sampled {
     /// Finite, and no larger than a sensor could give.
     pub(super) fn is_believable(&self) -> bool {
         self.value_b.norm_squared() < LONGEST_SAMPLE * LONGEST_SAMPLE
-            && self.variance >= 0.0 && self.variance < LONGEST_SAMPLE
+            && self.variance >= 0.0
+            && self.variance < LONGEST_SAMPLE
     }
 }

@@ -14,8 +14,8 @@ pub struct Window {
     pub duration_s: f32,
     /// Attitude error by bias \[s\] and matrix \[rad\]: `-integral dcm_nb (1, gyro)`.
     pub drive: [[f32; DRIVERS]; 3],
-    /// Its mean over the window: what a mean over the window saw of it.
-    pub mean_drive: [[f32; DRIVERS]; 3],
+    /// Its integral over the window, whose mean is what a mean over the window saw of it.
+    pub drive_integral: [[f32; DRIVERS]; 3],
     /// [rad^2] white variance of the attitude about each axis.
     pub angle_variance: f32,
     /// [rad^2] of it, the noise of the gyros' samples.
@@ -156,24 +156,20 @@ impl Window {
         if covered_s > 0.0 {
             self.rate_square += gyro_b.norm_squared() / covered_s;
         }
-        // A running mean, weighted by time; samples are taken at the ends of steps.
-        let part = if self.duration_s > 0.0 {
-            (covered_s + gap_s) / self.duration_s
-        } else {
-            0.0
-        };
-        let add = |(sum, mean): (&mut f32, &mut f32), gained: f32| {
+        // Samples are taken at the ends of steps.
+        let lasted_s = covered_s + gap_s;
+        let add = |(sum, integral): (&mut f32, &mut f32), gained: f32| {
             *sum -= gained;
-            *mean += (*sum - *mean) * part;
+            *integral += *sum * lasted_s;
         };
-        for (axis, (drive, mean)) in self.drive.iter_mut().zip(&mut self.mean_drive).enumerate() {
+        for (axis, (drive, integral)) in self.drive.iter_mut().zip(&mut self.drive_integral).enumerate() {
             let row = [0, 1, 2].map(|column| dcm_nb[(axis, column)]);
             let (bias, matrix) = drive.split_at_mut(3);
-            let (mean_bias, mean_matrix) = mean.split_at_mut(3);
-            for (both, part) in bias.iter_mut().zip(mean_bias).zip(row) {
+            let (bias_integral, matrix_integral) = integral.split_at_mut(3);
+            for (both, part) in bias.iter_mut().zip(bias_integral).zip(row) {
                 add(both, part * covered_s);
             }
-            for (both, k) in matrix.iter_mut().zip(mean_matrix).zip(0..9) {
+            for (both, k) in matrix.iter_mut().zip(matrix_integral).zip(0..9) {
                 add(both, row[k / 3] * gyro_b[k % 3]);
             }
         }
