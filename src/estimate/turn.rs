@@ -15,13 +15,13 @@
 //! `angle_b = C angle` over the believed ones that missed no sample. With fewer than three of those free of saturation all
 //! are used, and the rotation is said to be a lower bound. Refuses (by covering no time) fewer than three believed gyros.
 
-use nalgebra::{SMatrix, Vector3, Vector4};
+use nalgebra::{Matrix3, SMatrix, Vector3, Vector4};
 
 use crate::{
     calibration::{Set, Temperatures},
     geometry::{PLATES, rate_from_gyros},
     increments::{Channel, Increments},
-    redundancy::{Known, solve},
+    redundancy::matrix,
     sample::Kind,
 };
 
@@ -41,33 +41,20 @@ pub(super) struct Turn {
     pub saturated: bool,
 }
 
-/// Least squares over some gyros: found anew only when they are others.
+/// Least squares over some gyros, and its covariance for a variance of one: found anew only when they are others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Solver {
     gyros: u16,
-    /// Rate from values about the axes; `None` where they do not span space.
-    matrix: Option<SMatrix<f32, 3, PLATES>>,
-    /// Trace of the covariance of that, for values of a variance of one.
-    trace: f32,
+    found: Option<(SMatrix<f32, 3, PLATES>, Matrix3<f32>)>,
 }
 
 impl Solver {
-    fn of(&mut self, set: &Set, gyros: u16) -> &Self {
+    fn of(&mut self, set: &Set, gyros: u16) -> Option<&(SMatrix<f32, 3, PLATES>, Matrix3<f32>)> {
         if self.gyros != gyros {
-            let axes_b = set.gyro.map(|axis| axis.axis_b);
-            let solution = solve(&axes_b, &[0.0; PLATES], &[1.0; PLATES], gyros);
-            let column = |k: usize| {
-                let part = if gyros >> k & 1 == 1 { 1.0 } else { 0.0 };
-                solution.covariance_b * axes_b[k] * part
-            };
-            *self = Solver {
-                gyros,
-                matrix: (solution.known == Known::All)
-                    .then(|| SMatrix::from_columns(&[column(0), column(1), column(2), column(3)])),
-                trace: solution.covariance_b.trace(),
-            };
+            let found = matrix(&set.gyro.map(|axis| axis.axis_b), gyros);
+            *self = Solver { gyros, found };
         }
-        self
+        self.found.as_ref()
     }
 }
 
@@ -96,9 +83,8 @@ pub(super) fn turn(
         (false, false) => whole & !clipped,
     };
     let angles = calibrated(set, temperatures, increments, covered_s);
-    let solver = solver.of(set, used);
     let finite = angles.iter().all(|angle| angle.abs() <= f32::MAX);
-    let (Some(matrix), true) = (&solver.matrix, finite && covered_s > 0.0) else {
+    let (Some((matrix, covariance_b)), true) = (solver.of(set, used), finite && covered_s > 0.0) else {
         return Turn {
             angle_b: Vector3::zeros(),
             variance: 0.0,
@@ -115,7 +101,7 @@ pub(super) fn turn(
     let sampled_s = covered_s / f32::from(samples);
     Turn {
         angle_b: matrix * Vector4::from(angles) + beyond,
-        variance: noise * sampled_s * covered_s * solver.trace / 3.0,
+        variance: noise * sampled_s * covered_s * covariance_b.trace() / 3.0,
         covered_s,
         saturated,
     }

@@ -9,21 +9,12 @@
 use nalgebra::Vector3;
 
 use super::root::reciprocal_root;
-use crate::redundancy::{Known, Solution, solve_each};
+use crate::redundancy::{Known, Seen, Solution, solve_seen};
 
 /// Standard deviations. Beyond it a value is not used; it changes the vector by at most a quarter of that unnoticed.
 pub(super) const GATE: f32 = 6.0;
 /// An axis that explains itself to more than this part has no redundancy left.
 const UNCHECKED: f32 = 0.05;
-
-/// A value along an axis.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Seen {
-    pub(super) value: f32,
-    pub(super) variance: f32,
-    /// How far it is from what the vector expects of it, and the variance of what is expected.
-    pub(super) off: (f32, f32),
-}
 
 /// A vector out of those that agree.
 pub(super) struct Agreement {
@@ -64,12 +55,8 @@ impl Disagreement {
 
 /// The vector of those of `candidates` that agree; every axis is held against it.
 pub(super) fn agreed(axes_b: &[Vector3<f32>; 12], seen: &mut [Seen; 12], candidates: u16) -> Agreement {
-    let solved = |seen: &[Seen; 12], wanted| {
-        let each = axes_b.iter().zip(seen);
-        solve_each(each.map(|(axis_b, seen)| (axis_b, seen.value, seen.variance)), wanted)
-    };
     let mut found = Agreement {
-        solution: solved(seen, candidates),
+        solution: solve_seen(axes_b, seen, candidates),
         decided: true,
     };
     let mut worst = held_against(&found.solution, axes_b, seen);
@@ -77,7 +64,7 @@ pub(super) fn agreed(axes_b: &[Vector3<f32>; 12], seen: &mut [Seen; 12], candida
         return found;
     }
     while let Some(k) = worst {
-        let fewer = solved(seen, found.solution.used & !(1 << k));
+        let fewer = solve_seen(axes_b, seen, found.solution.used & !(1 << k));
         if fewer.known != Known::All {
             found.decided = false;
             break;

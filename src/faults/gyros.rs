@@ -28,7 +28,7 @@ use super::{
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::PLATES,
-    redundancy::{Known, Solution, solve},
+    redundancy::{Known, Solution, matrix, solve},
 };
 
 /// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a
@@ -87,14 +87,19 @@ impl Gyros {
         let axes_b = core::array::from_fn(|k| axes[k].axis_b);
         let across = across(&axes_b);
         let noise: [f32; PLATES] = core::array::from_fn(|k| axes[k].noise * axes[k].noise);
+        // No set is accepted whose gyros do not span space, any three of them.
+        let (rate_from_all, of_one) = matrix(&axes_b, ALL).unwrap_or_default();
         let parity_noise = (0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum();
         Gyros {
             axes_b,
             across,
-            rate_from_all: matrix(&axes_b, ALL),
-            of_one: solve(&axes_b, &[0.0; PLATES], &[1.0; PLATES], ALL).covariance_b,
+            rate_from_all,
+            of_one,
             alike: noise.iter().all(|other| *other == noise[0]),
-            without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k)) * Vector4::from(across)),
+            without: core::array::from_fn(|k| {
+                let (without, _) = matrix(&axes_b, ALL & !(1 << k)).unwrap_or_default();
+                without * Vector4::from(across)
+            }),
             uncertainty,
             timing_s,
             parity: Watch::new(parity_noise, allowed, parity_noise),
@@ -326,14 +331,4 @@ fn across(axes_b: &[Vector3<f32>; PLATES]) -> [f32; PLATES] {
     let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
     let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
     across.map(|part| part / length)
-}
-
-/// Rate from values about the axes whose bit is set, all weighing the same.
-fn matrix(axes_b: &[Vector3<f32>; PLATES], wanted: u16) -> SMatrix<f32, 3, PLATES> {
-    let column = |k: usize| {
-        let mut value = [0.0; PLATES];
-        value[k] = 1.0;
-        solve(axes_b, &value, &[1.0; PLATES], wanted).vector_b
-    };
-    SMatrix::from_columns(&[column(0), column(1), column(2), column(3)])
 }

@@ -14,7 +14,7 @@ use nalgebra::{ComplexField, Vector3};
 
 use super::{
     Cycle,
-    consensus::{Disagreement, Seen, agreed},
+    consensus::{Disagreement, agreed},
     health::Verdict,
     root::root,
     trace::{Limits, Systematic, larger},
@@ -23,7 +23,7 @@ use super::{
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::TRIAD_AXES,
-    redundancy::{Known, Solution, solve_each},
+    redundancy::{Known, Seen, Solution, solve_seen},
 };
 
 /// Means over one and five seconds, for less than one false alarm of 24 axes in ten hours of simulated rest. Sum of squares:
@@ -195,10 +195,7 @@ impl Triads {
                 left >>= 3;
             }
         }
-        nearest.unwrap_or_else(|| {
-            let each = self.axes_b.iter().zip(seen);
-            solve_each(each.map(|(axis_b, seen)| (axis_b, seen.value, 1.0)), candidates).vector_b
-        })
+        nearest.unwrap_or_else(|| solve_seen(&self.axes_b, seen, candidates).vector_b)
     }
 
     /// Notes what each axis disagrees by; judges if one that is believed raises an alarm.

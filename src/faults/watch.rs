@@ -82,7 +82,7 @@ impl Watch {
 
     /// Takes a cycle's disagreement beyond the offset, whose noise has `share` times the variance of the axis's own.
     /// `systematic` is the variance of what is systematic, in the noise that is counted in.
-    #[inline(always)]
+    #[inline]
     pub(super) fn note(&mut self, place: Place, disagreement: f32, share: f32, systematic: f32) {
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
         let mut sigmas = disagreement * reciprocal_root(self.noise * share);
@@ -130,7 +130,7 @@ impl Watch {
     }
 
     /// As [`Watch::learn`] of an axis whose window is within `bounds`, those of [`QUIET`], which most are; `None` of others.
-    #[inline(always)]
+    #[inline]
     pub(super) fn learn_quietly(&mut self, disagreement: f32, variance: f32, bounds: &Bounds) -> Option<()> {
         let crept = self.offset * self.offset;
         let quiet = self.trace.is_within(bounds) && crept <= QUIET * OFFSET_LIMIT * OFFSET_LIMIT * self.allowed;

@@ -9,7 +9,7 @@
 //! A scalar `z = h x + noise` updates in Joseph's form, `P <- (1 - k h) P (1 - k h)' + k r k'`. With `p = P h'`,
 //! `s = h p + r` and `k = p/s` its terms collect to `P - k p' - p k' + s k k'`, and that to `P - k u' - u k'` with
 //! `u = p - k s/2`: the same for any `k`, so an error of `k` is of second order in it, where the short `P - k p'` goes
-//! indefinite in f32. It is computed above the diagonal and mirrored below it.
+//! indefinite in f32. What is above the diagonal is mirrored below it.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -287,16 +287,14 @@ impl Covariance {
             take_off(row, driven.map(|part| part[k]), driven);
         }
         let (fours, last) = self.across.as_chunks_mut::<4>();
-        for four in fours {
-            take_off_four::<DRIVERS, 0>(four, driven.map(|part| fours_of(part, 0)), drivers);
+        for (n, four) in fours.iter_mut().enumerate() {
+            take_off_four(four, driven.map(|part| fours_of(part, n)), drivers);
         }
         for row in last {
             take_off(row, driven.map(|part| part[DRIVEN - 1]), drivers);
         }
-        if let ([first, second, third], _) = self.drivers.as_chunks_mut::<4>() {
-            take_off_four::<DRIVERS, 0>(first, drivers.map(|part| fours_of(part, 0)), drivers);
-            take_off_four::<DRIVERS, 4>(second, drivers.map(|part| fours_of(part, 1)), drivers);
-            take_off_four::<DRIVERS, 8>(third, drivers.map(|part| fours_of(part, 2)), drivers);
+        for (n, four) in self.drivers.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            take_off_four(four, drivers.map(|part| fours_of(part, n)), drivers);
         }
         mirror(&mut self.driven);
         mirror(&mut self.drivers);
@@ -409,14 +407,10 @@ fn take_off<const N: usize>(row: &mut [f32; N], [k, u]: [f32; 2], [k_c, u_c]: [&
     }
 }
 
-/// The same of four rows from column `FIRST` on, so that what belongs to a column is loaded once for four.
+/// The same of four rows, so that what belongs to a column is loaded once for four.
 #[inline(never)]
-fn take_off_four<const N: usize, const FIRST: usize>(
-    [a, b, c, d]: &mut [[f32; N]; 4],
-    [k, u]: [[f32; 4]; 2],
-    [k_c, u_c]: [&[f32; N]; 2],
-) {
-    for column in FIRST..N {
+fn take_off_four<const N: usize>([a, b, c, d]: &mut [[f32; N]; 4], [k, u]: [[f32; 4]; 2], [k_c, u_c]: [&[f32; N]; 2]) {
+    for column in 0..N {
         let (x, y) = (u_c[column], k_c[column]);
         a[column] = a[column] - k[0] * x - u[0] * y;
         b[column] = b[column] - k[1] * x - u[1] * y;
