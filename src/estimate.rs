@@ -132,8 +132,8 @@ impl Estimator {
             filter: Filter::new(site.params(&set)),
             turn_solver: turn::Solver::default(),
             closed: false,
-            white: [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)],
-            axes_n: axes_n(site.declination_deg.to_radians()),
+            white: whites(&set),
+            axes_n: axes_n(site),
             last_us: None,
             settlements: None,
             covariance_n: [0.0; 6],
@@ -151,8 +151,8 @@ impl Estimator {
         self.filter = Filter::new(site.params(set));
         self.turn_solver = turn::Solver::default();
         self.closed = false;
-        self.white = [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)];
-        self.axes_n = axes_n(site.declination_deg.to_radians());
+        self.white = whites(set);
+        self.axes_n = axes_n(site);
         self.last_us = None;
         self.settlements = None;
     }
@@ -309,10 +309,17 @@ impl Estimator {
     }
 }
 
-/// The axes that the vertical and a field with this declination [rad] span, which are never collinear.
-fn axes_n(declination: f32) -> Option<Matrix3<f32>> {
-    let (sin, cos) = attitude::sin_cos(declination);
+/// The axes that the vertical and the field of a site span, which are never collinear.
+#[inline(never)]
+fn axes_n(site: &Site) -> Option<Matrix3<f32>> {
+    let (sin, cos) = attitude::sin_cos(site.declination_deg.to_radians());
     triad::known_axes(Vector3::z(), Vector3::new(cos, sin, 0.0)).ok()
+}
+
+/// [`white`] of all axes of force and of field.
+#[inline(never)]
+fn whites(set: &Set) -> [f32; 2] {
+    [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)]
 }
 
 /// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.

@@ -109,6 +109,8 @@ pub struct Monitor {
 #[derive(Clone, Copy, Debug)]
 struct Turning {
     rate_b: Vector3<f32>,
+    /// [rad/s] length of it.
+    speed: f32,
     acceleration_b: Vector3<f32>,
     /// [rad/s] what it may turn about a direction no gyro is left for.
     missing: f32,
@@ -188,7 +190,7 @@ impl Monitor {
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
-        let rate = length(&turning.rate_b) + turning.missing;
+        let rate = turning.speed + turning.missing;
         let force_b = self.acc.step(
             &Cycle {
                 values: &values,
@@ -238,6 +240,7 @@ impl Monitor {
         };
         let turning = Turning {
             rate_b: rate_b.vector_b,
+            speed: length(&rate_b.vector_b),
             acceleration_b: change.map_or(Vector3::zeros(), |(last, dt_s)| (rate_b.vector_b - last.rate_b) / dt_s),
             missing: if rate_b.known == Known::All { 0.0 } else { UNKNOWN_RATE },
         };
@@ -247,7 +250,7 @@ impl Monitor {
             length(&(turning.acceleration_b - last.acceleration_b)) / 2.0
         });
         let noise = change.map_or(0.0, |(_, dt_s)| root(2.0 * rate_b.covariance_b.trace() / 3.0) / dt_s);
-        let rate = length(&turning.rate_b) + missing;
+        let rate = turning.speed + missing;
         let squared = rate * rate;
         let unsure = set.place_sigma * (length(&turning.acceleration_b) + squared)
             + self.arm * (lag + noise + missing * (rate + missing));
