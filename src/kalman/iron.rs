@@ -13,6 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Params, square, window::FieldSums};
+use crate::redundancy::{Known, invert};
 
 /// What has been learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +47,8 @@ impl HardIron {
         self.information += parted * weight;
         self.weighted += (sums.total_b - turned * sums.total_n / sums.count) * weight;
         let known = self.information + Matrix3::from_diagonal_element(1.0 / square(params.iron_sd_ut));
-        if let Some(inverse) = known.try_inverse() {
+        // With what was known before, something is known of every direction.
+        if let (inverse, Known::All) = invert(&known) {
             self.iron_b = inverse * self.weighted;
         }
     }
