@@ -22,7 +22,6 @@ mod gaps;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 pub use gaps::Known;
-pub(crate) use gaps::invert;
 
 /// Most axes of one vector.
 const AXES: usize = 16;

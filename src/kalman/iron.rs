@@ -13,7 +13,6 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Params, square, window::FieldSums};
-use crate::redundancy::{Known, invert};
 
 /// What has been learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +46,7 @@ impl HardIron {
         self.information += parted * weight;
         self.weighted += (sums.total_b - turned * sums.total_n / sums.count) * weight;
         let known = self.information + Matrix3::from_diagonal_element(1.0 / square(params.iron_sd_ut));
-        // With what was known before, something is known of every direction.
-        if let (inverse, Known::All) = invert(&known) {
+        if let Some(inverse) = known.try_inverse() {
             self.iron_b = inverse * self.weighted;
         }
     }

@@ -24,7 +24,7 @@ pub enum Known {
 const UNKNOWN: f32 = 1e-5;
 
 /// Covariance on what is known, and what is.
-pub(crate) fn invert(information: &Matrix3<f32>) -> (Matrix3<f32>, Known) {
+pub(super) fn invert(information: &Matrix3<f32>) -> (Matrix3<f32>, Known) {
     let mean = information.trace() / 3.0;
     if !(mean > 0.0 && mean.is_normal()) {
         return (Matrix3::zeros(), Known::Nothing);
