@@ -157,3 +157,22 @@ impl Sample {
         &self.slots_us[first..first + 4]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_of_a_kind_are_those_of_its_sensors() {
+        let sample = Sample {
+            reading: Reading::unread(0),
+            start_us: 0,
+            slots_us: core::array::from_fn(|slot| slot as u32),
+        };
+        for kind in [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer] {
+            for (plate, slot) in sample.slots_of(kind).iter().enumerate() {
+                assert_eq!(SENSORS[*slot as usize], Sensor { kind, plate });
+            }
+        }
+    }
+}
