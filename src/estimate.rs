@@ -232,7 +232,7 @@ impl Estimator {
         let Some((covariance, settlements)) = self.filter.settled() else {
             return;
         };
-        if core::mem::replace(&mut self.settlements, Some(settlements)) == Some(settlements) {
+        if self.settlements.replace(settlements) == Some(settlements) {
             return;
         }
         let (p, bias) = (covariance.attitude(), covariance.bias());

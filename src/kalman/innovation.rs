@@ -1,6 +1,9 @@
 //! One record for every scalar compared, and the correction that the scalars of a window add up to.
 
-use super::covariance::{Row, Seen, State};
+use super::{
+    covariance::Seen,
+    state::{Row, State},
+};
 
 /// Most scalars of a window: bias 3, velocity 2, field 2.
 pub const INNOVATIONS: usize = 7;

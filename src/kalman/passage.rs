@@ -15,8 +15,9 @@ use nalgebra::Vector3;
 
 use super::{
     Params,
-    covariance::{Covariance, DRIVEN, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
+    covariance::Covariance,
     square,
+    state::{DRIVEN, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
     window::{Means, Window},
 };
 

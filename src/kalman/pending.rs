@@ -7,9 +7,10 @@
 //! is done then.
 
 use super::{
-    covariance::{Covariance, Row, Seen, State},
+    covariance::{Covariance, Seen},
     innovation::INNOVATIONS,
     passage::Passage,
+    state::{Row, State},
 };
 
 /// How much of it a stage takes.

@@ -5,7 +5,7 @@
 
 use nalgebra::{ComplexField, Matrix3, Vector2, Vector3};
 
-use super::{Params, covariance::DRIVERS, square};
+use super::{Params, square, state::DRIVERS};
 
 /// Running sums.
 #[derive(Clone, Debug, Default)]
