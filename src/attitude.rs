@@ -48,6 +48,9 @@ const GIMBAL_LOCK: f32 = 1e-3;
 /// Up to this angle [rad] the series below are exact in f32: what they leave out is less than 3e-9.
 const SERIES: f32 = 1.0;
 
+/// Below this square of an angle both are one to the last digit of f32.
+const NO_ANGLE: f32 = 5e-8;
+
 /// Taylor coefficients of `sin(h)/h` and `cos(h)` in `h^2`.
 const SINE: [f32; 6] = [
     1.0,
@@ -71,12 +74,17 @@ fn series(square: f32) -> (f32, f32) {
     (sum(SINE), sum(COSINE))
 }
 
-/// Sine and cosine of an angle [rad].
+/// Sine and cosine of an angle [rad]; up to four times that of [`SERIES`] by doubling a quarter of it twice.
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
     let square = angle * angle;
     if square < SERIES * SERIES {
         let (sinc, cos) = series(square);
         return (angle * sinc, cos);
+    }
+    if square < 16.0 * SERIES * SERIES {
+        let (sinc, cos) = series(square * (1.0 / 16.0));
+        let doubled = |(sin, cos): (f32, f32)| (2.0 * sin * cos, 1.0 - 2.0 * sin * sin);
+        return doubled(doubled((angle * 0.25 * sinc, cos)));
     }
     ComplexField::sin_cos(angle)
 }
@@ -85,7 +93,9 @@ pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
 pub fn from_rotation_vector(angle: Vector3<f32>) -> UnitQuaternion<f32> {
     let half = angle * 0.5;
     let square = half.norm_squared();
-    let (sinc, cos) = if square < SERIES * SERIES {
+    let (sinc, cos) = if square < NO_ANGLE {
+        (1.0, 1.0)
+    } else if square < SERIES * SERIES {
         series(square)
     } else {
         let norm = ComplexField::sqrt(square);
@@ -146,9 +156,11 @@ pub fn dcm_nb(q_nb: &UnitQuaternion<f32>) -> Matrix3<f32> {
 pub fn from_dcm_bn(dcm_bn: &Matrix3<f32>) -> Option<UnitQuaternion<f32>> {
     let defect = (dcm_bn * dcm_bn.transpose() - Matrix3::identity()).amax();
     // A comparison with NaN is false.
-    if !(defect < ORTHONORMAL && dcm_bn.determinant() > 0.0) {
-        return None;
-    }
+    (defect < ORTHONORMAL && dcm_bn.determinant() > 0.0).then(|| from_rotation(dcm_bn))
+}
+
+/// [`from_dcm_bn`] of a matrix that is known to be a rotation.
+pub(crate) fn from_rotation(dcm_bn: &Matrix3<f32>) -> UnitQuaternion<f32> {
     let m = dcm_bn;
     let trace = m.trace();
     let squares = [trace, m[(0, 0)], m[(1, 1)], m[(2, 2)]];
@@ -163,7 +175,7 @@ pub fn from_dcm_bn(dcm_bn: &Matrix3<f32>) -> Option<UnitQuaternion<f32>> {
         2 => Quaternion::new(zx, s_xy, diagonal(1), s_yz),
         _ => Quaternion::new(xy, s_xz, s_yz, diagonal(2)),
     };
-    Some(UnitQuaternion::new_normalize(q))
+    UnitQuaternion::new_normalize(q)
 }
 
 /// Quaternion of Euler angles (thesis Eqs 2.32 to 2.35).

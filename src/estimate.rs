@@ -33,8 +33,8 @@ use crate::{
     increments::Increments,
     kalman::{Filter, Outcome, Sampled, Step},
     redundancy::{Known, Solution},
-    sample::{Kind, NO_SLOT, SENSORS, Sample},
-    triad::{Sighting, triad},
+    sample::{Kind, NO_SLOT, Sample},
+    triad,
     unit::Settings,
 };
 
@@ -54,7 +54,8 @@ pub struct Estimate {
     pub triad_nb: Option<[f32; 4]>,
     /// The filter's q_nb at [`Increments::end_us`], scalar first; `None` until it has aligned itself.
     pub q_nb: Option<[f32; 4]>,
-    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD.
+    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD. As of the latest window of the
+    /// filter whose work on it is done, which is some cycles after its measurements have corrected the attitude.
     pub covariance_n: [f32; 6],
     /// [rad/s] gyro bias in b.
     pub bias_b: [f32; 3],
@@ -97,6 +98,9 @@ impl Estimate {
 /// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.
 const NEAR_ONE_G: f32 = 0.1;
 
+/// Bits of twelve axes.
+const ALL_AXES: u16 = 0xFFF;
+
 /// Everything the step remembers.
 #[derive(Clone, Debug)]
 pub struct Estimator {
@@ -104,7 +108,18 @@ pub struct Estimator {
     temperatures: Temperatures,
     monitor: Monitor,
     filter: Filter,
+    turn_solver: turn::Solver,
+    /// White variance of a component of force, in (m/s2)^2, and of field, in uT2, by all axes.
+    white: [f32; 2],
+    /// The step before completed a window of the filter.
+    closed: bool,
+    /// What TRIAD knows.
+    axes_n: Option<Matrix3<f32>>,
     last_us: Option<u64>,
+    /// Of the filter's covariance when it was last looked at, with what is said of it.
+    settlements: Option<u8>,
+    covariance_n: [f32; 6],
+    bias_sd: [f32; 3],
 }
 
 impl Estimator {
@@ -115,7 +130,14 @@ impl Estimator {
             temperatures: Temperatures::default(),
             monitor: Monitor::new(&set),
             filter: Filter::new(site.params(&set)),
+            turn_solver: turn::Solver::default(),
+            closed: false,
+            white: whites(&set),
+            axes_n: axes_n(site),
             last_us: None,
+            settlements: None,
+            covariance_n: [0.0; 6],
+            bias_sd: [0.0; 3],
             set,
         }
     }
@@ -127,7 +149,12 @@ impl Estimator {
         self.temperatures = Temperatures::default();
         self.monitor = Monitor::new(set);
         self.filter = Filter::new(site.params(set));
+        self.turn_solver = turn::Solver::default();
+        self.closed = false;
+        self.white = whites(set);
+        self.axes_n = axes_n(site);
         self.last_us = None;
+        self.settlements = None;
     }
 
     /// Of a unit with these settings and the compiled-in parameters.
@@ -145,12 +172,17 @@ impl Estimator {
 
     /// Takes a cycle.
     pub fn step(&mut self, sample: &Sample, increments: &Increments) -> Estimate {
-        self.step_in_full(sample, increments).0
+        self.take(sample, increments, &mut Outcome::default())
     }
 
     /// Takes a cycle; the filter's records of it too.
-    #[inline(never)]
     pub fn step_in_full(&mut self, sample: &Sample, increments: &Increments) -> (Estimate, Outcome) {
+        let mut outcome = Outcome::default();
+        (self.take(sample, increments, &mut outcome), outcome)
+    }
+
+    #[inline(never)]
+    fn take(&mut self, sample: &Sample, increments: &Increments, outcome: &mut Outcome) -> Estimate {
         let reading = &sample.reading;
         self.temperatures.note(reading);
         let measured = self.set.apply(reading, &self.temperatures);
@@ -158,12 +190,23 @@ impl Estimator {
         self.last_us = Some(sample.start_us);
         // Zero is a gap to the monitor: there is no cycle before the first.
         let dt_s = since_us.unwrap_or_default() as f32 * 1e-6;
-        let vectors = self.monitor.step(&self.set, reading, &measured, dt_s);
+        // The step that completes a window leaves what can wait to the next one, and that leaves its own to the one after.
+        let closes = self.filter.closes_at(increments.end_us);
+        if core::mem::replace(&mut self.closed, closes) {
+            self.filter.spare();
+        }
+        let vectors = self.monitor.take(&self.set, reading, &measured, dt_s, closes);
         let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
-        let turned = turn::turn(&self.set, &self.temperatures, increments, believed);
+        let turned = turn::turn(
+            &self.set,
+            &self.temperatures,
+            increments,
+            believed,
+            &mut self.turn_solver,
+        );
         let force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
         let field = self.sampled(sample, Kind::Magnetometer, &vectors.field_b_ut);
-        let outcome = self.filter.step(&Step {
+        let step = Step {
             // Without a fast sample since the cycle before, the cycle itself is when the rotation is missing.
             at_us: if turned.covered_s > 0.0 {
                 increments.end_us
@@ -178,17 +221,30 @@ impl Estimator {
             acc: force,
             mag: field,
             lift_off: reading.lift_off,
-        });
-        if self.filter.aligned && !outcome.innovations.is_empty() {
-            let sd = ComplexField::sqrt(self.filter.bias_covariance_b().trace() / 3.0);
+        };
+        self.filter.take(&step, outcome);
+        self.look_at_the_covariance();
+        self.estimate(&vectors)
+    }
+
+    /// Keeps what is said of the filter's covariance, once a window's work on it is done.
+    fn look_at_the_covariance(&mut self) {
+        let Some((covariance, settlements)) = self.filter.settled() else {
+            return;
+        };
+        if self.settlements.replace(settlements) == Some(settlements) {
+            return;
+        }
+        let (p, bias) = (covariance.attitude(), covariance.bias());
+        self.covariance_n = [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33];
+        self.bias_sd = [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0)));
+        if self.filter.aligned {
+            let sd = ComplexField::sqrt(bias.trace() / 3.0);
             self.monitor.know_bias(self.filter.bias_b, sd);
         }
-        (self.estimate(&vectors), outcome)
     }
 
     fn estimate(&self, vectors: &Vectors) -> Estimate {
-        let p = self.filter.attitude_covariance_n();
-        let bias = self.filter.bias_covariance_b();
         Estimate {
             force_b: vectors.force_b.vector_b.into(),
             field_b_ut: vectors.field_b_ut.vector_b.into(),
@@ -196,71 +252,87 @@ impl Estimator {
             sensors: vectors.health,
             triad_nb: self.triad(vectors).map(parts),
             q_nb: self.filter.aligned.then(|| parts(self.filter.attitude())),
-            covariance_n: [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33],
+            covariance_n: self.covariance_n,
             bias_b: self.filter.bias_b.into(),
-            bias_sd: [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0))),
+            bias_sd: self.bias_sd,
         }
     }
 
     /// A whole vector at the mean of its sensors' slot times, with its white noise: what is systematic is the filter's own
     /// business.
     fn sampled(&self, sample: &Sample, kind: Kind, solution: &Solution) -> Option<Sampled> {
+        let whole_white = self.white[usize::from(kind == Kind::Magnetometer)];
         if solution.known != Known::All {
             return None;
         }
         let (mut slots_us, mut sensors) = (0_u64, 0_u64);
-        for (sensor, slot_us) in SENSORS.iter().zip(sample.slots_us) {
-            let used = sensor.kind == kind && solution.used >> (3 * sensor.plate) & 0b111 != 0;
-            if used && slot_us != NO_SLOT {
-                slots_us += u64::from(slot_us);
+        let mut used = solution.used;
+        for slot_us in sample.slots_of(kind) {
+            if used & 0b111 != 0 && *slot_us != NO_SLOT {
+                slots_us += u64::from(*slot_us);
                 sensors += 1;
             }
+            used >>= 3;
         }
+        let mean_us = match sensors {
+            // A division of 64 bits is a call.
+            4 => slots_us / 4,
+            _ => slots_us.checked_div(sensors).unwrap_or_default(),
+        };
         Some(Sampled {
             value_b: solution.vector_b,
-            variance: white(self.set.axes(kind), solution.used),
-            at_us: sample
-                .start_us
-                .saturating_add(slots_us.checked_div(sensors).unwrap_or_default()),
+            variance: if solution.used == ALL_AXES {
+                whole_white
+            } else {
+                white(self.set.axes(kind), solution.used)
+            },
+            at_us: sample.start_us.saturating_add(mean_us),
         })
     }
 
     fn triad(&self, vectors: &Vectors) -> Option<UnitQuaternion<f32>> {
+        let Vectors {
+            force_b, field_b_ut, ..
+        } = vectors;
+        if force_b.known != Known::All || field_b_ut.known != Known::All {
+            return None;
+        }
         let gravity = self.filter.params.gravity;
-        let off = ComplexField::abs(vectors.force_b.vector_b.norm() - gravity);
+        let (least, most) = ((1.0 - NEAR_ONE_G) * gravity, (1.0 + NEAR_ONE_G) * gravity);
+        let squared = force_b.vector_b.norm_squared();
         // A comparison with NaN is false.
-        let near = off < NEAR_ONE_G * gravity;
+        let near = squared > least * least && squared < most * most;
         if !near {
             return None;
         }
-        let (sin, cos) = attitude::sin_cos(self.filter.reference.declination);
-        let down = sighting(&vectors.force_b, -1.0, Vector3::z())?;
-        let north = sighting(&vectors.field_b_ut, 1.0, Vector3::new(cos, sin, 0.0))?;
-        triad(&down, &north).ok().map(|found| found.q_nb)
+        triad::attitude(-force_b.vector_b, field_b_ut.vector_b, self.axes_n.as_ref()?).ok()
     }
 }
 
-/// A whole vector as a direction.
-fn sighting(solution: &Solution, sign: f32, known_n: Vector3<f32>) -> Option<Sighting> {
-    let seen_b = solution.vector_b * sign;
-    (solution.known == Known::All).then(|| Sighting {
-        seen_b,
-        known_n,
-        seen_sd: ComplexField::sqrt(mean_variance(&solution.covariance_b)) / seen_b.norm(),
-        known_sd: 0.0,
-    })
+/// The axes that the vertical and the field of a site span, which are never collinear.
+#[inline(never)]
+fn axes_n(site: &Site) -> Option<Matrix3<f32>> {
+    let (sin, cos) = attitude::sin_cos(site.declination_deg.to_radians());
+    triad::known_axes(Vector3::z(), Vector3::new(cos, sin, 0.0)).ok()
+}
+
+/// [`white`] of all axes of force and of field.
+#[inline(never)]
+fn whites(set: &Set) -> [f32; 2] {
+    [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)]
 }
 
 /// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.
 fn white(axes: &[Axis], used: u16) -> f32 {
-    let of = axes.iter().enumerate().filter(|(k, _)| used >> k & 1 == 1);
-    let sum: f32 = of.map(|(_, axis)| axis.noise * axis.noise).sum();
+    let (mut sum, mut left) = (0.0, used);
+    for axis in axes {
+        if left & 1 == 1 {
+            sum += axis.noise * axis.noise;
+        }
+        left >>= 1;
+    }
     let count = used.count_ones() as f32;
     3.0 * sum / (count * count)
-}
-
-fn mean_variance(covariance: &Matrix3<f32>) -> f32 {
-    covariance.trace() / 3.0
 }
 
 /// Scalar first.

@@ -84,6 +84,8 @@ struct Cycle<'a, const N: usize> {
     frozen: u16,
     /// [s] since the cycle before; `None` after a gap.
     dt_s: Option<f32>,
+    /// Its disagreements are looked at in the next cycle.
+    watched_later: bool,
 }
 
 /// All 28 axes under watch.
@@ -107,6 +109,8 @@ pub struct Monitor {
 #[derive(Clone, Copy, Debug)]
 struct Turning {
     rate_b: Vector3<f32>,
+    /// [rad/s] length of it.
+    speed: f32,
     acceleration_b: Vector3<f32>,
     /// [rad/s] what it may turn about a direction no gyro is left for.
     missing: f32,
@@ -158,27 +162,42 @@ impl Monitor {
 
     /// Takes a cycle: `measured` is what `set` made of `reading`, `dt_s` [s] the time since the one before.
     pub fn step(&mut self, set: &Set, reading: &Reading, measured: &Measured, dt_s: f32) -> Vectors {
+        self.take(set, reading, measured, dt_s, false)
+    }
+
+    /// The same; `watched_later` leaves a third of the work to the next cycle. What accelerometers and magnetometers disagree
+    /// by is then looked at before that cycle's vectors, which are the first it may change: only the health word is late.
+    pub fn take(
+        &mut self,
+        set: &Set,
+        reading: &Reading,
+        measured: &Measured,
+        dt_s: f32,
+        watched_later: bool,
+    ) -> Vectors {
         let dt_s = (dt_s > 0.0 && dt_s < LONGEST_S).then_some(dt_s);
         let present = measured.present;
         let rate_b = self.gyro.step(&Cycle {
             values: &measured.gyro,
             present: present.of(Kind::Gyro),
-            frozen: frozen(&mut self.gyro_repeats, present.of(Kind::Gyro), |plate| {
-                [reading.gyro[plate]]
-            }),
+            frozen: frozen(
+                &mut self.gyro_repeats,
+                present.of(Kind::Gyro),
+                &reading.gyro.map(|counts| [counts]),
+            ),
             dt_s,
+            watched_later: false,
         });
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
-        let rate = length(&turning.rate_b) + turning.missing;
+        let rate = turning.speed + turning.missing;
         let force_b = self.acc.step(
             &Cycle {
                 values: &values,
                 present: present.of(Kind::Accelerometer),
-                frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), |plate| {
-                    reading.acc_p[plate]
-                }),
+                frozen: frozen(&mut self.acc_repeats, present.of(Kind::Accelerometer), &reading.acc_p),
                 dt_s,
+                watched_later,
             },
             &Apart { rate, by_place: unsure },
         );
@@ -186,10 +205,9 @@ impl Monitor {
             &Cycle {
                 values: &measured.mag,
                 present: present.of(Kind::Magnetometer),
-                frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), |plate| {
-                    reading.mag_p[plate]
-                }),
+                frozen: frozen(&mut self.mag_repeats, present.of(Kind::Magnetometer), &reading.mag_p),
                 dt_s,
+                watched_later,
             },
             &Apart { rate, by_place: 0.0 },
         );
@@ -222,6 +240,7 @@ impl Monitor {
         };
         let turning = Turning {
             rate_b: rate_b.vector_b,
+            speed: length(&rate_b.vector_b),
             acceleration_b: change.map_or(Vector3::zeros(), |(last, dt_s)| (rate_b.vector_b - last.rate_b) / dt_s),
             missing: if rate_b.known == Known::All { 0.0 } else { UNKNOWN_RATE },
         };
@@ -231,7 +250,7 @@ impl Monitor {
             length(&(turning.acceleration_b - last.acceleration_b)) / 2.0
         });
         let noise = change.map_or(0.0, |(_, dt_s)| root(2.0 * rate_b.covariance_b.trace() / 3.0) / dt_s);
-        let rate = length(&turning.rate_b) + missing;
+        let rate = turning.speed + missing;
         let squared = rate * rate;
         let unsure = set.place_sigma * (length(&turning.acceleration_b) + squared)
             + self.arm * (lag + noise + missing * (rate + missing));
@@ -239,6 +258,11 @@ impl Monitor {
     }
 
     fn settle_gyros(&mut self, measured: &Measured, rate: f32, dt_s: Option<f32>, found: [&Solution; 3]) {
+        // The vectors are asked which gyro it is once the parity says that it may be one: what was before says nothing.
+        if !self.gyro.is_doubted() {
+            self.vector_rate.pause();
+            return;
+        }
         let [force_b, field_b_ut, rate_b] = found;
         let still_gravity = GRAVITY.contains(&length(&force_b.vector_b));
         let directions = [
@@ -280,11 +304,14 @@ fn without_lever_arms(set: &Set, along: &[f32; TRIAD_AXES], turning: &Turning) -
 }
 
 /// Axes of the sensors that repeat themselves, three bits or one a sensor. At the end of its range a healthy one does.
-fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], present: u16, counts: impl Fn(usize) -> [i16; N]) -> u16 {
-    let each = repeats.iter_mut().enumerate().map(|(plate, repeats)| {
-        let axes = ((1 << N) - 1) << (N * plate);
-        let read = (present & axes == axes).then(|| counts(plate));
-        u16::from(repeats.frozen(read)) * axes
-    });
-    each.sum()
+fn frozen<const N: usize>(repeats: &mut [Repeats<N>; PLATES], present: u16, counts: &[[i16; N]; PLATES]) -> u16 {
+    let (mut axes, mut found) = ((1 << N) - 1, 0);
+    for (repeats, counts) in repeats.iter_mut().zip(counts) {
+        let read = (present & axes == axes).then_some(counts);
+        if repeats.frozen(read) {
+            found |= axes;
+        }
+        axes <<= N;
+    }
+    found
 }

@@ -9,6 +9,8 @@ pub mod frame_e;
 
 use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix, Vector3};
 
+use crate::redundancy;
+
 /// How many plates there are.
 pub const PLATES: usize = 4;
 
@@ -58,22 +60,14 @@ pub fn gyro_axes_b() -> Matrix4x3<f32> {
 /// columns of zeros for the absent ones. `None` for fewer than three: three axes of the tetrahedron span space, two
 /// do not.
 pub fn rate_from_gyros(present: u8) -> Option<SMatrix<f32, 3, 4>> {
-    let mut axes_b = gyro_axes_b();
+    let axes_b = gyro_axes_b();
     if present & 0xF == 0xF {
         // With all four `G^T G` is diagonal.
         let of_axis = Vector3::new(1.0 / 1.35, 1.0 / 1.35, 1.0 / 1.3);
         return Some(SMatrix::from_fn(|axis, plate| axes_b[(plate, axis)] * of_axis[axis]));
     }
-    for plate in 0..4 {
-        if present >> plate & 1 == 0 {
-            axes_b.set_row(plate, &RowVector3::zeros());
-        }
-    }
-    if (present & 0xF).count_ones() < 3 {
-        return None;
-    }
-    let normal = axes_b.transpose() * axes_b;
-    Some(normal.try_inverse()? * axes_b.transpose())
+    let axes_b = core::array::from_fn(|plate| axes_b.row(plate).transpose());
+    redundancy::matrix(&axes_b, present.into()).map(|(matrix, _)| matrix)
 }
 
 #[cfg(test)]

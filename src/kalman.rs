@@ -38,31 +38,38 @@
 //! Refuses (and says so, [`Refusal`]) steps that are not finite or do not go forward in time; a gap longer than
 //! [`Params::longest_gap_s`] starts the attitude afresh. The state is finite whatever comes in.
 
+mod compare;
 mod covariance;
 mod field;
 mod innovation;
 mod iron;
 mod params;
+mod passage;
 mod path;
+mod pending;
 mod start;
+mod state;
 mod step;
 mod window;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 pub use self::{
-    covariance::STATES,
+    covariance::Covariance,
     field::Reference,
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
     iron::HardIron,
     params::{Delays, Params, Rest},
+    state::STATES,
     step::{Outcome, Refusal, Sampled, Step},
 };
 use self::{
-    covariance::{BIAS, Covariance, GYRO_MATRIX, VELOCITY},
-    innovation::{Correction, Noise},
+    innovation::Correction,
+    passage::walks,
+    pending::{Pace, Pending},
     start::UNKNOWN,
-    window::{FieldSums, MeanField, Means, Window},
+    state::{GYRO_MATRIX, State, are_finite},
+    window::{FieldSums, MeanField, Window},
 };
 use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
@@ -79,8 +86,16 @@ pub struct Filter {
     pub gyro_matrix: Matrix3<f32>,
     /// [m/s] velocity north and east, as far as it is bounded.
     pub velocity_n: Vector2<f32>,
-    /// Covariance of the error state.
-    pub covariance: Covariance,
+    /// Covariance of the error state, but for what is pending.
+    covariance: Covariance,
+    /// What the latest window still has to do to it.
+    pending: Pending,
+    /// Nothing of it is to be done in the next step.
+    spared: bool,
+    /// How often the covariance was complete, round and round.
+    settlements: u8,
+    /// Rounding made a variance negative.
+    unsound: bool,
     /// The field that is expected.
     pub reference: Reference,
     /// Hard iron that the calibration does not know.
@@ -113,6 +128,10 @@ impl Filter {
             gyro_matrix: Matrix3::zeros(),
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
+            pending: Pending::nothing(),
+            spared: false,
+            settlements: 0,
+            unsound: false,
             reference: params.field,
             iron: HardIron::none(&params),
             aligned: false,
@@ -143,51 +162,118 @@ impl Filter {
         self.q_nb * from_rotation_vector(self.rate_b * self.params.delays.gyro_s)
     }
 
+    /// Covariance of the error state as of the last window; what is pending is done on a copy.
+    pub fn covariance(&self) -> Covariance {
+        let (mut covariance, mut pending) = (self.covariance.clone(), self.pending.clone());
+        while !pending.is_done() {
+            pending.work(&mut covariance, Pace::Large);
+        }
+        covariance.keep_bounds();
+        covariance
+    }
+
     /// [rad^2] covariance of the attitude's error as a small rotation vector in n, as of the last window.
     pub fn attitude_covariance_n(&self) -> Matrix3<f32> {
-        self.covariance.attitude()
+        self.covariance().attitude()
     }
 
     /// [rad/s] bias covariance in b.
     pub fn bias_covariance_b(&self) -> Matrix3<f32> {
-        self.covariance.bias()
+        self.covariance().bias()
+    }
+
+    /// The covariance as it was when it was last complete, and how often that was so, round and round; `None` while the
+    /// work of a window is half done.
+    pub fn settled(&self) -> Option<(&Covariance, u8)> {
+        let settled = (&self.covariance, self.settlements);
+        (!self.pending.is_half_done()).then_some(settled)
     }
 
     /// Takes a step.
     pub fn step(&mut self, step: &Step) -> Outcome {
         let mut outcome = Outcome::default();
+        self.take(step, &mut outcome);
+        outcome
+    }
+
+    /// Takes a step, and adds what it led to to an outcome that is empty yet: moving one costs as much as some steps.
+    pub fn take(&mut self, step: &Step, outcome: &mut Outcome) {
+        let rotation = step.is_a_rotation();
         let since_s = match self.last_us {
             Some(last_us) if step.at_us <= last_us => {
                 outcome.refusal = Some(Refusal::NotLater);
-                return outcome;
+                return;
             }
-            Some(last_us) => (step.at_us - last_us) as f32 * 1e-6,
-            None => step.covered_s,
+            Some(last_us) => seconds(step.at_us - last_us),
+            None if rotation => step.covered_s,
+            None => 0.0,
         };
         self.last_us = Some(step.at_us);
-        let rotation = step.is_a_rotation();
         if !rotation {
             outcome.refusal = Some(Refusal::NotARotation);
         }
-        let covered_s = if rotation { step.covered_s.min(since_s) } else { 0.0 };
+        let covered_s = match rotation {
+            true if step.covered_s < since_s => step.covered_s,
+            true => since_s,
+            false => 0.0,
+        };
         let gap_s = since_s - covered_s;
         if self.silent_s + gap_s >= self.params.longest_gap_s {
             outcome.refusal = Some(Refusal::Gap);
             self.lose(since_s);
-            return outcome;
+            return;
         }
-        let dcm_nb = self.propagate(step, covered_s, gap_s.max(0.0), rotation);
+        let dcm_nb = self.propagate(step, covered_s, gap_s, rotation);
         if rotation {
             self.gather(step, &dcm_nb);
         }
         if self.window.duration_s >= self.params.window_s - HALF_A_MILLISECOND {
-            self.close(&mut outcome, step.lift_off);
+            self.settle();
+            self.close(outcome, step.lift_off);
             if !self.is_finite() {
-                // Nothing above can lead here with finite input; the radiation that flips a bit of the state can.
+                *self = Filter::new(self.params);
+            }
+        } else if !self.pending.is_done() && !self.spared {
+            self.work(if since_s < LONG_STEP_S {
+                Pace::Small
+            } else {
+                Pace::Large
+            });
+        }
+        self.spared = false;
+    }
+
+    /// Whether a step that ends then completes a window. If the gyros were heard.
+    pub fn closes_at(&self, at_us: u64) -> bool {
+        let since_s = self
+            .last_us
+            .map_or(0.0, |last_us| seconds(at_us.saturating_sub(last_us)));
+        self.window.duration_s + since_s >= self.params.window_s - HALF_A_MILLISECOND
+    }
+
+    /// Leaves the next step to others: what is pending waits for the one after it.
+    pub fn spare(&mut self) {
+        self.spared = true;
+    }
+
+    /// One stage of what is pending; at its end the covariance is looked at.
+    fn work(&mut self, pace: Pace) {
+        self.pending.work(&mut self.covariance, pace);
+        if self.pending.is_done() {
+            self.settlements = self.settlements.wrapping_add(1);
+            self.unsound = !self.covariance.keep_bounds();
+            if !self.covariance.is_finite() {
+                // Nothing can lead here with finite input; the radiation that flips a bit of the state can.
                 *self = Filter::new(self.params);
             }
         }
-        outcome
+    }
+
+    /// All that is pending.
+    fn settle(&mut self) {
+        while !self.pending.is_done() {
+            self.work(Pace::Large);
+        }
     }
 
     /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
@@ -211,7 +297,7 @@ impl Filter {
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
             + params.turn_noise * params.turn_noise * (gyro_b - wrong_b + bridged_b).norm();
         // The rate missed is one and the same all through a gap, however many steps it lasts.
-        let silent_s = self.silent_s + gap_s.max(0.0);
+        let silent_s = self.silent_s + gap_s;
         variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
         self.silent_s = if rotation { 0.0 } else { silent_s };
         if rotation {
@@ -234,7 +320,11 @@ impl Filter {
         let (rate_b, window_s) = (self.rate_b, self.params.window_s);
         let carried = |sampled: Option<Sampled>, delay_s: f32| {
             let sampled = sampled.filter(Sampled::is_believable)?;
-            let late_s = (sampled.at_us as i64).wrapping_sub(step.at_us as i64) as f32 * 1e-6;
+            let late_s = if sampled.at_us < step.at_us {
+                -seconds(step.at_us - sampled.at_us)
+            } else {
+                seconds(sampled.at_us - step.at_us)
+            };
             let offset_s = late_s + delays.gyro_s - delay_s;
             let near = offset_s > -window_s && offset_s < window_s;
             near.then(|| (sampled, dcm * dcm_nb(&from_rotation_vector(rate_b * offset_s))))
@@ -248,110 +338,53 @@ impl Filter {
         }
     }
 
-    /// A window is complete: covariance over it, then everything it measured.
+    /// A window is complete: everything it measured. What that does to the covariance is pending.
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
+        let means = self.window.means(&self.params, lift_off);
         let following = self.window.following(&self.params);
-        let window = core::mem::replace(&mut self.window, following);
-        let means = window.means(&self.params, lift_off);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
         let iron_b = self.iron.iron_b;
-        if let Some(sums) = &means.field
+        if let Some(sums) = self.window.field()
             && self.iron.learn(&self.params, means.duration_s, sums)
         {
             self.reference.have_other_iron(&self.params, &iron_b);
         }
         if !self.aligned {
-            self.covariance.predict(&self.params, &window, &means);
+            // Of what a window does to it nothing else lasts until there is an attitude.
+            self.covariance.drift(&walks(&self.params, means.duration_s));
             outcome.aligned = self.align(&means, UNKNOWN);
             if !outcome.aligned {
                 self.covariance.forget_attitude();
             }
+            self.settlements = self.settlements.wrapping_add(1);
+            self.begin_window(outcome.aligned, following);
             return;
         }
         self.velocity_n += means.velocity_change_n;
-        self.covariance.predict(&self.params, &window, &means);
-        let mut correction = Correction::new(self.params.gate);
+        self.pending.passage.become_of(&self.params, &self.window, &means);
+        self.pending.clear();
+        let mut correction = Correction::new(self.params.gate, &mut outcome.innovations);
         if rests {
             self.compare_rest(&means, &mut correction);
         }
-        let velocity = means.vertical.then(|| self.compare_velocity(&means, &mut correction));
-        if velocity.is_none() {
+        let start = self.pending.passage.means_seen(&self.covariance);
+        let velocity = if means.vertical {
+            Some(self.compare_velocity(&means, &start, &mut correction))
+        } else {
             self.velocity_n = Vector2::zeros();
-            self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
-        }
-        let field = self.compare_field(&window, &means, &mut correction);
-        self.inject(&correction);
-        outcome.innovations = correction.innovations;
-        let bounded = self.covariance.keep_bounds();
-        outcome.aligned = self.recover(&means, bounded, [velocity, field]);
-    }
-
-    /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
-    /// whatever was believed before.
-    fn compare_rest(&mut self, means: &Means, correction: &mut Correction) {
-        let earth_b = self.q_nb.inverse_transform_vector(&self.params.earth_rate_n);
-        let noise = Noise::white(square(self.params.rest.bias_sd) + means.rate_variance);
-        if self.bias_rejected_s >= self.params.recovery_s {
-            self.bias_rejected_s = 0.0;
-            self.covariance.forget_bias(self.params.bias_sd);
-        }
-        let mut accepted = true;
-        for axis in 0..3 {
-            let measured = means.rate_b[axis] - earth_b[axis];
-            let rows = [(BIAS + axis, 1.0)];
-            accepted &= correction.compare(
-                &mut self.covariance,
-                Quantity::Bias,
-                self.bias_b[axis],
-                measured,
-                &rows,
-                noise,
-            );
-        }
-        self.bias_rejected_s = if accepted {
-            0.0
-        } else {
-            self.bias_rejected_s + means.duration_s
+            None
         };
+        let field = self.compare_field(&means, &start, &mut correction);
+        self.inject(&correction.error);
+        self.pending.begin();
+        outcome.aligned = self.recover(&means, [velocity, field]);
+        self.begin_window(outcome.aligned, following);
     }
 
-    /// The velocity is bounded: zero is measured of it.
-    fn compare_velocity(&mut self, means: &Means, correction: &mut Correction) -> bool {
-        let noise = Noise::lasting(means.velocity_variance, self.params.velocity_lasts_s, means.duration_s);
-        let mut accepted = true;
-        for axis in 0..2 {
-            let rows = [(VELOCITY + axis, 1.0)];
-            let predicted = self.velocity_n[axis];
-            accepted &= correction.compare(&mut self.covariance, Quantity::Velocity, predicted, 0.0, &rows, noise);
-        }
-        accepted
-    }
-
-    /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
-    /// disturbed for its rejection to say anything of the attitude.
-    fn compare_field(&mut self, window: &Window, means: &Means, correction: &mut Correction) -> Option<bool> {
-        let sums = means.field?;
-        self.reference
-            .learn(&self.params, means.duration_s, &sums, &self.iron.iron_b);
-        let compared = self
-            .reference
-            .compare(&self.params, means.duration_s, &self.mean_field(&sums))?;
-        let disturbed = compared.disturbance > self.params.field_gate;
-        self.disturbed_s = if disturbed {
-            self.disturbed_s + means.duration_s
-        } else {
-            0.0
-        };
-        correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
-        let mut accepted = true;
-        for scalar in &compared.scalars {
-            let (quantity, rows) = (scalar.quantity, &window.mean_rows(&scalar.row_n));
-            let covariance = &mut self.covariance;
-            accepted &= correction.compare(covariance, quantity, 0.0, scalar.residual, rows, scalar.noise);
-        }
-        correction.usable = true;
-        (!disturbed).then_some(accepted)
+    /// Another window. What the one that follows knows of the one before is in other axes if the attitude was found afresh.
+    fn begin_window(&mut self, afresh: bool, following: Window) {
+        self.window = if afresh { Window::default() } else { following };
     }
 
     /// The mean field of a window without the iron, as far as that is known.
@@ -361,32 +394,40 @@ impl Filter {
         mean
     }
 
-    fn inject(&mut self, correction: &Correction) {
-        let error = &correction.error;
-        let rotation_n = Vector3::new(error[0], error[1], error[2]);
+    fn inject(&mut self, error: &State) {
+        let [north, east, down, to_north, to_east] = error.driven;
+        let rotation_n = Vector3::new(north, east, down);
         self.q_nb = renormalised(from_rotation_vector(rotation_n) * self.q_nb);
-        self.bias_b += error.fixed_rows::<3>(BIAS);
-        for axis in 0..3 {
-            for about in 0..3 {
-                self.gyro_matrix[(axis, about)] += error[GYRO_MATRIX + 3 * axis + about];
-            }
-        }
-        self.velocity_n += error.fixed_rows::<2>(VELOCITY);
+        let (bias, matrix) = error.drivers.split_at(GYRO_MATRIX);
+        self.bias_b += Vector3::from_row_slice(bias);
+        self.gyro_matrix += Matrix3::from_row_slice(matrix);
+        self.velocity_n += Vector2::new(to_north, to_east);
     }
 
+    /// Of the state; the covariance is looked at when its work is done.
     fn is_finite(&self) -> bool {
-        let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
-        finite(self.q_nb.as_vector().as_slice())
-            && finite(self.bias_b.as_slice())
-            && finite(self.gyro_matrix.as_slice())
-            && finite(self.velocity_n.as_slice())
+        are_finite(self.q_nb.as_vector().as_slice())
+            && are_finite(self.bias_b.as_slice())
+            && are_finite(self.gyro_matrix.as_slice())
+            && are_finite(self.velocity_n.as_slice())
             && self.iron.is_finite()
-            && self.covariance.is_finite()
     }
 }
 
+/// [s] steps of this length or more take large stages of what is pending.
+const LONG_STEP_S: f32 = 0.1;
+
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;
+
+/// Of microseconds. A conversion of 64 bits is a call on the target, and intervals seldom have them.
+pub(crate) fn seconds(us: u64) -> f32 {
+    let us = match u32::try_from(us) {
+        Ok(us) => us as f32,
+        Err(_) => us as f32,
+    };
+    us * 1e-6
+}
 
 fn square(x: f32) -> f32 {
     x * x

@@ -19,9 +19,23 @@
 
 mod gaps;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 pub use gaps::Known;
+
+/// Most axes of one vector.
+const AXES: usize = 16;
+
+/// What an axis measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// [unit] along itself.
+    pub value: f32,
+    /// [unit2] variance of that.
+    pub variance: f32,
+    /// How far it is from what a vector expects of it, and the variance of what is expected, for who holds it against one.
+    pub off: (f32, f32),
+}
 
 /// A vector out of redundant axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,17 +72,32 @@ impl Solution {
 /// The vector behind `values`, one along each of `axes_b` with the variance beside it; axes whose bit in `wanted` is
 /// clear are left out, as are those beyond the shortest of the three.
 pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted: u16) -> Solution {
+    let mut seen = [Seen::default(); AXES];
+    for (seen, (value, variance)) in seen.iter_mut().zip(values.iter().zip(variances)) {
+        (seen.value, seen.variance) = (*value, *variance);
+    }
+    let axes = values.len().min(variances.len()).min(AXES);
+    solve_seen(axes_b, &seen[..axes], wanted)
+}
+
+/// [`solve`] for axes whose values and variances lie together.
+pub fn solve_seen(axes_b: &[Vector3<f32>], seen: &[Seen], wanted: u16) -> Solution {
     // Written out: a symmetric matrix has six elements, and this sum is most of what a cycle costs.
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut weighted = Vector3::zeros();
-    let mut used = 0;
-    for (k, ((axis_b, value), variance)) in axes_b.iter().zip(values).zip(variances).take(16).enumerate() {
-        let weight = 1.0 / variance;
+    // The bit of the axis; none beyond the sixteenth.
+    let (mut bit, mut used) = (1, 0);
+    for (axis_b, seen) in axes_b.iter().zip(seen) {
+        let Seen { value, variance, .. } = *seen;
+        let (axis, weight) = (bit, 1.0 / variance);
+        bit <<= 1;
         // Comparisons with NaN are false.
-        let usable = value.is_finite() && weight > 0.0 && weight <= f32::MAX;
-        if wanted >> k & 1 == 0 || !usable {
+        // Above zero and below infinity in one comparison.
+        let weighs = weight.to_bits().wrapping_sub(1) < f32::MAX.to_bits();
+        if !(wanted & axis != 0 && value.abs() <= f32::MAX && weighs) {
             continue;
         }
+        used |= axis;
         let row = axis_b * weight;
         xx += row.x * axis_b.x;
         xy += row.x * axis_b.y;
@@ -76,8 +105,7 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
         yy += row.y * axis_b.y;
         yz += row.y * axis_b.z;
         zz += row.z * axis_b.z;
-        weighted += row * *value;
-        used |= 1 << k;
+        weighted += row * value;
     }
     let (covariance_b, known) = gaps::invert(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
     Solution {
@@ -86,6 +114,19 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
         known,
         used,
     }
+}
+
+/// Rate by least squares from values about those of four axes that are wanted, all weighing the same: `rate = matrix
+/// values`. With the covariance for values of a variance of one; `None` where they do not span space.
+pub fn matrix(axes_b: &[Vector3<f32>; 4], wanted: u16) -> Option<(SMatrix<f32, 3, 4>, Matrix3<f32>)> {
+    let Solution {
+        covariance_b, known, ..
+    } = solve(axes_b, &[0.0; 4], &[1.0; 4], wanted);
+    let mut matrix = SMatrix::<f32, 3, 4>::zeros();
+    for (k, axis_b) in axes_b.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
+        matrix.set_column(k, &(covariance_b * axis_b));
+    }
+    (known == Known::All).then_some((matrix, covariance_b))
 }
 
 #[cfg(test)]

@@ -143,3 +143,36 @@ pub struct Sample {
     /// [us] instant at which each sensor was sampled, after `start_us`, in reading order; [`NO_SLOT`] if it was not.
     pub slots_us: [u32; SENSOR_COUNT],
 }
+
+impl Sample {
+    /// [us] slot times of the sensors of a kind, plate 1 to 4.
+    pub fn slots_of(&self, kind: Kind) -> &[u32] {
+        // The kinds come one after another in the reading order.
+        let first = match kind {
+            Kind::Accelerometer => 0,
+            Kind::Magnetometer => 4,
+            Kind::Gyro => 8,
+            Kind::Thermometer => 12,
+        };
+        &self.slots_us[first..first + 4]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_of_a_kind_are_those_of_its_sensors() {
+        let sample = Sample {
+            reading: Reading::unread(0),
+            start_us: 0,
+            slots_us: core::array::from_fn(|slot| slot as u32),
+        };
+        for kind in [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro, Kind::Thermometer] {
+            for (plate, slot) in sample.slots_of(kind).iter().enumerate() {
+                assert_eq!(SENSORS[*slot as usize], Sensor { kind, plate });
+            }
+        }
+    }
+}

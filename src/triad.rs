@@ -73,14 +73,30 @@ pub fn triad(first: &Sighting, second: &Sighting) -> Result<Observation, Unobser
         return Err(Unobservable::NotADirection);
     }
     let (w1, w2) = (direction(first.seen_b)?, direction(second.seen_b)?);
-    let axes_b = axes(w1, w2)?;
-    let axes_n = axes(direction(first.known_n)?, direction(second.known_n)?)?;
-    let q_nb = attitude::from_dcm_bn(&(axes_b * axes_n.transpose())).ok_or(Unobservable::NotADirection)?;
+    let q_nb = turned(axes(w1, w2)?, &known_axes(first.known_n, second.known_n)?);
     let (w1_w2, cross) = (w1 * w2.transpose(), w1.cross(&w2).norm_squared());
     let coupled = (w1_w2 + w1_w2.transpose()) * (variance_1 * w1.dot(&w2));
     let about_first = w1 * w1.transpose() * (variance_2 - variance_1);
     let covariance_b = Matrix3::from_diagonal_element(variance_1) + (about_first + coupled) / cross;
     Ok(Observation { q_nb, covariance_b })
+}
+
+/// The axes that two known directions span, for [`attitude`]: they need not be found anew for every sighting of them.
+pub fn known_axes(first_n: Vector3<f32>, second_n: Vector3<f32>) -> Result<Matrix3<f32>, Unobservable> {
+    axes(direction(first_n)?, direction(second_n)?)
+}
+
+/// The attitude of [`triad`] alone, from two directions seen and the axes that they are known to span.
+pub fn attitude(
+    first_b: Vector3<f32>,
+    second_b: Vector3<f32>,
+    known_axes_n: &Matrix3<f32>,
+) -> Result<UnitQuaternion<f32>, Unobservable> {
+    Ok(turned(axes(direction(first_b)?, direction(second_b)?)?, known_axes_n))
+}
+
+fn turned(axes_b: Matrix3<f32>, axes_n: &Matrix3<f32>) -> UnitQuaternion<f32> {
+    attitude::from_rotation(&(axes_b * axes_n.transpose()))
 }
 
 /// A vector's direction. The scale is taken out first, since squares of f32 leave its range at 1e19.
@@ -145,6 +161,17 @@ mod tests {
         assert!(attitude::angle_between(&found.q_nb, &golden_attitude()) < 1e-6);
         let swapped = triad(&other, &up).unwrap();
         assert!(attitude::angle_between(&swapped.q_nb, &golden_attitude()) < 1e-6);
+    }
+
+    #[test]
+    fn the_attitude_alone_is_that_of_the_whole() {
+        let [up, other] = golden();
+        let axes_n = known_axes(up.known_n, other.known_n).unwrap();
+        assert_eq!(
+            attitude(up.seen_b, other.seen_b, &axes_n),
+            triad(&up, &other).map(|found| found.q_nb)
+        );
+        assert_eq!(attitude(up.seen_b, up.seen_b, &axes_n), Err(Unobservable::Collinear));
     }
 
     #[test]

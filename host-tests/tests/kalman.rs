@@ -285,7 +285,7 @@ fn a_million_steps_in_f32_stay_with_f64() {
         }
         if step % 10_000 == 9 {
             // Scaled to unit diagonal, so that radians and metres compare.
-            let p = filter.covariance.0;
+            let p = filter.covariance().matrix();
             let scaled = p.map_with_location(|row, column, value| value / (p[(row, row)] * p[(column, column)]).sqrt());
             least_ratio = least_ratio.min(scaled.symmetric_eigenvalues().min());
         }

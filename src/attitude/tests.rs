@@ -145,3 +145,13 @@ fn a_million_turns_keep_the_norm() {
     let q = (0..1_000_000).fold(UnitQuaternion::identity(), |q, _| renormalised(q * turn));
     close(q.norm(), 1.0, ROUNDING);
 }
+
+#[test]
+fn sines_and_cosines_are_those_of_f64_through_more_than_a_turn() {
+    for step in -500..=500 {
+        let angle = 0.01 * step as f32;
+        let (sin, cos) = sin_cos(angle);
+        close(sin, ComplexField::sin(f64::from(angle)) as f32, ROUNDING);
+        close(cos, ComplexField::cos(f64::from(angle)) as f32, ROUNDING);
+    }
+}

@@ -3,19 +3,38 @@
 //! In: a [`Reading`], its [`Temperatures`], a [`Set`]. Out: [`Measured`]. A count that was not read, stands at the end of
 //! its range or cannot come from the part gives no value, and is said to be which.
 
-use super::{Axis, Channel, Channels, Set, Temperatures};
+use super::{Axis, Channels, Set, Temperatures};
 use crate::{
     geometry::{PLATES, TRIAD_AXES},
     sample::{Kind, Reading},
     sensor::hmc5883l::OVERFLOW,
 };
 
+/// [counts] what a part says at the ends of its range, and beyond it if it has a word for that.
+struct Ends {
+    least: i16,
+    most: i16,
+    overflow: i16,
+}
+
 /// [counts] ends of the LIS331HH's 12 bits.
-const ACC_ENDS: (i16, i16) = (-2048, 2047);
+const ACC_ENDS: Ends = Ends {
+    least: -2048,
+    most: 2047,
+    overflow: -2048,
+};
 /// [counts] just beyond the HMC5883L's 12 bits, where it says [`OVERFLOW`].
-const MAG_ENDS: (i16, i16) = (-2049, 2048);
+const MAG_ENDS: Ends = Ends {
+    least: -2049,
+    most: 2048,
+    overflow: OVERFLOW,
+};
 /// [counts] where the ADIS16265 ends: 320 deg/s of 0.07326, and the same counts in its other ranges.
-const GYRO_ENDS: (i16, i16) = (-4368, 4368);
+const GYRO_ENDS: Ends = Ends {
+    least: -4368,
+    most: 4368,
+    overflow: -4368,
+};
 
 /// What each axis measured along itself in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,44 +67,57 @@ impl Set {
         };
         let plates_c: [f32; PLATES] = core::array::from_fn(|plate| above_c(temperatures.plate_c(plate)));
         let gyros_c: [f32; PLATES] = core::array::from_fn(|plate| above_c(temperatures.gyro_c(plate)));
-        let mut seen = Seen::default();
-        let (acc, mag) = (reading.acc_p.as_flattened(), reading.mag_p.as_flattened());
-        Measured {
-            acc: core::array::from_fn(|k| {
-                let channel = Channel::of(Kind::Accelerometer, k);
-                seen.value(channel, &self.acc[k], acc[k], plates_c[k / 3], ACC_ENDS)
-            }),
-            mag: core::array::from_fn(|k| {
-                let channel = Channel::of(Kind::Magnetometer, k);
-                seen.value(channel, &self.mag[k], mag[k], plates_c[k / 3], MAG_ENDS)
-            }),
-            gyro: core::array::from_fn(|k| {
-                let channel = Channel::of(Kind::Gyro, k);
-                seen.value(channel, &self.gyro[k], reading.gyro[k], gyros_c[k], GYRO_ENDS)
-            }),
-            present: seen.present,
-            saturated: seen.saturated,
+        let mut measured = Measured {
+            acc: [0.0; TRIAD_AXES],
+            mag: [0.0; TRIAD_AXES],
+            gyro: [0.0; PLATES],
+            present: Channels::default(),
+            saturated: Channels::default(),
             temperature_held: temperatures.held(),
             beyond_validity,
-        }
+        };
+        let (acc, mag) = (reading.acc_p.as_flattened(), reading.mag_p.as_flattened());
+        let found = values(&self.acc, acc, &plates_c, &ACC_ENDS, &mut measured.acc);
+        measured.take(Kind::Accelerometer, &found);
+        let found = values(&self.mag, mag, &plates_c, &MAG_ENDS, &mut measured.mag);
+        measured.take(Kind::Magnetometer, &found);
+        let found = values(&self.gyro, &reading.gyro, &gyros_c, &GYRO_ENDS, &mut measured.gyro);
+        measured.take(Kind::Gyro, &found);
+        measured
     }
 }
 
-#[derive(Default)]
+impl Measured {
+    fn take(&mut self, kind: Kind, found: &Seen) {
+        self.present = self.present.with(kind, found.present);
+        self.saturated = self.saturated.with(kind, found.saturated);
+    }
+}
+
+/// Axes of one kind, bit `k` for its axis `k`.
 struct Seen {
-    present: Channels,
-    saturated: Channels,
+    present: u16,
+    saturated: u16,
 }
 
-impl Seen {
-    fn value(&mut self, channel: Channel, axis: &Axis, counts: i16, above_c: f32, ends: (i16, i16)) -> f32 {
-        let overflowed = channel.kind() == Kind::Magnetometer && counts == OVERFLOW;
-        if overflowed || counts == ends.0 || counts == ends.1 {
-            self.saturated.insert(channel);
-        } else if (ends.0..=ends.1).contains(&counts) {
-            self.present.insert(channel);
-            return axis.value(counts, above_c);
+/// What the axes of one kind measured, as many a plate as there are.
+fn values(axes: &[Axis], counts: &[i16], above_c: &[f32; PLATES], ends: &Ends, values: &mut [f32]) -> Seen {
+    let mut seen = Seen {
+        present: 0,
+        saturated: 0,
+    };
+    let (mut bit, a_plate) = (1, axes.len() / PLATES);
+    let plates = axes.chunks_exact(a_plate).zip(counts.chunks_exact(a_plate));
+    for (((axes, counts), values), above_c) in plates.zip(values.chunks_exact_mut(a_plate)).zip(above_c) {
+        for ((axis, &counts), value) in axes.iter().zip(counts).zip(values) {
+            if counts > ends.least && counts < ends.most {
+                seen.present |= bit;
+                *value = axis.value(counts, *above_c);
+            } else if counts == ends.least || counts == ends.most || counts == ends.overflow {
+                seen.saturated |= bit;
+            }
+            bit <<= 1;
         }
-        0.0
     }
+    seen
 }

@@ -15,13 +15,13 @@
 //! `angle_b = C angle` over the believed ones that missed no sample. With fewer than three of those free of saturation all
 //! are used, and the rotation is said to be a lower bound. Refuses (by covering no time) fewer than three believed gyros.
 
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{Matrix3, SMatrix, Vector3, Vector4};
 
 use crate::{
     calibration::{Set, Temperatures},
     geometry::{PLATES, rate_from_gyros},
     increments::{Channel, Increments},
-    redundancy::{Known, solve},
+    redundancy::matrix,
     sample::Kind,
 };
 
@@ -41,8 +41,31 @@ pub(super) struct Turn {
     pub saturated: bool,
 }
 
+/// Least squares over some gyros, and its covariance for a variance of one: found anew only when they are others.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Solver {
+    gyros: u16,
+    found: Option<(SMatrix<f32, 3, PLATES>, Matrix3<f32>)>,
+}
+
+impl Solver {
+    fn of(&mut self, set: &Set, gyros: u16) -> Option<&(SMatrix<f32, 3, PLATES>, Matrix3<f32>)> {
+        if self.gyros != gyros {
+            let found = matrix(&set.gyro.map(|axis| axis.axis_b), gyros);
+            *self = Solver { gyros, found };
+        }
+        self.found.as_ref()
+    }
+}
+
 /// The rotation of a cycle by the gyros whose bit in `believed` is set.
-pub(super) fn turn(set: &Set, temperatures: &Temperatures, increments: &Increments, believed: u16) -> Turn {
+pub(super) fn turn(
+    set: &Set,
+    temperatures: &Temperatures,
+    increments: &Increments,
+    believed: u16,
+    solver: &mut Solver,
+) -> Turn {
     let covered_s = increments.covered_us as f32 * 1e-6;
     let samples = increments.gyro.iter().fold(0, |most, gyro| most.max(gyro.count));
     let which = |is: &dyn Fn(&Channel) -> bool| {
@@ -59,17 +82,16 @@ pub(super) fn turn(set: &Set, temperatures: &Temperatures, increments: &Incremen
         (false, true) => whole,
         (false, false) => whole & !clipped,
     };
-    let axes_b = set.gyro.map(|axis| axis.axis_b);
     let angles = calibrated(set, temperatures, increments, covered_s);
-    let solution = solve(&axes_b, &angles, &[1.0; PLATES], used);
-    if solution.known != Known::All || covered_s <= 0.0 {
+    let finite = angles.iter().all(|angle| angle.abs() <= f32::MAX);
+    let (Some((matrix, covariance_b)), true) = (solver.of(set, used), finite && covered_s > 0.0) else {
         return Turn {
             angle_b: Vector3::zeros(),
             variance: 0.0,
             covered_s: 0.0,
             saturated,
         };
-    }
+    };
     let beyond = if sound == seen {
         beyond_integrals(set, increments, used)
     } else {
@@ -78,8 +100,8 @@ pub(super) fn turn(set: &Set, temperatures: &Temperatures, increments: &Incremen
     let noise = set.gyro.iter().map(|axis| axis.noise * axis.noise).sum::<f32>() / PLATES as f32;
     let sampled_s = covered_s / f32::from(samples);
     Turn {
-        angle_b: solution.vector_b + beyond,
-        variance: noise * sampled_s * covered_s * solution.covariance_b.trace() / 3.0,
+        angle_b: matrix * Vector4::from(angles) + beyond,
+        variance: noise * sampled_s * covered_s * covariance_b.trace() / 3.0,
         covered_s,
         saturated,
     }
@@ -157,7 +179,13 @@ mod tests {
     }
 
     fn turned(set: &Set, increments: &Increments, believed: u16) -> Turn {
-        turn(set, &Temperatures::default(), increments, believed)
+        turn(
+            set,
+            &Temperatures::default(),
+            increments,
+            believed,
+            &mut Solver::default(),
+        )
     }
 
     #[test]

@@ -16,19 +16,19 @@
 //!
 //! [`vector_rate`]: super::vector_rate
 
-use nalgebra::{ComplexField, SMatrix, Vector3, Vector4};
+use nalgebra::{ComplexField, Matrix3, SMatrix, Vector3, Vector4};
 
 use super::{
     Cycle,
     health::Verdict,
-    root::reciprocal_root,
-    trace::Limits,
+    root::{reciprocal_root, root},
+    trace::{Limits, Systematic},
     watch::{QUIET, Watch},
 };
 use crate::{
     calibration::{Axis, Uncertainty},
     geometry::PLATES,
-    redundancy::{Known, Solution, solve},
+    redundancy::{Known, Solution, matrix, solve},
 };
 
 /// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a
@@ -52,19 +52,28 @@ pub(super) struct Gyros {
     axes_b: [Vector3<f32>; PLATES],
     /// Unit vector of the parity.
     across: [f32; PLATES],
-    /// Least squares by all four, and without each.
+    /// Least squares by all four, and its covariance for a variance of one.
     rate_from_all: SMatrix<f32, 3, PLATES>,
-    rate_without: [SMatrix<f32, 3, PLATES>; PLATES],
+    of_one: Matrix3<f32>,
+    /// All four have the same noise, so that these are the weighted ones too.
+    alike: bool,
+    /// By how much a parity of one moves the rate when each gyro is left out.
+    without: [Vector3<f32>; PLATES],
     uncertainty: Uncertainty,
     /// [s] by how much the sampling instants are unsure.
     timing_s: f32,
     parity: Watch,
     watches: [Watch; PLATES],
+    /// What is systematic of the parity, and of each gyro.
+    of_parity: Systematic,
+    of_gyros: [Systematic; PLATES],
     /// [rad/s] rate of the cycle before.
     course_b: Option<Vector3<f32>>,
     usual_b: Option<Vector3<f32>>,
     cycles: f32,
     quiet_for: u8,
+    /// Cycles for which the parity is still doubted.
+    doubted_for: u8,
     /// Parity of the cycle before, in standard deviations of the noise.
     last_sigmas: f32,
     leaping: Option<usize>,
@@ -78,23 +87,40 @@ impl Gyros {
         let axes_b = core::array::from_fn(|k| axes[k].axis_b);
         let across = across(&axes_b);
         let noise: [f32; PLATES] = core::array::from_fn(|k| axes[k].noise * axes[k].noise);
+        // No set is accepted whose gyros do not span space, any three of them.
+        let (rate_from_all, of_one) = matrix(&axes_b, ALL).unwrap_or_default();
+        let parity_noise = (0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum();
         Gyros {
             axes_b,
             across,
-            rate_from_all: matrix(&axes_b, ALL),
-            rate_without: core::array::from_fn(|k| matrix(&axes_b, ALL & !(1 << k))),
+            rate_from_all,
+            of_one,
+            alike: noise.iter().all(|other| *other == noise[0]),
+            without: core::array::from_fn(|k| {
+                let (without, _) = matrix(&axes_b, ALL & !(1 << k)).unwrap_or_default();
+                without * Vector4::from(across)
+            }),
             uncertainty,
             timing_s,
-            parity: Watch::new((0..PLATES).map(|k| across[k] * across[k] * noise[k]).sum(), allowed),
-            watches: noise.map(|noise| Watch::new(noise, allowed)),
+            parity: Watch::new(parity_noise, allowed, parity_noise),
+            watches: noise.map(|noise| Watch::new(noise, allowed, noise)),
+            of_parity: Systematic::NONE,
+            of_gyros: [Systematic::NONE; PLATES],
             course_b: None,
             usual_b: None,
             cycles: 0.0,
             quiet_for: 0,
+            doubted_for: 0,
             last_sigmas: 0.0,
             leaping: None,
             suspect: false,
         }
+    }
+
+    /// Whether the parity is on its way to an alarm, or was not long ago; to be asked once a cycle.
+    pub(super) fn is_doubted(&mut self) -> bool {
+        self.doubted_for = self.doubted_for.saturating_sub(1);
+        self.doubted_for > 0 || self.suspect
     }
 
     /// Gyros that are not believed.
@@ -116,7 +142,17 @@ impl Gyros {
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle, candidates);
         let variances = core::array::from_fn(|k| self.watches[k].noise + systematic);
-        let mut solution = solve(&self.axes_b, cycle.values, &variances, candidates);
+        let finite = cycle.values.iter().all(|value| value.abs() <= f32::MAX);
+        let mut solution = if candidates == ALL && self.alike && finite {
+            Solution {
+                vector_b: self.rate_from_all * Vector4::from(*cycle.values),
+                covariance_b: self.of_one * variances[0],
+                known: Known::All,
+                used: ALL,
+            }
+        } else {
+            solve(&self.axes_b, cycle.values, &variances, candidates)
+        };
         if candidates == ALL {
             solution = self.check(cycle, &variances, systematic, solution);
         } else {
@@ -159,13 +195,12 @@ impl Gyros {
 
     /// The parity of all four; the rate of those left.
     fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
-        let sum: f32 = (0..PLATES).map(|k| self.across[k] * cycle.values[k]).sum();
-        let parity = sum - self.parity.offset;
+        let parity = self.parity_of(cycle.values);
         let noise = self.parity.noise;
         let variance = noise + systematic + self.parity.offset_variance;
         if let Some(leapt) = self.leap(cycle, variances, parity * reciprocal_root(noise)) {
             self.watches[leapt].strike(true);
-            if self.watches[leapt].alarm(LIMITS) >= 1.0 {
+            if self.watches[leapt].alarm(LIMITS, &self.of_gyros[leapt].added()) >= 1.0 {
                 self.blame(leapt, Verdict::Disagreeing);
             }
             return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
@@ -173,13 +208,18 @@ impl Gyros {
         if self.leaping.is_none() {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
-        self.parity.note(parity, 1.0, systematic);
-        let alarm = self.parity.learn(parity, variance, LIMITS);
+        let counted = (systematic + self.parity.offset_variance) / noise;
+        let place = self.of_parity.push(root(counted));
+        self.parity.note(place, parity, 1.0, counted);
+        let alarm = self.parity.learn(parity, variance, LIMITS, &self.of_parity.added());
         self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
         } else {
             0
         };
+        if alarm > QUIET {
+            self.doubted_for = QUIET_CYCLES;
+        }
         self.suspect = alarm > 1.0 || (self.suspect && self.quiet_for < QUIET_CYCLES);
         let widened = if self.suspect {
             1.0 + parity * parity / variance
@@ -227,6 +267,7 @@ impl Gyros {
         let part = self.across[plate];
         let watch = &mut self.watches[plate];
         watch.exclude(verdict);
+        self.of_gyros[plate].restart();
         watch.offset = self.parity.offset / part;
         watch.offset_variance = self.parity.offset_variance / (part * part);
         if verdict == Verdict::Frozen {
@@ -237,6 +278,7 @@ impl Gyros {
         }
         self.leaping = None;
         self.parity.restart();
+        self.of_parity.restart();
         self.suspect = false;
     }
 
@@ -248,8 +290,10 @@ impl Gyros {
             let share = (variances[k] + variance) / variances[k];
             let watch = &mut self.watches[k];
             let disagreement = cycle.values[k] - watch.offset - expected;
-            watch.note(disagreement, share, systematic);
-            watch.reconsider();
+            let counted = (systematic + watch.offset_variance / share) / watch.noise;
+            let place = self.of_gyros[k].push(root(counted));
+            watch.note(place, disagreement, share, counted);
+            watch.reconsider(&self.of_gyros[k].added());
         }
     }
 
@@ -261,11 +305,22 @@ impl Gyros {
         *usual_b += (rate_b - *usual_b) / self.cycles;
     }
 
-    /// The rate without each gyro in turn; `None` unless all four are used. The parity's learned offset is taken out across
-    /// all four, which leaves the rate of all as it is and gives each of these the same bias.
+    /// The rate without each gyro in turn; `None` unless all four are used. What four gyros measure is what their rate
+    /// explains and the parity, so without one of them the rate is off from that of all by the parity alone. Its learned
+    /// offset is taken out, which gives each of these the same bias.
     pub(super) fn without_each(&self, values: &[f32; PLATES], used: u16) -> Option<[Vector3<f32>; PLATES]> {
-        let values = Vector4::from(*values) - Vector4::from(self.across) * self.parity.offset;
-        (used == ALL).then(|| self.rate_without.map(|matrix| matrix * values))
+        if used != ALL {
+            return None;
+        }
+        let rate_b = self.rate_from_all * Vector4::from(*values);
+        let parity = self.parity_of(values);
+        Some(self.without.map(|moved_b| rate_b + moved_b * parity))
+    }
+
+    /// Parity beyond its learned offset.
+    fn parity_of(&self, values: &[f32; PLATES]) -> f32 {
+        let parts = self.across.iter().zip(values);
+        parts.fold(0.0, |sum, (across, value)| sum + across * value) - self.parity.offset
     }
 }
 
@@ -276,14 +331,4 @@ fn across(axes_b: &[Vector3<f32>; PLATES]) -> [f32; PLATES] {
     let across = [volume(b, c, d), -volume(a, c, d), volume(a, b, d), -volume(a, b, c)];
     let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
     across.map(|part| part / length)
-}
-
-/// Rate from values about the axes whose bit is set, all weighing the same.
-fn matrix(axes_b: &[Vector3<f32>; PLATES], wanted: u16) -> SMatrix<f32, 3, PLATES> {
-    let column = |k: usize| {
-        let mut value = [0.0; PLATES];
-        value[k] = 1.0;
-        solve(axes_b, &value, &[1.0; PLATES], wanted).vector_b
-    };
-    SMatrix::from_columns(&[column(0), column(1), column(2), column(3)])
 }

@@ -10,6 +10,8 @@
 
 use nalgebra::ComplexField;
 
+use crate::sample::NOT_READ;
+
 /// Chance of so many repeats in a row of a healthy sensor.
 const CHANCE: f32 = 1e-9;
 /// Repeats beyond which waiting longer tells nothing: half a minute at 5 Hz.
@@ -18,7 +20,7 @@ const MOST: f32 = 150.0;
 /// How often one sensor has repeated itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Repeats<const N: usize> {
-    last: Option<[i16; N]>,
+    last: [i16; N],
     seen: u16,
     frozen_at: u16,
 }
@@ -32,17 +34,21 @@ impl<const N: usize> Repeats<N> {
         // Without noise a repeat is certain: the logarithm is kept off zero.
         let repeats = ComplexField::ln(CHANCE) / ComplexField::ln(chance).min(-1e-6);
         Repeats {
-            last: None,
+            // What no part says, so that the first counts repeat nothing.
+            last: [NOT_READ; N],
             seen: 0,
             frozen_at: ComplexField::ceil(repeats.clamp(2.0, MOST)) as u16,
         }
     }
 
     /// Takes a cycle's counts, `None` if not read; whether it is frozen.
-    pub(super) fn frozen(&mut self, counts: Option<[i16; N]>) -> bool {
+    pub(super) fn frozen(&mut self, counts: Option<&[i16; N]>) -> bool {
         if let Some(counts) = counts {
-            let repeats = self.last.replace(counts) == Some(counts);
-            self.seen = if repeats { self.seen.saturating_add(1) } else { 0 };
+            if self.last == *counts {
+                self.seen = self.seen.saturating_add(1);
+            } else {
+                (self.last, self.seen) = (*counts, 0);
+            }
         }
         self.seen >= self.frozen_at
     }
@@ -99,9 +105,9 @@ mod tests {
     #[test]
     fn a_frozen_sensor_is_found_and_one_that_moves_again_let_go() {
         let mut repeats = Repeats::new([1.53; 3]);
-        let frozen: [bool; 8] = core::array::from_fn(|_| repeats.frozen(Some([1, 2, 3])));
+        let frozen: [bool; 8] = core::array::from_fn(|_| repeats.frozen(Some(&[1, 2, 3])));
         assert_eq!(frozen, [false, false, false, false, false, true, true, true]);
         assert!(repeats.frozen(None));
-        assert!(!repeats.frozen(Some([1, 2, 4])));
+        assert!(!repeats.frozen(Some(&[1, 2, 4])));
     }
 }

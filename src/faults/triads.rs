@@ -14,15 +14,16 @@ use nalgebra::{ComplexField, Vector3};
 
 use super::{
     Cycle,
-    consensus::{Agreement, Values},
+    consensus::{Disagreement, agreed},
     health::Verdict,
-    trace::Limits,
-    watch::Watch,
+    root::root,
+    trace::{Limits, Systematic, larger},
+    watch::{QUIET, Watch},
 };
 use crate::{
     calibration::{Axis, Uncertainty},
-    geometry::{PLATES, TRIAD_AXES},
-    redundancy::{Known, Solution, solve},
+    geometry::TRIAD_AXES,
+    redundancy::{Known, Seen, Solution, solve_seen},
 };
 
 /// Means over one and five seconds, for less than one false alarm of 24 axes in ten hours of simulated rest. Sum of squares:
@@ -57,35 +58,59 @@ pub(super) struct Triads {
     /// [s] by how much the sensors' sampling instants are unsure.
     timing_s: f32,
     watches: [Watch; TRIAD_AXES],
+    /// What is systematic of all of them, counted in the noise of the least noisy.
+    of_all: Systematic,
+    /// [1/unit2] one over the variance of that.
+    per_noise: f32,
+    /// [1] that variance in the noise of the noisiest.
+    least_relative: f32,
     /// Squared differences from what it should be, its negative, the next and the one after next axis of its sensor.
     likeness: [[f32; 4]; TRIAD_AXES],
     /// The vector the offsets were learned at.
     usual_b: Option<Vector3<f32>>,
     last_b: Option<Vector3<f32>>,
     cycles: f32,
+    /// What the axes measured in the latest cycle, and how far that was from its vector.
+    seen: [Seen; TRIAD_AXES],
+    /// Axes present, what was systematic, and the vector of the cycle before, if it is still to be watched.
+    late: Option<(u16, f32, Solution)>,
     /// It is not decidable which axis is at fault.
     pub(super) undecided: bool,
 }
 
 impl Triads {
     pub(super) fn new(axes: &[Axis; TRIAD_AXES], uncertainty: Uncertainty, timing_s: f32) -> Self {
+        let least = axes.iter().fold(f32::MAX, |least, axis| least.min(axis.noise));
+        let most = axes.iter().fold(0.0_f32, |most, axis| most.max(axis.noise));
+        let (noise, allowed) = (least * least, uncertainty.bias * uncertainty.bias);
         Triads {
             axes_b: core::array::from_fn(|k| axes[k].axis_b),
             uncertainty,
             timing_s,
-            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, uncertainty.bias * uncertainty.bias)),
+            watches: axes.map(|axis| Watch::new(axis.noise * axis.noise, allowed, noise)),
+            of_all: Systematic::NONE,
+            per_noise: 1.0 / noise,
+            least_relative: noise / (most * most),
             likeness: [[0.0; 4]; TRIAD_AXES],
             usual_b: None,
             last_b: None,
             cycles: 0.0,
+            seen: [Seen::default(); TRIAD_AXES],
+            late: None,
             undecided: false,
         }
     }
 
     /// Axes that are not believed.
     pub(super) fn excluded(&self) -> u16 {
-        let each = self.watches.iter().enumerate();
-        each.fold(0, |axes, (k, watch)| axes | u16::from(watch.excluded()) << k)
+        let (mut bit, mut excluded) = (1, 0);
+        for watch in &self.watches {
+            if watch.excluded() {
+                excluded |= bit;
+            }
+            bit <<= 1;
+        }
+        excluded
     }
 
     /// What is held of axis `k`.
@@ -95,38 +120,50 @@ impl Triads {
 
     /// Takes a cycle.
     pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) -> Solution {
-        for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
-            self.watches[k].exclude(Verdict::Frozen);
+        let doubled = self.catch_up();
+        if cycle.frozen != 0 {
+            for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
+                self.watches[k].exclude(Verdict::Frozen);
+            }
         }
-        let values = core::array::from_fn(|k| cycle.values[k] - self.watches[k].offset);
         let candidates = cycle.present & !self.excluded();
-        let systematic = self.systematic(cycle.dt_s, apart, &values, candidates);
-        let variances = core::array::from_fn(|k| {
-            let watch = &self.watches[k];
-            watch.noise + systematic + watch.offset_variance
-        });
-        let axes_b = self.axes_b;
-        let axes = Values {
-            axes_b: &axes_b,
-            values: &values,
-            variances: &variances,
-        };
-        let found = axes.agreed(candidates);
-        self.undecided = !found.decided;
+        for ((seen, value), watch) in self.seen.iter_mut().zip(cycle.values).zip(&self.watches) {
+            seen.value = value - watch.offset;
+            seen.variance = watch.noise + watch.offset_variance;
+        }
+        let systematic = self.systematic(cycle.dt_s, apart, &self.seen, candidates);
+        for seen in &mut self.seen {
+            seen.variance += systematic;
+        }
+        let found = agreed(&self.axes_b, &mut self.seen, candidates);
+        self.undecided = !found.decided || doubled;
         if found.solution.known != Known::All {
             self.last_b = None;
         } else if found.decided {
-            let alarms = self.watch(cycle.present, systematic, &axes, &found);
-            self.judge(&alarms, &axes, &found.solution);
+            if cycle.watched_later {
+                self.late = Some((cycle.present, systematic, found.solution));
+            } else {
+                self.watch(cycle.present, systematic, &found.solution);
+            }
             self.remember(&found.solution);
         }
         found.solution
     }
 
+    /// Watches the cycle before, if that was put off: nothing has asked since. Whether it was not isolable then.
+    fn catch_up(&mut self) -> bool {
+        let Some((present, systematic, solution)) = self.late.take() else {
+            return false;
+        };
+        self.undecided = false;
+        self.watch(present, systematic, &solution);
+        self.undecided
+    }
+
     /// [unit2] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
     /// motion within the uncertainty of the sampling instants, and what differs by place.
-    fn systematic(&self, dt_s: Option<f32>, apart: &Apart, values: &[f32; TRIAD_AXES], candidates: u16) -> f32 {
-        let rough_b = self.rough(values, candidates);
+    fn systematic(&self, dt_s: Option<f32>, apart: &Apart, seen: &[Seen; TRIAD_AXES], candidates: u16) -> f32 {
+        let rough_b = self.rough(seen, candidates);
         let Uncertainty { scale, direction, .. } = self.uncertainty;
         let relative = scale * scale + direction * direction;
         let from_usual = self.usual_b.map_or(0.0, |usual_b| (rough_b - usual_b).norm_squared());
@@ -141,67 +178,91 @@ impl Triads {
 
     /// A vector good enough to say how uncertain it is: that of the complete plate nearest to the last one, as wild values
     /// are not; before there is a last one, or without a complete plate, that of all.
-    fn rough(&self, values: &[f32; TRIAD_AXES], candidates: u16) -> Vector3<f32> {
-        let of_plate = |plate: usize| {
-            // Near enough to rotations, whatever the calibration.
-            let axes = 3 * plate..3 * plate + 3;
-            let sum = axes.fold(Vector3::zeros(), |sum, k| sum + self.axes_b[k] * values[k]);
-            (candidates >> (3 * plate) & 0b111 == 0b111).then_some(sum)
-        };
-        let mut nearest = None;
+    fn rough(&self, seen: &[Seen; TRIAD_AXES], candidates: u16) -> Vector3<f32> {
+        let (mut nearest, mut least) = (None, f32::INFINITY);
         if let Some(last_b) = self.last_b {
-            for vector_b in (0..PLATES).filter_map(of_plate) {
-                let off = (vector_b - last_b).norm_squared();
-                if nearest.is_none_or(|(least, _)| off < least) {
-                    nearest = Some((off, vector_b));
+            let (axes, seen) = (self.axes_b.as_chunks::<3>().0, seen.as_chunks::<3>().0);
+            let mut left = candidates;
+            for ([x_b, y_b, z_b], [x, y, z]) in axes.iter().zip(seen) {
+                if left & 0b111 == 0b111 {
+                    // Near enough to rotations, whatever the calibration.
+                    let vector_b = x_b * x.value + y_b * y.value + z_b * z.value;
+                    let off = (vector_b - last_b).norm_squared();
+                    if off < least {
+                        (nearest, least) = (Some(vector_b), off);
+                    }
                 }
+                left >>= 3;
             }
         }
-        match nearest {
-            Some((_, vector_b)) => vector_b,
-            None => solve(&self.axes_b, values, &[1.0; TRIAD_AXES], candidates).vector_b,
-        }
+        nearest.unwrap_or_else(|| solve_seen(&self.axes_b, seen, candidates).vector_b)
     }
 
-    /// Notes what each axis disagrees by; how near each that is believed is to an alarm.
-    fn watch(&mut self, present: u16, systematic: f32, axes: &Values, found: &Agreement) -> [f32; TRIAD_AXES] {
-        let mut alarms = [0.0; TRIAD_AXES];
-        for (k, (watch, alarm)) in self.watches.iter_mut().zip(&mut alarms).enumerate() {
-            let (read, used) = (present >> k & 1 == 1, found.solution.used >> k & 1 == 1);
-            let disagreement = axes.disagreement(k, found).filter(|_| read);
-            if let Some(disagreement) = disagreement {
+    /// Notes what each axis disagrees by; judges if one that is believed raises an alarm.
+    #[inline(never)]
+    fn watch(&mut self, present: u16, systematic: f32, solution: &Solution) {
+        let offsets = self.watches.iter().map(|watch| watch.offset_variance);
+        let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
+        let place = self.of_all.push(root(counted));
+        let added = self.of_all.added();
+        let bounds = self.of_all.bounds(LIMITS, &added, QUIET, self.least_relative);
+        let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
+        let (mut read, mut used) = (present, solution.used);
+        for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(&self.seen) {
+            let disagreement = if read & 1 == 1 {
+                Disagreement::of(seen, used & 1 == 1)
+            } else {
+                None
+            };
+            match disagreement {
                 // The parts of the disagreement's variance are in the same proportion as the axis's own.
-                watch.note(disagreement.by, disagreement.variance / axes.variances[k], systematic);
+                Some(Disagreement { by, share }) => watch.note(place, by, share, counted),
+                None => watch.miss(place),
             }
             match disagreement {
-                Some(_) if watch.excluded() => watch.reconsider(),
-                Some(disagreement) if used => {
-                    watch.strike(false);
-                    *alarm = watch.learn(disagreement.by, disagreement.variance, LIMITS);
+                _ if watch.excluded() => {
+                    doubted = true;
+                    if disagreement.is_some() {
+                        watch.reconsider(&added);
+                    }
                 }
-                _ if watch.excluded() => {}
+                Some(Disagreement { by, share }) if used & 1 == 1 => {
+                    watch.strike(false);
+                    let variance = share * seen.variance;
+                    if watch.learn_quietly(by, variance, &bounds).is_none() {
+                        *alarm = watch.learn(by, variance, LIMITS, &added);
+                        loudest = larger(*alarm, loudest);
+                    }
+                }
                 gated => {
                     if gated.is_some() {
                         watch.strike(true);
                     }
-                    *alarm = watch.alarm(LIMITS);
+                    *alarm = watch.alarm(LIMITS, &added);
+                    loudest = larger(*alarm, loudest);
                 }
             }
+            (read, used) = (read >> 1, used >> 1);
         }
-        let doubted = present & self.excluded();
-        for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
-            self.resemble(k, axes, &found.solution);
-        }
-        alarms
-    }
-
-    /// Excludes the axis with the loudest alarm, if there is one.
-    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], axes: &Values, solution: &Solution) {
-        let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
-        if alarms[worst] < 1.0 {
+        if !doubted && loudest < 1.0 {
             return;
         }
-        if self.has_double(worst, axes, solution) {
+        let seen = &{ self.seen };
+        if doubted {
+            let doubted = present & self.excluded();
+            for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
+                self.resemble(k, seen, solution);
+            }
+        }
+        if loudest >= 1.0 {
+            self.judge(&alarms, seen, solution);
+        }
+    }
+
+    /// Excludes the axis with the loudest alarm.
+    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], seen: &[Seen; TRIAD_AXES], solution: &Solution) {
+        let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
+        if self.has_double(worst, seen, solution) {
             self.undecided = true;
             return;
         }
@@ -218,12 +279,13 @@ impl Triads {
         for watch in self.watches.iter_mut().filter(|watch| !watch.excluded()) {
             watch.restart();
         }
+        self.of_all.restart();
     }
 
     /// Whether a fault of another used axis would look the same as one of `k`.
-    fn has_double(&self, k: usize, axes: &Values, solution: &Solution) -> bool {
+    fn has_double(&self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) -> bool {
         let moved_b = solution.covariance_b * self.axes_b[k];
-        let free = |j: usize| axes.variances[j] - solution.along(&self.axes_b[j]).1;
+        let free = |j: usize| seen[j].variance - solution.along(&self.axes_b[j]).1;
         (0..TRIAD_AXES)
             .filter(|j| *j != k && solution.used >> j & solution.used >> k & 1 == 1)
             .any(|j| {
@@ -233,17 +295,17 @@ impl Triads {
     }
 
     /// Compares an excluded axis with its negative and with its sensor's other axes.
-    fn resemble(&mut self, k: usize, axes: &Values, solution: &Solution) {
+    fn resemble(&mut self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) {
         let expected = |k: usize| solution.along(&self.axes_b[k]).0;
         let plate = k / 3 * 3;
         let (next, after) = (plate + (k + 1) % 3, plate + (k + 2) % 3);
-        let measured = axes.values[k] + self.watches[k].offset;
+        let measured = seen[k].value + self.watches[k].offset;
         for (kept, other) in
             self.likeness[k]
                 .iter_mut()
                 .zip([expected(k), -expected(k), expected(next), expected(after)])
         {
-            let off = (measured - other) * (measured - other) / axes.variances[k];
+            let off = (measured - other) * (measured - other) / seen[k].variance;
             *kept = if *kept == 0.0 {
                 off
             } else {

@@ -70,6 +70,11 @@ impl VectorRate {
         }
     }
 
+    /// Forgets the stretch; the next cycle begins one.
+    pub(super) fn pause(&mut self) {
+        self.rates_b = [None; 2];
+    }
+
     /// Takes a cycle: rates without each gyro, and acceleration and field where they are directions fixed in n.
     pub(super) fn step(
         &mut self,

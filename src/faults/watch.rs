@@ -12,7 +12,7 @@
 use super::{
     health::Verdict,
     root::{reciprocal_root, root},
-    trace::{LONG, Limits, Trace, WILD},
+    trace::{Added, Bounds, LONG, Limits, Place, Trace, WILD, larger},
 };
 
 /// Cycles the learned offset goes back: 200 s at 5 Hz. Large: steps are seen sharper. Small: drifts are followed.
@@ -38,6 +38,8 @@ pub(super) struct Watch {
     trace: Trace,
     /// [unit2] variance of its noise.
     pub(super) noise: f32,
+    /// Of the noise that is counted in what is systematic, in its own.
+    relative: f32,
     /// [unit] learned disagreement.
     pub(super) offset: f32,
     /// [unit2] of the offset.
@@ -51,11 +53,13 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// An axis not seen yet, with noise of this variance, whose offset may have the other.
-    pub(super) fn new(noise: f32, allowed: f32) -> Self {
+    /// An axis not seen yet, with noise of this variance, whose offset may have the other; what is systematic is counted
+    /// in noise of the variance `counted_in`.
+    pub(super) fn new(noise: f32, allowed: f32, counted_in: f32) -> Self {
         Watch {
             trace: Trace::EMPTY,
             noise,
+            relative: counted_in / noise,
             offset: 0.0,
             offset_variance: allowed,
             allowed,
@@ -76,19 +80,29 @@ impl Watch {
         self.trace.full()
     }
 
-    /// Takes a cycle's disagreement beyond the offset; its variance and the systematic part of it are those of the axis
-    /// times `share`.
-    pub(super) fn note(&mut self, disagreement: f32, share: f32, systematic: f32) {
-        let per_noise = reciprocal_root(self.noise * share);
-        let systematic = root(systematic * share + self.offset_variance) * per_noise;
+    /// Takes a cycle's disagreement beyond the offset, whose noise has `share` times the variance of the axis's own.
+    /// `systematic` is the variance of what is systematic, in the noise that is counted in.
+    #[inline]
+    pub(super) fn note(&mut self, place: Place, disagreement: f32, share: f32, systematic: f32) {
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
-        let mut sigmas = disagreement * per_noise;
+        let mut sigmas = disagreement * reciprocal_root(self.noise * share);
         // The root is worth its while only beyond what it is at least.
         if sigmas.abs() > WILD {
-            let most = WILD * root(1.0 + systematic * systematic);
-            sigmas = sigmas.max(-most).min(most);
+            let most = WILD * root(1.0 + self.relative * systematic);
+            sigmas = if sigmas > most {
+                most
+            } else if sigmas < -most {
+                -most
+            } else {
+                sigmas
+            };
         }
-        self.trace.push(sigmas, systematic);
+        self.trace.push(place, sigmas);
+    }
+
+    /// Takes a cycle in which it was not read.
+    pub(super) fn miss(&mut self, place: Place) {
+        self.trace.push(place, 0.0);
     }
 
     /// Notes that the axis was beyond the gate in this cycle, or not.
@@ -97,8 +111,8 @@ impl Watch {
     }
 
     /// How near it is to an alarm, squared; above 1 there is one.
-    pub(super) fn alarm(&self, limits: Limits) -> f32 {
-        self.loudness(self.trace.over_squared(limits))
+    pub(super) fn alarm(&self, limits: Limits, added: &Added) -> f32 {
+        self.loudness(self.trace.over_squared(limits, added, self.relative))
     }
 
     fn loudness(&self, over: f32) -> f32 {
@@ -107,19 +121,36 @@ impl Watch {
             let loud = f32::from(self.strikes) / f32::from(STRIKES) + root(over);
             return loud * loud;
         }
-        let crept = self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed);
-        over.max(crept)
+        larger(self.crept(), over)
+    }
+
+    /// Square of the offset in parts of its limit.
+    fn crept(&self) -> f32 {
+        self.offset * self.offset / (OFFSET_LIMIT * OFFSET_LIMIT * self.allowed)
+    }
+
+    /// As [`Watch::learn`] of an axis whose window is within `bounds`, those of [`QUIET`], which most are; `None` of others.
+    #[inline]
+    pub(super) fn learn_quietly(&mut self, disagreement: f32, variance: f32, bounds: &Bounds) -> Option<()> {
+        let crept = self.offset * self.offset;
+        let quiet = self.trace.is_within(bounds) && crept <= QUIET * OFFSET_LIMIT * OFFSET_LIMIT * self.allowed;
+        quiet.then(|| self.learn_from(disagreement, variance))
+    }
+
+    fn learn_from(&mut self, disagreement: f32, variance: f32) {
+        let gain = self.offset_variance / variance;
+        self.offset += gain * disagreement;
+        let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
+        let learnt = self.offset_variance * (1.0 - gain) + forgotten;
+        self.offset_variance = if learnt < self.allowed { learnt } else { self.allowed };
     }
 
     /// Learns from a disagreement of this variance in all, unless something may be wrong; how near it is to an alarm, as
     /// [`Watch::alarm`] has it.
-    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits) -> f32 {
-        let over = self.trace.over_squared(limits);
-        if self.loudness(over) <= QUIET || !self.trace.full() {
-            let gain = self.offset_variance / variance;
-            self.offset += gain * disagreement;
-            let forgotten = self.noise * (1.0 / (MEMORY * MEMORY));
-            self.offset_variance = (self.offset_variance * (1.0 - gain) + forgotten).min(self.allowed);
+    pub(super) fn learn(&mut self, disagreement: f32, variance: f32, limits: Limits, added: &Added) -> f32 {
+        let over = self.trace.over_squared(limits, added, self.relative);
+        if larger(self.crept(), over) <= QUIET || !self.trace.full() {
+            self.learn_from(disagreement, variance);
         }
         self.loudness(over)
     }
@@ -144,14 +175,14 @@ impl Watch {
 
     /// Looks at an excluded axis after a cycle was noted: it comes back after a full window of agreement, and after each
     /// relapse only after twice as many.
-    pub(super) fn reconsider(&mut self) {
-        let agrees = self.trace.over_squared(SOUND) < 1.0;
+    pub(super) fn reconsider(&mut self, added: &Added) {
+        let agrees = self.trace.over_squared(SOUND, added, self.relative) < 1.0;
         self.sound_for = if agrees { self.sound_for.saturating_add(1) } else { 0 };
         if self.sound_for >= (LONG as u16) << self.relapses.saturating_sub(1) {
             self.verdict = Verdict::Sound;
             self.strikes = 0;
         } else if self.trace.full() && self.verdict.is_unnamed() && !agrees {
-            let (variance, expected) = self.trace.variance();
+            let (variance, expected) = self.trace.variance(added, self.relative);
             self.verdict = if variance > NOISY * expected {
                 Verdict::Noisy
             } else {

@@ -53,7 +53,7 @@ pub struct Scalar {
 /// The field of a window.
 pub struct Compared {
     pub scalars: [Scalar; 2],
-    /// [1] what norm and dip show of a disturbance.
+    /// [1] square of what norm and dip show of a disturbance.
     pub disturbance: f32,
 }
 
@@ -92,7 +92,10 @@ impl Reference {
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
     pub(super) fn compare(&self, params: &Params, duration_s: f32, mean: &MeanField) -> Option<Compared> {
-        let (north, east) = self.magnetic(&mean.mag_n);
+        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
+        let (sin_d, cos_d) = sin_cos(self.declination);
+        let (x, y) = (mean.mag_n.x, mean.mag_n.y);
+        let (north, east) = (cos_d * x + sin_d * y, cos_d * y - sin_d * x);
         let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
         let dip = RealField::atan2(mean.mag_n.z, horizontal);
         if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
@@ -102,8 +105,6 @@ impl Reference {
         let disturbance = self.deviation(norm, dip);
         let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
         let noise = |sd: f32| Noise::lasting(square(sd), params.field_lasts_s, duration_s).and_white(seen);
-        // The axes of the reference in n: the tilts it sees are about magnetic north and magnetic east.
-        let (sin_d, cos_d) = sin_cos(self.declination);
         Some(Compared {
             scalars: [
                 Scalar {
@@ -119,7 +120,7 @@ impl Reference {
                     noise: noise(params.dip_sd),
                 },
             ],
-            disturbance: ComplexField::sqrt(disturbance),
+            disturbance,
         })
     }
 
@@ -142,12 +143,6 @@ impl Reference {
 
     fn deviation(&self, norm_ut: f32, dip: f32) -> f32 {
         square(norm_ut / self.norm_ut - 1.0) + square(dip - self.dip)
-    }
-
-    /// Components along magnetic north and magnetic east.
-    fn magnetic(&self, v_n: &Vector3<f32>) -> (f32, f32) {
-        let (sin, cos) = sin_cos(self.declination);
-        (cos * v_n.x + sin * v_n.y, cos * v_n.y - sin * v_n.x)
     }
 
     /// The iron is another from now on; until now it was `iron_b` [uT]. A reference that was complete stands, a younger one

@@ -1,8 +1,9 @@
 //! One record for every scalar compared, and the correction that the scalars of a window add up to.
 
-use nalgebra::SVector;
-
-use super::covariance::{Covariance, STATES};
+use super::{
+    covariance::Seen,
+    state::{Row, State},
+};
 
 /// Most scalars of a window: bias 3, velocity 2, field 2.
 pub const INNOVATIONS: usize = 7;
@@ -77,46 +78,61 @@ impl Noise {
 }
 
 /// What the scalars of a window correct together.
-pub(super) struct Correction {
+pub(super) struct Correction<'a> {
     gate: f32,
     /// Scalars compared while this is `false` are recorded and not used.
     pub usable: bool,
     /// The error state as estimated so far.
-    pub error: SVector<f32, STATES>,
+    pub error: State,
     /// What was compared.
-    pub innovations: Innovations,
+    innovations: &'a mut Innovations,
 }
 
-impl Correction {
-    pub fn new(gate: f32) -> Self {
+/// A scalar to be compared.
+pub(super) struct Scalar<'a> {
+    pub quantity: Quantity,
+    /// As the state has it.
+    pub predicted: f32,
+    pub measured: f32,
+    /// `h`: how it depends on the error state at the end of the window.
+    pub row: Row<'a>,
+    /// `r`.
+    pub noise: Noise,
+}
+
+impl<'a> Correction<'a> {
+    pub fn new(gate: f32, innovations: &'a mut Innovations) -> Self {
         Correction {
             gate,
             usable: true,
-            error: SVector::zeros(),
-            innovations: Innovations::new(),
+            error: State::default(),
+            innovations,
         }
     }
 
-    /// Compares a scalar that depends on the error state by `rows` (index, factor). Whether it was accepted.
-    pub fn compare(
-        &mut self,
-        covariance: &mut Covariance,
-        quantity: Quantity,
-        predicted: f32,
-        measured: f32,
-        rows: &[(usize, f32)],
-        noise: Noise,
-    ) -> bool {
-        let explained: f32 = rows.iter().map(|(index, factor)| self.error[*index] * factor).sum();
-        let residual = measured - predicted - explained;
-        let seen = covariance.seen(rows, noise.lasting);
-        let variance = seen.variance - noise.lasting + noise.alone;
+    /// Compares a scalar. Whether it was accepted. The column of `own` is `P h'` of the covariance at the end of the window
+    /// before any of its scalars, and becomes that after the ones `before`, `P h' - sum k (p h')`; the covariance itself has
+    /// their updates later.
+    pub fn compare(&mut self, scalar: &Scalar, before: &[Seen], own: &mut Seen) -> bool {
+        let Scalar {
+            quantity,
+            predicted,
+            measured,
+            row,
+            noise,
+        } = *scalar;
+        let residual = measured - predicted - row.of(&self.error);
+        for seen in before {
+            own.column.add(&seen.column, -(row.of(&seen.column) / seen.variance));
+        }
+        let of_state = row.of(&own.column);
+        own.variance = of_state + noise.lasting;
+        let variance = of_state + noise.alone;
         let test_ratio = residual * residual / (self.gate * self.gate * variance);
         // Not greater than one, so that NaN is rejected too.
-        let accepted = self.usable && test_ratio <= 1.0;
+        let accepted = self.usable && variance > 0.0 && test_ratio <= 1.0;
         if accepted {
-            self.error += seen.column * (residual / seen.variance);
-            covariance.update(&seen);
+            self.error.add(&own.column, residual / own.variance);
         }
         // There are as many places as scalars.
         let _ = self.innovations.push(Innovation {
@@ -135,21 +151,32 @@ impl Correction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kalman::{Params, covariance::BIAS};
+    use crate::kalman::{Params, covariance::Covariance};
 
     #[test]
     fn an_error_that_lasts_is_one_witness_and_shows_once_in_the_residual() {
         const VARIANCE: f32 = 1e-6;
         let left = |lasts_s: f32| {
             let mut covariance = Covariance::new(&Params::ROOM);
-            let noise = Noise::lasting(VARIANCE, lasts_s, 1.0);
-            let mut correction = Correction::new(5.0);
+            let scalar = Scalar {
+                quantity: Quantity::Bias,
+                predicted: 0.0,
+                measured: 0.0,
+                row: Row::Driver(0),
+                noise: Noise::lasting(VARIANCE, lasts_s, 1.0),
+            };
+            let mut innovations = Innovations::new();
             for _ in 0..60 {
-                correction.innovations.clear();
-                correction.compare(&mut covariance, Quantity::Bias, 0.0, 0.0, &[(BIAS, 1.0)], noise);
+                innovations.clear();
+                let mut own = Seen {
+                    column: covariance.of_driver(0),
+                    variance: 0.0,
+                };
+                Correction::new(5.0, &mut innovations).compare(&scalar, &[], &mut own);
+                covariance.update(&own);
             }
-            let known = covariance.0[(BIAS, BIAS)];
-            let shown = correction.innovations[0].variance - VARIANCE;
+            let known = covariance.bias()[(0, 0)];
+            let shown = innovations[0].variance - VARIANCE;
             assert!(shown > 0.0 && shown < 1.2 * known, "{shown} {known}");
             known
         };

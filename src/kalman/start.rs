@@ -2,9 +2,9 @@
 //!
 //! In: a window's means. Out: attitude and covariance by TRIAD, bias and gyro matrix kept.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{ComplexField, Vector2, Vector3};
 
-use super::{Filter, Window, square, window::Means};
+use super::{Filter, Window, passage::walks, square, window::Means};
 use crate::{
     attitude::{dcm_nb, renormalised},
     triad::{Sighting, triad},
@@ -17,8 +17,9 @@ pub(super) const UNKNOWN: f32 = 1e3;
 const MUCH_BETTER: f32 = 0.1;
 
 impl Filter {
-    /// Counts rejections that say something of the attitude, and finds it afresh where it must be. Whether it did.
-    pub(super) fn recover(&mut self, means: &Means, bounded: bool, accepted: [Option<bool>; 2]) -> bool {
+    /// Counts rejections that say something of the attitude, and finds it afresh where it must be. Whether it did. Only
+    /// where it may have to be is the covariance's work done for it.
+    pub(super) fn recover(&mut self, means: &Means, accepted: [Option<bool>; 2]) -> bool {
         for (rejected_s, accepted) in self.rejected_s.iter_mut().zip(accepted) {
             match accepted {
                 Some(false) => *rejected_s += means.duration_s,
@@ -26,24 +27,28 @@ impl Filter {
                 None => {}
             }
         }
-        let worst = self.covariance.attitude().diagonal().max();
-        if !bounded
-            || self
-                .rejected_s
-                .into_iter()
-                .any(|rejected_s| rejected_s >= self.params.recovery_s)
-        {
+        let recovery_s = self.params.recovery_s;
+        let rejected = self.rejected_s.into_iter().any(|rejected_s| rejected_s >= recovery_s);
+        if rejected || core::mem::take(&mut self.unsound) {
+            self.settle();
             // What was rejected for so long may have taught the bias before, as when a gyro lied.
             self.covariance.forget_bias(self.params.bias_sd);
             return self.align(means, UNKNOWN);
         }
-        worst > square(self.params.lost_sd) && self.align(means, MUCH_BETTER * worst)
+        let lost = square(self.params.lost_sd);
+        // Scalars only make it less, and the drive makes it twice as much in no window that the gyros were heard in.
+        if 2.0 * (self.covariance.worst() + means.angle_variance) < lost {
+            return false;
+        }
+        self.settle();
+        let worst = self.covariance.worst();
+        worst > lost && self.align(means, MUCH_BETTER * worst)
     }
 
     /// TRIAD on the means of a window, both gathered in the axes that `q_nb` leads to. Whether it could, with no
     /// variance above `most` \[rad^2\].
     pub(super) fn align(&mut self, means: &Means, most: f32) -> bool {
-        let (Some(sums), true) = (means.field, means.near_one_g) else {
+        let (Some(sums), true) = (self.window.field(), means.near_one_g) else {
             return false;
         };
         let mean = self.mean_field(&sums);
@@ -51,7 +56,7 @@ impl Filter {
         let down = Sighting {
             seen_b: -means.acc_n,
             known_n: Vector3::z(),
-            seen_sd: means.tilt_sd,
+            seen_sd: ComplexField::sqrt(means.tilt_variance),
             known_sd: 0.0,
         };
         let field = Sighting {
@@ -67,8 +72,6 @@ impl Filter {
             return false;
         }
         self.q_nb = renormalised(found.q_nb * self.q_nb);
-        // What the window that has begun still knew of the one before was in other axes.
-        self.window = Window::default();
         let dcm = dcm_nb(&found.q_nb);
         self.covariance.align(&(dcm * found.covariance_b * dcm.transpose()));
         self.covariance.forget_velocity(means.start_velocity_sd(&self.params));
@@ -80,11 +83,13 @@ impl Filter {
 
     /// The attitude is not known any more; bias and matrix have aged.
     pub(super) fn lose(&mut self, since_s: f32) {
+        self.settle();
         self.silent_s = 0.0;
         self.window = Window::default();
         self.aligned = false;
         self.rate_b = Vector3::zeros();
         self.velocity_n = Vector2::zeros();
-        self.covariance.age(&self.params, since_s);
+        self.covariance.age(&self.params, &walks(&self.params, since_s));
+        self.settlements = self.settlements.wrapping_add(1);
     }
 }

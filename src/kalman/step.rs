@@ -82,7 +82,8 @@ const LONGEST_SAMPLE: f32 = 1e4;
 impl Sampled {
     /// Finite, and no larger than a sensor could give.
     pub(super) fn is_believable(&self) -> bool {
-        let norm = self.value_b.norm();
-        norm < LONGEST_SAMPLE && self.variance >= 0.0 && self.variance < LONGEST_SAMPLE
+        self.value_b.norm_squared() < LONGEST_SAMPLE * LONGEST_SAMPLE
+            && self.variance >= 0.0
+            && self.variance < LONGEST_SAMPLE
     }
 }

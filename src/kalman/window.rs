@@ -3,12 +3,9 @@
 //! In: each step's attitude, increment and samples in n. Out: how gyro errors turned into attitude error (`drive`), and
 //! [`Means`]: velocity gained, mean specific force and field in n, their spreads, and whether the unit was at rest.
 
-use nalgebra::{ComplexField, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{ComplexField, Matrix3, Vector2, Vector3};
 
-use super::{Params, covariance::BIAS, innovation::Noise, square};
-
-/// Gyro error states that drive the attitude: bias 3, matrix 9.
-pub const DRIVERS: usize = 12;
+use super::{Params, innovation::Noise, square, state::DRIVERS};
 
 /// Running sums.
 #[derive(Clone, Debug, Default)]
@@ -16,9 +13,9 @@ pub struct Window {
     /// [s] so far, gaps included.
     pub duration_s: f32,
     /// Attitude error by bias \[s\] and matrix \[rad\]: `-integral dcm_nb (1, gyro)`.
-    pub drive: SMatrix<f32, 3, DRIVERS>,
-    /// Its mean over the window: what a mean over the window saw of it.
-    pub mean_drive: SMatrix<f32, 3, DRIVERS>,
+    pub drive: [[f32; DRIVERS]; 3],
+    /// Its integral over the window, whose mean is what a mean over the window saw of it.
+    pub drive_integral: [[f32; DRIVERS]; 3],
     /// [rad^2] white variance of the attitude about each axis.
     pub angle_variance: f32,
     /// [rad^2] of it, the noise of the gyros' samples.
@@ -158,11 +155,11 @@ pub struct Means {
     pub velocity_change_variance: f32,
     /// [m2/s2] how far from zero the velocity itself may be.
     pub velocity_variance: f32,
-    /// [rad] of the direction of mean specific force as the vertical.
-    pub tilt_sd: f32,
+    /// [rad2] white variance of the attitude about each axis.
+    pub angle_variance: f32,
+    /// [rad2] of the direction of mean specific force as the vertical.
+    pub tilt_variance: f32,
     acc_spread: f32,
-    /// The field, if it was sampled.
-    pub field: Option<FieldSums>,
 }
 
 /// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
@@ -195,23 +192,28 @@ impl Window {
         if covered_s > 0.0 {
             self.rate_square += gyro_b.norm_squared() / covered_s;
         }
-        for axis in 0..3 {
-            let column = dcm_nb.column(axis);
-            for row in 0..3 {
-                self.drive[(row, axis)] -= column[row] * covered_s;
-                for about in 0..3 {
-                    self.drive[(row, 3 + 3 * axis + about)] -= column[row] * gyro_b[about];
-                }
+        // Samples are taken at the ends of steps.
+        let lasted_s = covered_s + gap_s;
+        let add = |(sum, integral): (&mut f32, &mut f32), gained: f32| {
+            *sum -= gained;
+            *integral += *sum * lasted_s;
+        };
+        for (axis, (drive, integral)) in self.drive.iter_mut().zip(&mut self.drive_integral).enumerate() {
+            let row = [0, 1, 2].map(|column| dcm_nb[(axis, column)]);
+            let (bias, matrix) = drive.split_at_mut(3);
+            let (bias_integral, matrix_integral) = integral.split_at_mut(3);
+            for (both, part) in bias.iter_mut().zip(bias_integral).zip(row) {
+                add(both, part * covered_s);
+            }
+            for (both, k) in matrix.iter_mut().zip(matrix_integral).zip(0..9) {
+                add(both, row[k / 3] * gyro_b[k % 3]);
             }
         }
-        // A running mean, weighted by time; samples are taken at the ends of steps.
-        let part = (covered_s + gap_s) / self.duration_s.max(f32::MIN_POSITIVE);
-        self.mean_drive += (self.drive - self.mean_drive) * part;
     }
 
     /// A sample of specific force.
     pub fn take_acc(&mut self, acc_n: &Vector3<f32>, variance: f32, gravity: f32) {
-        self.far_from_one_g |= !is_near(acc_n.norm(), gravity, SAMPLE_NEAR_ONE_G);
+        self.far_from_one_g |= !is_near(acc_n, gravity, SAMPLE_NEAR_ONE_G);
         self.acc.take(acc_n, variance);
     }
 
@@ -245,14 +247,9 @@ impl Window {
         sums.variance += variance;
     }
 
-    /// What a mean over the window sees of the error state, if at any instant it sees `row_n` of the attitude error: less
-    /// of what the gyros' errors added than there is at its end.
-    pub fn mean_rows(&self, row_n: &Vector3<f32>) -> [(usize, f32); BIAS + DRIVERS] {
-        let missed = (self.mean_drive - self.drive).transpose() * row_n;
-        core::array::from_fn(|index| match index {
-            0..BIAS => (index, row_n[index]),
-            _ => (index, missed[index - BIAS]),
-        })
+    /// The field, if it was sampled.
+    pub fn field(&self) -> Option<&FieldSums> {
+        (self.mag.count > 0.0).then_some(&self.mag)
     }
 
     /// What it all says.
@@ -275,7 +272,7 @@ impl Window {
         let vertical_s = if vertical { self.duration_s } else { 0.0 };
         let rest = !lift_off
             && near_one_g
-            && rate_b.norm() < params.rest.rate
+            && rate_b.norm_squared() < square(params.rest.rate)
             && rate_spread < square(params.rest.rate_spread)
             && acc_spread < square(params.rest.acc_spread);
         let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
@@ -296,9 +293,9 @@ impl Window {
                     + square(params.acc_excess * self.excess(params))
                     + missed),
             velocity_variance: if rest { square(params.velocity_rest_sd) } else { moving },
-            tilt_sd: ComplexField::sqrt(square(START_TILT_SD) + tilt_variance),
+            angle_variance: self.angle_variance,
+            tilt_variance: square(START_TILT_SD) + tilt_variance,
             acc_spread,
-            field: (self.mag.count > 0.0).then_some(self.mag),
         }
     }
 }
@@ -325,6 +322,9 @@ impl Means {
     }
 }
 
-fn is_near(norm: f32, gravity: f32, part: f32) -> bool {
-    ComplexField::abs(norm - gravity) < part * gravity
+/// Whether a specific force is within this part of one g; no root is needed for that.
+fn is_near(acc_n: &Vector3<f32>, gravity: f32, part: f32) -> bool {
+    let (least, most) = ((1.0 - part) * gravity, (1.0 + part) * gravity);
+    let squared = acc_n.norm_squared();
+    squared > least * least && squared < most * most
 }

@@ -10,6 +10,9 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod whole;
+
+#[cfg(target_os = "none")]
 mod counted {
     use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -30,8 +33,8 @@ mod counted {
     /// [s] between them.
     const DT_S: f32 = 0.02;
     /// [m/s2] specific force at rest, and [uT] field, north, east, down.
-    const FORCE_N: Vector3<f32> = Vector3::new(0.0, 0.0, -9.806_65);
-    const FIELD_N_UT: Vector3<f32> = Vector3::new(20.0, 0.0, 40.0);
+    pub const FORCE_N: Vector3<f32> = Vector3::new(0.0, 0.0, -9.806_65);
+    pub const FIELD_N_UT: Vector3<f32> = Vector3::new(20.0, 0.0, 40.0);
     /// SysTick counts down through so many bits.
     const COUNTER: u32 = 0x00FF_FFFF;
 
@@ -46,15 +49,15 @@ mod counted {
     static __INTERRUPTS: [u32; 1] = [0];
 
     /// What the sensors say at one instant.
-    struct Sample {
+    pub struct Sample {
         at_us: u64,
-        rate_b: Vector3<f32>,
+        pub rate_b: Vector3<f32>,
         force_b: Vector3<f32>,
         field_b_ut: Vector3<f32>,
     }
 
     /// The tumble: rates of some 40 deg/s about all axes.
-    fn motion(step: usize, q_nb: &mut UnitQuaternion<f32>) -> Sample {
+    pub fn motion(step: usize, q_nb: &mut UnitQuaternion<f32>) -> Sample {
         let t_s = step as f32 * DT_S;
         let rate_b = [(0.7, 0.5), (0.9, 0.4), (1.3, 0.6)].map(|(w, size): (f32, f32)| {
             let phase = nalgebra::ComplexField::sin(w * t_s);
@@ -70,14 +73,19 @@ mod counted {
         }
     }
 
+    /// What `work` gives, and the ticks it takes.
+    pub fn ticks<T>(work: impl FnOnce() -> T) -> (T, u32) {
+        let before = SYST::get_current();
+        let made = core::hint::black_box(work());
+        (made, before.wrapping_sub(SYST::get_current()) & COUNTER)
+    }
+
     /// Ticks that `update` takes for each sample, kept as those of `filter`.
     fn count(filter: usize, mut update: impl FnMut(&Sample)) {
         let mut q_nb = UnitQuaternion::identity();
         for step in 0..SETTLING + UPDATES {
             let sample = motion(step, &mut q_nb);
-            let before = SYST::get_current();
-            update(&sample);
-            let ticks = before.wrapping_sub(SYST::get_current()) & COUNTER;
+            let ((), ticks) = ticks(|| update(&sample));
             if let Some(update) = step.checked_sub(SETTLING) {
                 COSTS[filter * UPDATES + update].store(ticks, Ordering::Relaxed);
             }
@@ -145,6 +153,7 @@ mod counted {
             ours();
             madgwick();
             vqf();
+            super::whole::count();
             DONE.store(1, Ordering::Relaxed);
         }
         loop {

@@ -1,4 +1,5 @@
-//! Instructions of one update on the emulated board, ours beside published filters: the table of the README.
+//! Instructions on the emulated board: of one update, ours beside published filters, and of the whole estimation of a cycle
+//! with two parts of it. The tables of the README.
 //!
 //! Run it with `CARGO_PROFILE_RELEASE_OPT_LEVEL=3`, or it counts what the release profile's `s` makes.
 
@@ -19,6 +20,17 @@ const FILTERS: [&str; 3] = [
     "VQF (vqf-rs)",
 ];
 const UPDATES: usize = 600;
+
+/// As in the image, in its order.
+const PARTS: [&str; 6] = [
+    "tumble: calibration",
+    "tumble: fault detection and the three vectors",
+    "tumble: whole estimation of a cycle",
+    "rest: calibration",
+    "rest: fault detection and the three vectors",
+    "rest: whole estimation of a cycle",
+];
+const CYCLES: usize = 150;
 
 /// [ns] far longer than it takes.
 const LONGEST: Nanos = 4_000_000_000;
@@ -47,6 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         statics: vec![
             ("DONE".to_owned(), 4),
             ("COSTS".to_owned(), 4 * FILTERS.len() * UPDATES),
+            ("CYCLES".to_owned(), 4 * PARTS.len() * CYCLES),
         ],
         ..Options::default()
     };
@@ -67,17 +80,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     if words(&report.statics[0]) != [1] {
         return Err(format!("the image was not done after {} s", LONGEST / 1_000_000_000).into());
     }
-    println!("instructions of an update         least  median    mean    most");
+    println!("instructions of an update at 50 Hz              least  median    mean    most");
     for (name, costs) in FILTERS.iter().zip(words(&report.statics[1]).chunks(UPDATES)) {
-        let mut costs = costs.to_vec();
-        costs.sort_unstable();
-        let mean = costs.iter().sum::<u32>() / UPDATES as u32;
-        println!(
-            "{name:46} {:6} {:7} {mean:7} {:7}",
-            costs[0],
-            costs[UPDATES / 2],
-            costs[UPDATES - 1]
-        );
+        print(name, costs);
+    }
+    println!("instructions of a cycle at 5 Hz                 least  median    mean    most");
+    for (name, costs) in PARTS.iter().zip(words(&report.statics[2]).chunks(CYCLES)) {
+        print(name, costs);
     }
     Ok(())
+}
+
+fn print(name: &str, costs: &[u32]) {
+    let mut costs = costs.to_vec();
+    costs.sort_unstable();
+    let mean = costs.iter().sum::<u32>() / costs.len() as u32;
+    println!(
+        "{name:46} {:6} {:7} {mean:7} {:7}",
+        costs[0],
+        costs[costs.len() / 2],
+        costs[costs.len() - 1]
+    );
 }

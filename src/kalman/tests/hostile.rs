@@ -170,7 +170,7 @@ fn the_covariance_stays_positive_for_a_day_at_rest() {
             lift_off: false,
         });
     }
-    let least = world.filter.covariance.0.symmetric_eigenvalues().min();
+    let least = world.filter.covariance().matrix().symmetric_eigenvalues().min();
     assert!(least > 0.0, "{least}");
     assert!((world.filter.q_nb.norm() - 1.0).abs() < 1e-6);
     world.off_by_less_than(0.05);
