@@ -51,7 +51,7 @@ impl Filter {
         let (Some(sums), true) = (self.window.field(), means.near_one_g) else {
             return false;
         };
-        let mean = self.mean_field(&sums);
+        let mean = self.mean_field(sums);
         let disturbance = self.reference.disturbance(&mean.mag_n, &means.acc_n);
         let down = Sighting {
             seen_b: -means.acc_n,

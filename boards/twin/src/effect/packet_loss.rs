@@ -18,7 +18,7 @@ const PAGE: Page = Page {
     siblings: &["clock-rate", "latency", "read-skew"],
     confirm_by: "Count the packets on the line with another receiver.",
     scope: Scope::Unit,
-    sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
+    sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
     parameters: &[Symbol::signed("dt", "s", 0.2)],
     ..Page::SMOOTH
 };

@@ -42,4 +42,8 @@ impl Effect for WarmUp {
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![20.0, 40.0, 80.0, 160.0, 320.0]
     }
+
+    fn has_values_between(&self) -> bool {
+        true
+    }
 }
