@@ -20,6 +20,7 @@ pub use self::rival::Rival;
 use self::{
     passing::{always, bounded, fitted, stretches, taken},
     rival::compare,
+    variant::is_same,
 };
 use crate::{
     library::Library,
@@ -92,6 +93,11 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         progress(round as f64 / MOST_EFFECTS as f64);
         let base = estimate_of(library, &scores, &set);
         let mut gains = gains(library, &scores, &set, base);
+        for (candidate, gain) in gains.iter_mut().enumerate() {
+            if set.iter().any(|member| is_same(problem, library, *member, candidate)) {
+                *gain = f64::NEG_INFINITY;
+            }
+        }
         let stretches = stretches(problem, library, &set, &best, nothing, &mut gains);
         if round < DISCRETE_ROUNDS {
             add_discrete(problem, library, &set, &best, &mut gains);

@@ -16,6 +16,9 @@ use crate::{
 /// ten thousand.
 const HALVINGS: usize = 10;
 
+/// Values tried by which two of an effect with values between them are apart at least: either may move some way to the other.
+const APART: usize = 5;
+
 /// [nats] that make another value a better one.
 const SHARPER: f64 = 0.5;
 
@@ -60,6 +63,23 @@ fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
         .filter_map(|index| grid.get(index))
         .map(|value| (value - variant).abs());
     Some(0.5 * distances.fold(0.0, f64::max))
+}
+
+/// Whether two hypotheses are one with values between the variants tried: a warm-up of 80 s and one of 160 s are both one of
+/// 120 s, in two halves that the prior takes for smaller.
+pub fn is_same(problem: &Problem, library: &Library, member: usize, candidate: usize) -> bool {
+    let [member, candidate] = [member, candidate].map(|index| &library.hypotheses[index].cause);
+    let effect = member.effect;
+    if !effect.has_values_between()
+        || effect.page().name != candidate.effect.page().name
+        || member.locality != candidate.locality
+    {
+        return false;
+    }
+    let mut grid = effect.variants(problem.twin.starts_s());
+    grid.sort_by(f64::total_cmp);
+    let place = |variant: f64| grid.partition_point(|value| *value <= variant);
+    place(member.variant).abs_diff(place(candidate.variant)) < APART
 }
 
 /// A set refitted with another variant of its last member, whose columns are made anew.
