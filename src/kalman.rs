@@ -47,6 +47,8 @@ mod params;
 mod passage;
 mod path;
 mod pending;
+mod propagate;
+mod settle;
 mod start;
 mod state;
 mod step;
@@ -71,7 +73,7 @@ use self::{
     state::{GYRO_MATRIX, State, are_finite},
     window::{FieldSums, MeanField, Window},
 };
-use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
+use crate::attitude::{from_rotation_vector, renormalised};
 
 /// The filter: its parameters and its whole state.
 #[derive(Clone, Debug)]
@@ -162,16 +164,6 @@ impl Filter {
         self.q_nb * from_rotation_vector(self.rate_b * self.params.delays.gyro_s)
     }
 
-    /// Covariance of the error state as of the last window; what is pending is done on a copy.
-    pub fn covariance(&self) -> Covariance {
-        let (mut covariance, mut pending) = (self.covariance.clone(), self.pending.clone());
-        while !pending.is_done() {
-            pending.work(&mut covariance, Pace::Large);
-        }
-        covariance.keep_bounds();
-        covariance
-    }
-
     /// [rad^2] covariance of the attitude's error as a small rotation vector in n, as of the last window.
     pub fn attitude_covariance_n(&self) -> Matrix3<f32> {
         self.covariance().attitude()
@@ -180,13 +172,6 @@ impl Filter {
     /// [rad/s] bias covariance in b.
     pub fn bias_covariance_b(&self) -> Matrix3<f32> {
         self.covariance().bias()
-    }
-
-    /// The covariance as it was when it was last complete, and how often that was so, round and round; `None` while the
-    /// work of a window is half done.
-    pub fn settled(&self) -> Option<(&Covariance, u8)> {
-        let settled = (&self.covariance, self.settlements);
-        (!self.pending.is_half_done()).then_some(settled)
     }
 
     /// Takes a step.
@@ -241,101 +226,6 @@ impl Filter {
             });
         }
         self.spared = false;
-    }
-
-    /// Whether a step that ends then completes a window. If the gyros were heard.
-    pub fn closes_at(&self, at_us: u64) -> bool {
-        let since_s = self
-            .last_us
-            .map_or(0.0, |last_us| seconds(at_us.saturating_sub(last_us)));
-        self.window.duration_s + since_s >= self.params.window_s - HALF_A_MILLISECOND
-    }
-
-    /// Leaves the next step to others: what is pending waits for the one after it.
-    pub fn spare(&mut self) {
-        self.spared = true;
-    }
-
-    /// One stage of what is pending; at its end the covariance is looked at.
-    fn work(&mut self, pace: Pace) {
-        self.pending.work(&mut self.covariance, pace);
-        if self.pending.is_done() {
-            self.settlements = self.settlements.wrapping_add(1);
-            self.unsound = !self.covariance.keep_bounds();
-            if !self.covariance.is_finite() {
-                // Nothing can lead here with finite input; the radiation that flips a bit of the state can.
-                *self = Filter::new(self.params);
-            }
-        }
-    }
-
-    /// All that is pending.
-    fn settle(&mut self) {
-        while !self.pending.is_done() {
-            self.work(Pace::Large);
-        }
-    }
-
-    /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
-    fn propagate(&mut self, step: &Step, covered_s: f32, gap_s: f32, rotation: bool) -> Matrix3<f32> {
-        let gyro_b = if rotation { step.angle_b } else { Vector3::zeros() };
-        let began_b = core::mem::replace(&mut self.gyro_b, rotation.then_some(step.rate_b));
-        let rates_b = began_b
-            .filter(|_| gap_s < HALF_A_MILLISECOND)
-            .map(|began_b| [began_b, step.rate_b]);
-        // The gap comes before what the increment covers.
-        let bridged_b = self.rate_b * gap_s;
-        if gap_s > 0.0 {
-            self.q_nb *= from_rotation_vector(bridged_b);
-        }
-        let (ended_nb, mean) = path::through(&self.q_nb, &gyro_b, rates_b, covered_s);
-        let wrong_b = self.gyro_matrix * gyro_b + self.bias_b * covered_s;
-        let moved_n = mean * wrong_b + self.params.earth_rate_n * (covered_s + gap_s);
-        self.q_nb = renormalised(from_rotation_vector(-moved_n) * ended_nb);
-        let after = dcm_nb(&self.q_nb);
-        let params = &self.params;
-        let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
-            + params.turn_noise * params.turn_noise * (gyro_b - wrong_b + bridged_b).norm();
-        // The rate missed is one and the same all through a gap, however many steps it lasts.
-        let silent_s = self.silent_s + gap_s;
-        variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));
-        self.silent_s = if rotation { 0.0 } else { silent_s };
-        if rotation {
-            variance += step.angle_variance;
-            self.rate_b = step.rate_b - self.gyro_matrix * step.rate_b - self.bias_b;
-        }
-        if step.saturated {
-            variance += square(params.saturated_rate_sd * covered_s);
-        }
-        self.window.turn(&mean, &gyro_b, covered_s, gap_s, variance);
-        if rotation {
-            self.window.gyro_variance += step.angle_variance;
-        }
-        after
-    }
-
-    /// The samples of a step, each carried to n with the attitude at its own instant.
-    fn gather(&mut self, step: &Step, dcm: &Matrix3<f32>) {
-        let delays = self.params.delays;
-        let (rate_b, window_s) = (self.rate_b, self.params.window_s);
-        let carried = |sampled: Option<Sampled>, delay_s: f32| {
-            let sampled = sampled.filter(Sampled::is_believable)?;
-            let late_s = if sampled.at_us < step.at_us {
-                -seconds(step.at_us - sampled.at_us)
-            } else {
-                seconds(sampled.at_us - step.at_us)
-            };
-            let offset_s = late_s + delays.gyro_s - delay_s;
-            let near = offset_s > -window_s && offset_s < window_s;
-            near.then(|| (sampled, dcm * dcm_nb(&from_rotation_vector(rate_b * offset_s))))
-        };
-        if let Some((acc, dcm)) = carried(step.acc, delays.acc_s) {
-            self.window
-                .take_acc(&(dcm * acc.value_b), acc.variance, self.params.gravity);
-        }
-        if let Some((mag, dcm)) = carried(step.mag, delays.mag_s) {
-            self.window.take_mag(&mag.value_b, &dcm, mag.variance);
-        }
     }
 
     /// A window is complete: everything it measured. What that does to the covariance is pending.

@@ -88,6 +88,7 @@ impl Filter {
         self.window = Window::default();
         self.aligned = false;
         self.rate_b = Vector3::zeros();
+        self.gyro_b = None;
         self.velocity_n = Vector2::zeros();
         self.covariance.age(&self.params, &walks(&self.params, since_s));
         self.settlements = self.settlements.wrapping_add(1);
