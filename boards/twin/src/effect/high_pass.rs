@@ -37,7 +37,7 @@ impl Effect for HighPass {
     }
 
     fn told(&self, variant: f64) -> Option<String> {
-        Some(format!("with a corner of {variant} Hz"))
+        Some(format!("with a corner of {variant:.3} Hz"))
     }
 
     /// Corners [Hz].

@@ -1,5 +1,7 @@
 //! Where an effect acts when it acts on one channel, and what the description tells about the neighbours.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 
 use crate::environment::Environment;
@@ -59,11 +61,8 @@ impl Site<'_> {
         let channels = &self.unit.channels;
         if channels.iter().any(|channel| channel.instant_sigma_s.is_some()) {
             let chip = |channel: &Channel| (channel.group.clone(), channel.sensor);
-            let mut before: Vec<_> = channels.iter().map(chip).collect();
-            before.truncate(self.index);
-            before.retain(|other| *other != chip(self.channel));
-            before.dedup();
-            return before.len();
+            let before: BTreeSet<_> = channels.iter().take(self.index).map(chip).collect();
+            return before.len() - usize::from(before.contains(&chip(self.channel)));
         }
         let before = channels.iter().map(|channel| channel.slot_s);
         let mut before: Vec<f64> = before.filter(|slot_s| *slot_s < self.channel.slot_s).collect();
