@@ -28,13 +28,13 @@ pub struct Trace {
 /// Residuals of the channels whose gap is largest.
 pub fn traces(problem: &Problem, model: &Model) -> Vec<Trace> {
     let twin = problem.twin;
+    // In standard deviations of a sample: in units of noise a channel that scatters more than described is as quiet as any.
+    let gap = |channel: usize| {
+        let standard = problem.in_sigmas(channel, &problem.residual(channel, &[]));
+        standard.norm_squared() / standard.len().max(1) as f64
+    };
     let mut order: Vec<(usize, f64)> = (0..problem.frames.len())
-        .map(|channel| {
-            (
-                channel,
-                problem.residual(channel, &[]).norm_squared() / problem.frames[channel].series.rows.len().max(1) as f64,
-            )
-        })
+        .map(|channel| (channel, gap(channel)))
         .collect();
     order.sort_by(|one, other| other.1.total_cmp(&one.1));
     let trace = |(channel, _): &(usize, f64)| {
