@@ -211,7 +211,7 @@ impl Trace {
     }
 }
 
-/// The larger of two numbers; the second if either is none. `f32::max` is a call on the target.
+/// The larger of two numbers; the second if either is NaN. `f32::max` is a call on the target.
 pub(super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
