@@ -91,7 +91,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
                 own[frame.series.rows[row] as usize] / frame.weights[row]
             }),
             codes: codes(problem, index, &read[index]),
-            clock: clock(problem, index),
+            clock: clock(problem, index, &read[index]),
             instrument: instrument(problem, index),
             is_limited: problem.is_limited(index),
             levels: vec![
@@ -146,8 +146,8 @@ fn instrument(problem: &Problem, index: usize) -> Option<Instrument> {
     })
 }
 
-/// The clock of a channel's part at the fitted samples.
-fn clock(problem: &Problem, index: usize) -> Option<Clock> {
+/// The clock of a channel's part at the fitted samples, as far as it scatters them about what the channel is to `read`.
+fn clock(problem: &Problem, index: usize, read: &[f64]) -> Option<Clock> {
     let (twin, frame) = (problem.twin, &problem.frames[index]);
     let period_s = conversion_period_s(&twin.unit().channels[index]);
     let at_rows = |values: &[f64]| -> Vec<f64> {
@@ -157,10 +157,15 @@ fn clock(problem: &Problem, index: usize) -> Option<Clock> {
     let slopes = at_rows(&problem.true_twin().by_instant(index))
         .into_iter()
         .zip(frame.weights.iter());
-    (period_s > 0.0).then(|| Clock {
-        period_s,
-        instants_s: at_rows(&twin.instants_s(index)),
-        slopes: slopes.map(|(slope, weight)| slope / weight).collect(),
+    let expected = at_rows(read).into_iter().zip(frame.weights.iter());
+    let left = expected.zip(&frame.series.values);
+    (period_s > 0.0).then(|| {
+        let clock = Clock {
+            period_s,
+            instants_s: at_rows(&twin.instants_s(index)),
+            slopes: slopes.map(|(slope, weight)| slope / weight).collect(),
+        };
+        clock.as_shown(left.map(|((expected, weight), value)| (value - expected) / weight))
     })
 }
 

@@ -26,6 +26,9 @@ const SLOWEST: f64 = 0.1;
 /// Draws after which any beat will do: a clock and a sampling that are as slow as each other have no other.
 const TRIES: usize = 20;
 
+/// Squares to which one of a sample is cut, in units of what is expected.
+const FARTHEST: f64 = 16.0;
+
 /// [units of noise] to which the zero of a channel is known.
 const ZERO: f64 = 0.2;
 
@@ -105,6 +108,28 @@ pub fn simulate(
 }
 
 impl Clock {
+    /// A clock that scatters a channel as much as what is `left` of it shows, from not at all to evenly over a period: one that
+    /// keeps step with the cycle scatters nothing. By least squares of the squares, each with the weight that its own scatter
+    /// leaves it.
+    pub fn as_shown(mut self, left: impl Iterator<Item = f64>) -> Self {
+        let (mut along, mut energy) = (0.0, 0.0);
+        for (slope, left) in self.slopes.iter().zip(left).filter(|(_, left)| left.is_finite()) {
+            let even = (slope * self.period_s).powi(2) / 12.0;
+            let weight = (1.0 + even).powi(-2);
+            // One outlier is no scatter.
+            let square = left.powi(2).min(FARTHEST * (1.0 + even));
+            along += weight * even * (square - 1.0);
+            energy += weight * even * even;
+        }
+        let part = if energy > 0.0 {
+            (along / energy).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        self.slopes.iter_mut().for_each(|slope| *slope *= part.sqrt());
+        self
+    }
+
     /// Adds what a clock of unknown phase and rate makes of a channel. The mean age is the calibration's.
     fn age(&self, residual: &mut DVector<f64>, random: &mut Xoshiro256PlusPlus) {
         let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
@@ -124,6 +149,40 @@ impl Clock {
         let mean_s = ages_s.iter().sum::<f64>() / ages_s.len().max(1) as f64;
         for ((residual, age_s), slope) in residual.iter_mut().zip(ages_s).zip(&self.slopes) {
             *residual += slope * (age_s - mean_s);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    use super::*;
+
+    const SAMPLES: usize = 1500;
+
+    /// How much of its clock's scatter a channel is taken to have that has so much of it.
+    fn shown(part: f64) -> f64 {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+        let clock = Clock {
+            period_s: 0.02,
+            instants_s: (0..SAMPLES).map(|row| row as f64 * 0.2).collect(),
+            slopes: (0..SAMPLES).map(|row| 200.0 * (row as f64 * 0.05).cos()).collect(),
+        };
+        let mut left = DVector::zeros(SAMPLES);
+        clock.age(&mut left, &mut random);
+        left *= part.sqrt();
+        left.apply(|value| *value += Distribution::<f64>::sample(&StandardNormal, &mut random));
+        let shown = clock.clone().as_shown(left.iter().copied());
+        (shown.slopes[0] / clock.slopes[0]).powi(2)
+    }
+
+    #[test]
+    fn a_clock_scatters_as_much_as_its_channel_shows() {
+        // The squares of 1500 samples tell the part to a tenth.
+        for part in [0.0, 0.5, 1.0] {
+            let shown = shown(part);
+            assert!((shown - part).abs() < 0.3, "{part} {shown}");
         }
     }
 }
