@@ -20,6 +20,7 @@ mod shapes;
 mod simulated;
 mod spectrum;
 mod strength;
+mod sums;
 mod together;
 use aspects::{Label, Sights, coded};
 pub use codes::Codes;
@@ -52,6 +53,8 @@ pub struct View {
     pub name: String,
     /// Kind of sensor, an index.
     pub kind: usize,
+    /// The part it is of, an index: channels of one have one.
+    pub part: usize,
     /// Its axis in b.
     pub axis_b: Vector3<f64>,
     /// Place of each sample in the fitted time, 0 to 1.
@@ -129,7 +132,7 @@ impl Leftover {
 
 /// Least odds of "enough" that a p-value leaves: it speaks against it by at most `-1 / (e p ln p)` (Sellke, Bayarri and Berger
 /// 2001).
-fn odds(log_p: f64) -> f64 {
+pub(crate) fn odds(log_p: f64) -> f64 {
     if log_p < -1.0 {
         (1.0 + log_p + (-log_p).ln()).exp()
     } else {

@@ -3,7 +3,7 @@
 //! sensor along `n` feels.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use twin::predict::{Feel, Kind};
+use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
     leftover::{Clock, Codes, Instrument, LEVELS, View},
@@ -71,6 +71,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
                 Kind::Magnetometer => 2,
                 Kind::Thermometer => 3,
             },
+            part: part(problem, index),
             axis_b: channel.axis_b,
             phase: frame
                 .series
@@ -144,6 +145,14 @@ fn instrument(problem: &Problem, index: usize) -> Option<Instrument> {
         record,
         places: rows().map(|row| problem.twin.starts_s()[row] / step_s).collect(),
     })
+}
+
+/// The first channel of a channel's part: the sensors of one kind in a group are one.
+fn part(problem: &Problem, index: usize) -> usize {
+    let channels = &problem.twin.unit().channels;
+    let own = &channels[index];
+    let is_its = |other: &Channel| other.sensor == own.sensor && other.group == own.group;
+    channels.iter().position(is_its).unwrap_or(index)
 }
 
 /// The clock of a channel's part at the fitted samples, as far as it scatters them about what the channel is to `read`.

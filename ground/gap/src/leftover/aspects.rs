@@ -17,24 +17,15 @@
 use nalgebra::{DMatrix, Vector1};
 
 use super::{
-    Fitted, LEVELLED, LEVELS, STRETCHES, Suspect, View,
+    Fitted, LEVELLED, STRETCHES, Suspect, View,
     common::Common,
     shapes::{BINS, Shapes},
-    spectrum::Spectrum,
+    spectrum::{Spectrum, strongest},
     strength::Strength,
+    sums::{alike, between_levels, mean_logarithm, outliers, squares, tails},
     together,
 };
 use crate::place::octaves;
-
-/// Lags of the whiteness tests.
-const LAGS: usize = 10;
-
-/// [units of noise] to which samples are cut before their squares are compared: one blow is no noise that comes and goes.
-const CUT: f64 = 3.0;
-
-/// [units of noise] to which samples are cut before fourth powers are summed: one sample that is farther out has its say in
-/// the energy; here it would only make the simulated logs' own few hide everyone else's.
-const FAR: f64 = 5.0;
 
 /// [units of noise] within which a sample is where the one before was: what is sent again is as near as a calibration is right,
 /// and how near that is says nothing.
@@ -162,6 +153,13 @@ impl<'a> Sights<'a> {
             of_all.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
             of_all.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
         }
+        of_all.extend(self.parts().map(|part| {
+            let names: Vec<&str> = self
+                .of_part(part)
+                .map(|channel| self.views[channel].name.as_str())
+                .collect();
+            format!("{}: one frequency", names.join(" "))
+        }));
         of_all.extend(COMMON.map(|stretches| format!("all sensors: a common rotation in stretches of 1/{stretches}")));
         of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
         labels.extend(of_all.into_iter().map(|what| Label {
@@ -212,6 +210,16 @@ impl<'a> Sights<'a> {
         labels
     }
 
+    /// The parts that there are.
+    fn parts(&self) -> impl Iterator<Item = usize> {
+        (0..self.views.len()).filter(|index| self.views[*index].part == *index)
+    }
+
+    /// The channels of one.
+    fn of_part(&self, part: usize) -> impl Iterator<Item = usize> {
+        (0..self.views.len()).filter(move |index| self.views[*index].part == part)
+    }
+
     /// Kinds of the channels that an effect on the scatter is in.
     fn scattered_kinds(&self) -> impl Iterator<Item = usize> {
         let is_in = |kind: &usize| self.scattered.iter().any(|channel| self.views[*channel].kind == *kind);
@@ -225,11 +233,14 @@ impl<'a> Sights<'a> {
         let mut together = vec![[0.0; EACH]; kinds];
         let mut common = vec![DMatrix::zeros(BINS, 3); kinds];
         let mut stretches = vec![[0.0; STRETCHES]; kinds];
+        let mut shares = Vec::new();
         for (index, (view, shapes)) in self.views.iter().zip(&self.shapes).enumerate() {
             let rest = &fitted.rest[index];
             let values = rest.as_slice();
             let binned = shapes.binned(rest);
             let along = shapes.along(rest, &binned);
+            let transform = self.spectra[index].of(values);
+            shares.push(transform.shares());
             let mut own = vec![
                 rest.norm_squared(),
                 along.slow,
@@ -237,8 +248,8 @@ impl<'a> Sights<'a> {
                 along.motion,
                 alike(values),
                 alike(&squares(values)),
-                self.spectra[index].plainness(values),
-                values.iter().map(|value| value.clamp(-FAR, FAR).powi(4)).sum(),
+                transform.plainness(),
+                tails(values),
                 fitted.nuisance[index].norm_squared(),
             ];
             own.extend(view.levels.iter().map(|levels| between_levels(levels, values)));
@@ -259,6 +270,10 @@ impl<'a> Sights<'a> {
             sums.extend(self.factors[kind].iter().map(|factor| factor.sum(fitted)));
             sums.extend(stretches[kind]);
         }
+        sums.extend(
+            self.parts()
+                .map(|part| strongest(self.of_part(part).map(|channel| &shares[channel]))),
+        );
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
         let (mut sizes, mut distances) = (Vec::new(), Vec::new());
@@ -295,17 +310,6 @@ fn kinds(views: &[View]) -> usize {
     views.iter().map(|view| view.kind + 1).max().unwrap_or(0)
 }
 
-/// Places of what is far out.
-fn outliers(values: &[f64]) -> impl Iterator<Item = usize> + Clone {
-    (0..values.len()).filter(|at| values[*at].abs() > FAR)
-}
-
-/// Mean logarithm of sizes; zero where there are none.
-fn mean_logarithm(sizes: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = sizes.fold((0.0, 0.0), |(sum, count), size| (sum + size.ln(), count + 1.0));
-    if count > 0.0 { sum / count } else { 0.0 }
-}
-
 /// How long the waves are, in samples, of each of the [`octaves`] of so long a series.
 fn waves(count: usize) -> Vec<String> {
     let octaves = octaves::energies(&vec![0.0; count]).len();
@@ -319,31 +323,4 @@ fn waves(count: usize) -> Vec<String> {
 /// In which of so many equal parts of the log.
 pub fn place(phase: f64, of: usize) -> usize {
     ((phase * of as f64) as usize).min(of - 1)
-}
-
-/// Squares of the covariances of neighbours, in units of the energy.
-fn alike(values: &[f64]) -> f64 {
-    let energy: f64 = values.iter().map(|value| value * value).sum();
-    let covariances = (1..=LAGS).map(|lag| {
-        let pairs = values.iter().zip(values.iter().skip(lag));
-        pairs.map(|(a, b)| a * b).sum::<f64>().powi(2)
-    });
-    covariances.sum::<f64>() / energy.max(1.0)
-}
-
-/// Squares about their mean.
-fn squares(values: &[f64]) -> Vec<f64> {
-    let square = |value: &f64| value.clamp(-CUT, CUT).powi(2);
-    let mean = values.iter().map(square).sum::<f64>() / values.len().max(1) as f64;
-    values.iter().map(|value| square(value) - mean).collect()
-}
-
-/// Energy of the means of the levels.
-fn between_levels(levels: &[u8], values: &[f64]) -> f64 {
-    let mut sums = [(0.0, 0.0); LEVELS];
-    for (level, value) in levels.iter().zip(values) {
-        let (sum, count) = &mut sums[usize::from(*level).min(LEVELS - 1)];
-        (*sum, *count) = (*sum + value, *count + 1.0);
-    }
-    sums.iter().map(|(sum, count)| sum * sum / f64::max(*count, 1.0)).sum()
 }

@@ -17,6 +17,7 @@ fn scene() -> (Vec<View>, Joint) {
     let view = |channel: usize| View {
         name: format!("g{channel}"),
         kind: 1,
+        part: channel,
         axis_b: Vector3::ith(channel, 1.0),
         phase: phase.clone(),
         motion: DMatrix::from_fn(SAMPLES, 2, |row, column| {
@@ -32,7 +33,7 @@ fn scene() -> (Vec<View>, Joint) {
         clock: None,
         instrument: None,
         is_limited: false,
-        levels: vec![(0..SAMPLES).map(|row| (row % LEVELS) as u8).collect(); LEVELLED.len()],
+        levels: vec![(0..SAMPLES).map(|row| (row * row / 7 % LEVELS) as u8).collect(); LEVELLED.len()],
     };
     let columns = Columns {
         nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
@@ -352,7 +353,8 @@ fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
 fn a_wrong_law_is_found_by_the_steps_between_levels() {
     let left = judged(|channel, residual| {
         if channel == 0 {
-            let of_level = |row: usize| 0.3 * ((row % LEVELS) as f64 - 3.5) / 2.3;
+            let levels = scene().0[0].levels[0].clone();
+            let of_level = |row: usize| 0.3 * (f64::from(levels[row]) - 3.5) / 2.3;
             residual
                 .iter_mut()
                 .enumerate()

@@ -1,0 +1,58 @@
+//! Sums of one channel's residual that are squares or as good as such.
+//!
+//! In: residuals in units of noise. Out: numbers that noise alone keeps small, for [`super::aspects`].
+
+use super::LEVELS;
+
+/// Lags of the whiteness tests.
+const LAGS: usize = 10;
+
+/// [units of noise] to which samples are cut before their squares are compared: one blow is no noise that comes and goes.
+const CUT: f64 = 3.0;
+
+/// [units of noise] to which samples are cut before fourth powers are summed: one sample that is farther out has its say in
+/// the energy; here it would only make the simulated logs' own few hide everyone else's.
+const FAR: f64 = 5.0;
+
+/// Places of what is far out.
+pub fn outliers(values: &[f64]) -> impl Iterator<Item = usize> + Clone {
+    (0..values.len()).filter(|at| values[*at].abs() > FAR)
+}
+
+/// Fourth powers, which tell heavy tails.
+pub fn tails(values: &[f64]) -> f64 {
+    values.iter().map(|value| value.clamp(-FAR, FAR).powi(4)).sum()
+}
+
+/// Mean logarithm of sizes; zero where there are none.
+pub fn mean_logarithm(sizes: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = sizes.fold((0.0, 0.0), |(sum, count), size| (sum + size.ln(), count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Squares of the covariances of neighbours, in units of the energy.
+pub fn alike(values: &[f64]) -> f64 {
+    let energy: f64 = values.iter().map(|value| value * value).sum();
+    let covariances = (1..=LAGS).map(|lag| {
+        let pairs = values.iter().zip(values.iter().skip(lag));
+        pairs.map(|(a, b)| a * b).sum::<f64>().powi(2)
+    });
+    covariances.sum::<f64>() / energy.max(1.0)
+}
+
+/// Squares about their mean.
+pub fn squares(values: &[f64]) -> Vec<f64> {
+    let square = |value: &f64| value.clamp(-CUT, CUT).powi(2);
+    let mean = values.iter().map(square).sum::<f64>() / values.len().max(1) as f64;
+    values.iter().map(|value| square(value) - mean).collect()
+}
+
+/// Energy of the means of the levels.
+pub fn between_levels(levels: &[u8], values: &[f64]) -> f64 {
+    let mut sums = [(0.0, 0.0); LEVELS];
+    for (level, value) in levels.iter().zip(values) {
+        let (sum, count) = &mut sums[usize::from(*level).min(LEVELS - 1)];
+        (*sum, *count) = (*sum + value, *count + 1.0);
+    }
+    sums.iter().map(|(sum, count)| sum * sum / f64::max(*count, 1.0)).sum()
+}
