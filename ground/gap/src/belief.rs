@@ -9,6 +9,7 @@ use crate::{
     attribute::Chosen,
     cause::Cause,
     crossval::{self, Key},
+    fit_error::FitError,
     held::{
         Held,
         strength::{Claimed, Promise},
@@ -20,7 +21,7 @@ use crate::{
 };
 
 /// Prior probability that a unit has something the library does not.
-const UNKNOWN_PRIOR: f64 = 0.05;
+pub const UNKNOWN_PRIOR: f64 = 0.05;
 
 /// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
 /// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
@@ -125,6 +126,7 @@ impl Promised {
 pub fn promises(
     held: &Held,
     problem: &Problem,
+    library: &Library,
     model: &Model,
     chosen: &[Chosen],
     louder: &[f64],
@@ -134,19 +136,15 @@ pub fn promises(
         // They were withdrawn.
         return Vec::new();
     }
-    let actives: Vec<_> = model
-        .components
-        .iter()
-        .map(|component| component.active.clone())
-        .collect();
+    let error = FitError::of(problem, model);
     let promised = |(index, cause): (usize, &mut Cause)| {
         let added = problem.added(&model.components, index);
         let open: Vec<_> = added.iter().map(|(channel, _)| problem.still_open(*channel)).collect();
+        let hypothesis = &library.hypotheses[chosen[index].hypothesis];
         let promise = held.promise(Claimed {
             added: &added,
             open: &open,
-            slopes: &problem.twin.jacobian(&actives, index),
-            covariance: &chosen[index].covariance,
+            error: &error.with_value(problem, model, index, hypothesis),
             after: &model.predicted,
             sigmas: &problem.sigmas,
             louder,

@@ -159,6 +159,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let promises = promises(
         &subject.held,
         &problem,
+        &library,
         model,
         &found.chosen,
         &explanation.louder,

@@ -102,6 +102,12 @@ impl Joint {
         fitted
     }
 
+    /// Covariance of the effects' parameters.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let precision = self.precision.as_ref();
+        precision.map_or_else(|| DMatrix::zeros(0, 0), Cholesky::inverse)
+    }
+
     /// Columns of each channel.
     pub fn columns(&self) -> impl Iterator<Item = &Columns> {
         self.channels.iter().map(|channel| &channel.columns)

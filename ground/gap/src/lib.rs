@@ -26,6 +26,7 @@ pub mod crossval;
 pub mod diagnose;
 pub mod evidence;
 pub mod explain;
+pub mod fit_error;
 pub mod gram;
 pub mod gross;
 pub mod held;

@@ -4,7 +4,10 @@ mod gyros;
 
 use std::fs;
 
-use gap::{case::Subject, command::taught, diagnose::Diagnosis, terminal, verdict::Verdict};
+use gap::{
+    attribute::attribute, case::Subject, command::taught, diagnose::Diagnosis, fit_error::FitError, library::Library,
+    model::Model, problem::Problem, terminal, verdict::Verdict,
+};
 use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -218,4 +221,33 @@ fn a_tone_is_not_called_a_walk_of_the_zero() {
     let hummed = diagnosed_in(&erring(tone, ""), &[]).1;
     assert!(hummed.causes.is_empty(), "{:?}", hummed.causes);
     assert!(hummed.none_of_these > 0.9, "{}", hummed.none_of_these);
+}
+
+/// [s] time constants of a warm-up, none of which is tried as it is.
+const TAUS_S: [f64; 6] = [55.0, 66.0, 95.0, 110.0, 128.0, 140.0];
+
+/// How far the time constant that is found for a warm-up of `tau_s` is off, in standard deviations of what it is said to be
+/// off by.
+fn off(tau_s: f64) -> f64 {
+    let folder = erring(|t_s| 0.02 * (-t_s / tau_s).exp(), "");
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let mut library = Library::new(&problem, &[], &|_| {});
+    let found = attribute(&problem, &mut library, &|_| {});
+    let hypothesis = &library.hypotheses[found.chosen[0].hypothesis];
+    assert_eq!(hypothesis.effect(), "gyro-warm-up", "{tau_s} s");
+    let model = Model::around(&problem, found.model(&library));
+    let error = FitError::of(&problem, &model).with_value(&problem, &model, 0, hypothesis);
+    let variance = error.covariance[(error.slopes.len() - 1, error.slopes.len() - 1)];
+    let found_s = hypothesis.cause.variant;
+    println!("{tau_s} s: {found_s:.1} +- {:.1} s", variance.sqrt());
+    (found_s - tau_s) / variance.sqrt()
+}
+
+#[test]
+fn a_time_constant_is_off_by_as_much_as_is_said() {
+    let off = TAUS_S.map(off);
+    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
+    // Moved as long as that is worth a tenth of a nat, which is half a standard deviation; one log of noise.
+    assert!((0.2..1.5).contains(&rms), "{off:?}");
 }

@@ -3,10 +3,9 @@
 //! In: a set of hypotheses, refined. Out: the same set refined with another value, whose columns the library then has, or as
 //! it was.
 
-use twin::effect::onsets;
-
 use super::passing::renew;
 use crate::{
+    fit_error::grid,
     library::{Hypothesis, Library},
     problem::Problem,
     refine::{Refined, refine},
@@ -20,7 +19,7 @@ const HALVINGS: usize = 10;
 const APART: usize = 5;
 
 /// [nats] that make another value a better one.
-const SHARPER: f64 = 0.5;
+const SHARPER: f64 = 0.1;
 
 /// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step
 /// that is seconds off, or a limit that is a percent off, leaves more than most effects make.
@@ -48,15 +47,7 @@ pub(super) fn sharpened(problem: &Problem, library: &mut Library, set: &[usize],
 
 /// Half the way to the farther neighbour of a hypothesis' variant; `None` where there is nothing between.
 fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
-    let starts_s = problem.twin.starts_s();
-    let (effect, variant) = (hypothesis.cause.effect, hypothesis.cause.variant);
-    let grid: Vec<f64> = if effect.has_values_between() {
-        effect.variants(starts_s)
-    } else if hypothesis.places.is_empty() {
-        return None;
-    } else {
-        onsets(starts_s).collect()
-    };
+    let (grid, variant) = (grid(problem, hypothesis)?, hypothesis.cause.variant);
     let at = grid.iter().position(|value| *value == variant)?;
     let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
     let distances = neighbours

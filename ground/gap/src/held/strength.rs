@@ -5,10 +5,9 @@
 //! that only happened to look like the truth on the fit windows.
 
 use nalgebra::{DMatrix, DVector};
-use twin::predict::Column;
 
 use super::Held;
-use crate::next::erfc;
+use crate::{fit_error::FitError, leftover::odds, next::erfc};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]
@@ -18,10 +17,8 @@ pub struct Claimed<'a> {
     /// For each of them what its fitted calibration still leaves open, a row for a column that is known to one: its standard
     /// deviation at every row of the log, in physical units.
     pub open: &'a [DMatrix<f64>],
-    /// The effect's slopes by each of its parameters, channels with values of every row, in physical units.
-    pub slopes: &'a [Column],
-    /// Covariance of those parameters.
-    pub covariance: &'a DMatrix<f64>,
+    /// What everything that is fitted may be off by.
+    pub error: &'a FitError,
     /// Predictions of every row with everything in, channel by channel.
     pub after: &'a [Vec<f64>],
     /// Standard deviation of a sample at every row, channel by channel.
@@ -35,7 +32,7 @@ pub struct Claimed<'a> {
 pub struct Promise {
     /// Best factor.
     pub factor: f64,
-    /// Its standard deviation: of the held-out noise, of the calibration, and of the parameters, which a motion may show
+    /// Its standard deviation: of the held-out noise, of the calibration, and of all that was fitted, which a motion may show
     /// otherwise than the fit windows' did.
     pub sigma: f64,
 }
@@ -48,13 +45,17 @@ const TOLERATED: f64 = 0.25;
 const SHOWN: f64 = 0.5;
 
 impl Promise {
-    /// Probability that a true effect is as far from one.
+    /// How far a true effect may be as far from one, 0 to 1: the odds that the probability of that leaves it.
     pub fn confidence(&self) -> f64 {
         if self.sigma > SHOWN {
             return 1.0;
         }
         let away = ((self.factor - 1.0).abs() - TOLERATED).max(0.0);
-        erfc(away / self.sigma / core::f64::consts::SQRT_2)
+        odds(
+            erfc(away / self.sigma / core::f64::consts::SQRT_2)
+                .max(f64::MIN_POSITIVE)
+                .ln(),
+        )
     }
 }
 
@@ -62,7 +63,7 @@ impl Held {
     /// How strong an effect is here, apart from what the calibration may still do; nothing where it adds nothing.
     pub fn promise(&self, claimed: Claimed) -> Option<Promise> {
         let (mut energy, mut along) = (0.0, 0.0);
-        let mut by_parameter = DVector::zeros(claimed.slopes.len());
+        let mut by_parameter = DVector::zeros(claimed.error.slopes.len());
         for ((channel, added), open) in claimed.added.iter().zip(claimed.open) {
             let series = &self.channels[*channel];
             let sigma = |row: usize| claimed.sigmas[*channel][row] * claimed.louder[*channel];
@@ -84,7 +85,7 @@ impl Held {
             let apart = &own - &nuisance * inner.solve(&imitated);
             energy += apart.dot(&own);
             along += apart.dot(&rest);
-            for (sum, slope) in by_parameter.iter_mut().zip(claimed.slopes) {
+            for (sum, slope) in by_parameter.iter_mut().zip(&claimed.error.slopes) {
                 let Some((_, values)) = slope.entries.iter().find(|(index, _)| index == channel) else {
                     continue;
                 };
@@ -96,13 +97,15 @@ impl Held {
         }
         (energy > 0.0).then(|| Promise {
             factor: 1.0 + along / energy,
-            sigma: (energy + by_parameter.dot(&(claimed.covariance * &by_parameter)).max(0.0)).sqrt() / energy,
+            sigma: (energy + by_parameter.dot(&(&claimed.error.covariance * &by_parameter)).max(0.0)).sqrt() / energy,
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use twin::predict::Column;
+
     use super::*;
     use crate::log::Series;
 
@@ -126,16 +129,19 @@ mod tests {
         let added = [(0, (0..SAMPLES).map(|row| sine(row, 0.1)).collect())];
         let open = [DMatrix::from_element(1, SAMPLES, 100.0)];
         let after = [(0..SAMPLES).map(|row| sine(row, 0.1)).collect()];
-        let slopes = [Column {
+        let amplitude = Column {
             name: "amplitude".into(),
             sigma: 1.0,
             entries: added.to_vec(),
-        }];
+        };
+        let error = FitError {
+            slopes: vec![amplitude],
+            covariance: DMatrix::from_element(1, 1, fitted_sigma * fitted_sigma),
+        };
         let claimed = Claimed {
             added: &added,
             open: &open,
-            slopes: &slopes,
-            covariance: &DMatrix::from_element(1, 1, fitted_sigma * fitted_sigma),
+            error: &error,
             after: &after,
             sigmas: &[vec![0.1; SAMPLES]],
             louder: &[1.0],
