@@ -8,7 +8,7 @@ use std::fmt::Write;
 pub use place::{places, when};
 pub use shrink::shrink;
 
-use crate::{case::Subject, diagnose::Diagnosis};
+use crate::{belief::UNKNOWN_PRIOR, case::Subject, diagnose::Diagnosis};
 
 /// Columns of a screen.
 const WIDTH: usize = 118;
@@ -202,6 +202,8 @@ fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::f
     if diagnosis.causes.is_empty() {
         let said = if diagnosis.none_of_these > 0.5 {
             "NONE OF THESE: nothing in the library explains what is there"
+        } else if diagnosis.gate.unknown(UNKNOWN_PRIOR) > 0.5 {
+            "UNDECIDED: there is a gap, but no cause of it is likelier than not"
         } else {
             "NO EFFECT beyond calibration and noise"
         };
