@@ -5,7 +5,8 @@
 //! (expected log predictive density; Vehtari, Gelman and Gabry 2017; blocks, because neighbouring rows are alike).
 //!
 //! Evidence is the first key, this is the second: where they disagree the smaller confidence holds. An effect that shows
-//! in one block only (a shock, a lost packet) cannot be predicted from the others, so there it has no say.
+//! in one block only (a shock, a lost packet) cannot be predicted from the others, so there it has no say; nor has it where the
+//! calibration, refitted, predicts as well without the effect: a zero beyond what is known of zeros is told by its size alone.
 //!
 //! The calibration is refitted in every fold; the model is linear about the parameters found.
 
@@ -24,6 +25,9 @@ const BLOCKS: usize = 10;
 
 /// Share of an effect's energy in one block from which it counts as an event.
 const EVENT: f64 = 0.5;
+
+/// [nats] by which blocks would be better predicted if the effect were there, below which they say nothing.
+const SAID: f64 = 3.0;
 
 /// What cross-validation says of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,31 +55,49 @@ fn erfc_of(z: f64) -> f64 {
     if z >= 0.0 { tail } else { 2.0 - tail }
 }
 
-/// A key for each effect of the model, in its order; `None` for one that is an event.
+/// A key for each effect of the model, in its order; `None` where it has no say.
 pub fn keys(problem: &Problem, library: &Library, model: &Model) -> Vec<Option<Key>> {
     let blocks = blocks(problem);
-    let with = losses(problem, library, model, &blocks);
+    let with = errors(problem, library, model, &blocks);
     let key = |index: usize| {
         if is_event(problem, &model.components, index, &blocks) {
             return None;
         }
         let mut others = model.components.clone();
         others.remove(index);
-        let without = losses(problem, library, &Model::around(problem, others), &blocks);
-        Some(key_of(&without, &with))
+        let without = errors(problem, library, &Model::around(problem, others), &blocks);
+        key_of(&without, &with)
     };
     (0..model.components.len()).map(key).collect()
 }
 
-fn key_of(without: &[f64], with: &[f64]) -> Key {
-    let gains: Vec<f64> = without.iter().zip(with).map(|(without, with)| without - with).collect();
+/// From the errors on each block, without the effect and with it.
+fn key_of(without: &[Vec<DVector<f64>>], with: &[Vec<DVector<f64>>]) -> Option<Key> {
+    let blocks = || without.iter().zip(with);
+    let sum = |block: (&Vec<DVector<f64>>, &Vec<DVector<f64>>), of: fn(&DVector<f64>, &DVector<f64>) -> f64| -> f64 {
+        block
+            .0
+            .iter()
+            .zip(block.1)
+            .map(|(without, with)| 0.5 * of(without, with))
+            .sum()
+    };
+    let promised: f64 = blocks()
+        .map(|block| sum(block, |without, with| (without - with).norm_squared()))
+        .sum();
+    if promised < SAID {
+        return None;
+    }
+    let gains: Vec<f64> = blocks()
+        .map(|block| sum(block, |without, with| without.norm_squared() - with.norm_squared()))
+        .collect();
     let count = gains.len() as f64;
     let gain: f64 = gains.iter().sum();
     let variance = gains.iter().map(|one| (one - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
-    Key {
+    Some(Key {
         gain,
         error: (count * variance).sqrt(),
-    }
+    })
 }
 
 /// By channel, the block of each fitted sample.
@@ -100,8 +122,8 @@ fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &
     most > EVENT * energies.iter().sum::<f64>()
 }
 
-/// Half the squared error on each block, left out of the fit.
-fn losses(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usize>]) -> Vec<f64> {
+/// The errors on each block, left out of the fit, channel by channel.
+fn errors(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usize>]) -> Vec<Vec<DVector<f64>>> {
     let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
     for component in &model.components {
         let parameters = component.active.cause.parameters(problem.twin.unit());
@@ -125,39 +147,53 @@ fn losses(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usi
         });
         chosen.unzip()
     };
-    let loss = |block: usize| -> f64 {
+    let error = |block: usize| {
         let (columns, values) = part(block, false);
         let found = Joint::new(columns, &sigmas).fit(&values);
         let (columns, values) = part(block, true);
         let channels = columns.iter().zip(&values).zip(&found.nuisance);
-        let squares = channels.map(|((columns, values), nuisance)| {
-            (values - &columns.nuisance * nuisance - &columns.effects * &found.parameters).norm_squared()
-        });
-        0.5 * squares.sum::<f64>()
+        channels
+            .map(|((columns, values), nuisance)| {
+                values - &columns.nuisance * nuisance - &columns.effects * &found.parameters
+            })
+            .collect()
     };
-    (0..BLOCKS).map(loss).collect()
+    (0..BLOCKS).map(error).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The key of an effect that is worth so many nats in each block, beside an error of its own.
+    fn key(nats: &[f64]) -> Option<Key> {
+        let block = |worse: f64| vec![DVector::from_column_slice(&[3.0, (2.0 * worse.max(0.0)).sqrt()])];
+        let without: Vec<_> = nats.iter().map(|nats| block(*nats)).collect();
+        let with: Vec<_> = nats.iter().map(|nats| block(-nats)).collect();
+        key_of(&without, &with)
+    }
+
     #[test]
     fn a_steady_gain_is_believed_and_one_lucky_block_is_not() {
-        let steady = key_of(
-            &[12.0, 11.0, 13.0, 12.5, 11.5, 12.0, 11.0, 13.0, 12.0, 12.0],
-            &[10.0; 10],
+        let steady = key(&[2.0, 1.0, 3.0, 2.5, 1.5, 2.0, 1.0, 3.0, 2.0, 2.0]).expect("a say");
+        assert!(
+            (steady.gain - 20.0).abs() < 1e-9 && steady.confidence() > 0.999,
+            "{steady:?}"
         );
-        assert!(steady.confidence() > 0.999, "{steady:?}");
-        let mut lucky = [10.0; 10];
-        lucky[3] = 30.0;
-        let lucky = key_of(&lucky, &[10.1; 10]);
+        let mut lucky = [-0.1; 10];
+        lucky[3] = 20.0;
+        let lucky = key(&lucky).expect("a say");
         assert!(lucky.confidence() < 0.85, "{lucky:?}");
     }
 
     #[test]
     fn an_effect_that_predicts_worse_is_not_believed() {
-        let worse = key_of(&[10.0, 10.1, 9.9, 10.0], &[11.0, 11.2, 10.9, 11.0]);
+        let worse = key(&[-1.0, -1.1, -1.0, -1.0]).expect("a say");
         assert!(worse.confidence() < 0.01, "{worse:?}");
+    }
+
+    #[test]
+    fn an_effect_without_which_blocks_are_predicted_as_well_is_told_by_others() {
+        assert_eq!(key(&[0.1, -0.1, 0.2, -0.1, 0.1]), None);
     }
 }
