@@ -71,14 +71,23 @@ impl FitError {
     }
 }
 
-/// The values of a hypothesis between which others are possible, in order; `None` where there are none.
+/// The values about that of a hypothesis between which others are possible, in order; `None` where there are none.
 pub fn grid(problem: &Problem, hypothesis: &Hypothesis) -> Option<Vec<f64>> {
     let starts_s = problem.twin.starts_s();
-    let effect = hypothesis.cause.effect;
-    let mut grid = effect.variants(starts_s);
-    let is_onset = !hypothesis.places.is_empty() && grid == onsets(starts_s).collect::<Vec<f64>>();
+    let cause = &hypothesis.cause;
+    let mut grid = cause.effect.variants(starts_s);
+    if !cause.effect.has_values_between() {
+        let onsets: Vec<f64> = onsets(starts_s).collect();
+        let is_other = |value: &f64| !onsets.contains(value);
+        let others: Vec<f64> = grid.iter().copied().filter(is_other).collect();
+        let is_onset = grid.len() == others.len() + onsets.len() && !others.contains(&cause.variant);
+        if !is_onset || hypothesis.places.is_empty() {
+            return None;
+        }
+        grid = onsets;
+    }
     grid.sort_by(f64::total_cmp);
-    (effect.has_values_between() || is_onset).then_some(grid)
+    Some(grid)
 }
 
 /// The covariance of parameters that follow a value of this variance by `along`, and of that value.

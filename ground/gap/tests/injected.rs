@@ -251,3 +251,20 @@ fn a_time_constant_is_off_by_as_much_as_is_said() {
     // Moved as long as that is worth a tenth of a nat, which is half a standard deviation; one log of noise.
     assert!((0.2..1.5).contains(&rms), "{off:?}");
 }
+
+#[test]
+fn an_onset_beside_other_variants_is_moved_to_where_it_is() {
+    // A supply's variants are a ramp and onsets; 71 s is none of them.
+    let folder = erring(|t_s| if t_s > 71.0 { 0.02 } else { 0.0 }, "");
+    let said = diagnosed_in(&folder, &["gyro-bias"]).1;
+    let supply = said
+        .causes
+        .iter()
+        .find(|cause| cause.effect == "gyro-supply")
+        .expect("a supply");
+    assert!(
+        supply.which.as_deref().is_some_and(|told| told.contains("71")),
+        "{:?}",
+        supply.which
+    );
+}
