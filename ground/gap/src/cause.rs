@@ -51,6 +51,8 @@ pub struct Cause {
     pub channels: Vec<usize>,
     /// Probability of this effect here against all others and nothing.
     pub probability: f64,
+    /// Its part of the probability that it or any that could stand in its place is there.
+    pub of_any: f64,
     /// [nats] over the model without it.
     pub gain: f64,
     /// Its parameters.
@@ -67,6 +69,13 @@ pub struct Cause {
     pub physics: &'static str,
     /// It is so large that it may stand for something else.
     pub is_suspicious: bool,
+}
+
+impl Cause {
+    /// Probability that it or any that could stand in its place is there.
+    pub fn any(&self) -> f64 {
+        self.probability / self.of_any.max(f64::MIN_POSITIVE)
+    }
 }
 
 /// The chosen effects as causes; their shares are still energies.
@@ -101,6 +110,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
                 .map(|(channel, _)| *channel)
                 .collect(),
             probability: probability(library, chosen),
+            of_any: probability(library, chosen) / probability_of_any(library, chosen).max(f64::MIN_POSITIVE),
             gain: chosen.gain,
             is_suspicious: oversize(page, &chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
             parameters,
@@ -145,6 +155,7 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
         locality: subject.names(scatter.channels.iter().copied()).join(" "),
         channels: scatter.channels.clone(),
         probability: 1.0 / (1.0 + (-gain).exp()),
+        of_any: 1.0,
         gain: scatter.gain,
         parameters,
         share: 2.0 * scatter.gain,

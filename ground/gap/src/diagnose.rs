@@ -169,9 +169,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let scatter = explanation.scatter.as_ref();
     causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
     belief.weigh(&mut causes);
-    // One of a set that cannot be told apart is there, but none of them is likelier than not: no name.
-    let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) =
-        causes.into_iter().partition(|cause| cause.probability >= SAID);
+    // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier than
+    // not.
+    let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|cause| cause.any() >= SAID);
+    let is_decided = causes.iter().all(|cause| cause.probability >= SAID);
     share_out(&mut causes);
     let mut alternatives = alternatives(&library, found, &explanation.refused);
     let trust_in_others = if found.chosen.is_empty() {
@@ -191,7 +192,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
         place.passage = Some(Passage::of(&problem, span));
     }
-    let correction = is_named
+    let correction = (is_named && is_decided)
         .then(|| Correction::of(&subject.twin, &model.components))
         .flatten();
     let finished = if is_named {
@@ -232,7 +233,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             .components
             .iter()
             // What comes and goes is no property of the unit.
-            .filter(|component| is_named && component.span.is_none())
+            .filter(|component| is_named && is_decided && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
         rivals: confusion::pair(&library, found),

@@ -1,5 +1,6 @@
 //! The verdict on one screen.
 
+mod causes;
 mod place;
 mod shrink;
 
@@ -8,13 +9,10 @@ use std::fmt::Write;
 pub use place::{places, when};
 pub use shrink::shrink;
 
-use crate::{belief::UNKNOWN_PRIOR, case::Subject, diagnose::Diagnosis};
+use crate::{case::Subject, diagnose::Diagnosis};
 
 /// Columns of a screen.
 const WIDTH: usize = 118;
-
-/// Parameters of a cause that are printed; the rest is in the files.
-const PRINTED: usize = 4;
 
 /// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
 const REMAINS: f64 = 2.5;
@@ -82,7 +80,7 @@ pub fn limits(diagnosis: &Diagnosis) -> String {
 pub fn why(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
-    let _ = gross(&mut text, subject, diagnosis).and_then(|()| causes(&mut text, subject, diagnosis));
+    let _ = gross(&mut text, subject, diagnosis).and_then(|()| causes::write(&mut text, subject, diagnosis));
     for (effect, key) in &diagnosis.keys {
         let _ = writeln!(
             text,
@@ -171,7 +169,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     )?;
     place::line(text, diagnosis)?;
     gross(text, subject, diagnosis)?;
-    causes(text, subject, diagnosis)?;
+    causes::write(text, subject, diagnosis)?;
     held_out(text, subject, diagnosis)?;
     if diagnosis.causes.is_empty() {
         let weakest: Vec<String> = diagnosis
@@ -196,99 +194,6 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         }
     }
     writeln!(text, "NEXT    {next_experiment}")
-}
-
-fn causes(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
-    if diagnosis.causes.is_empty() {
-        let said = if diagnosis.none_of_these > 0.5 {
-            "NONE OF THESE: nothing in the library explains what is there"
-        } else if diagnosis.gate.unknown(UNKNOWN_PRIOR) > 0.5 {
-            "UNDECIDED: there is a gap, but no cause of it is likelier than not"
-        } else {
-            "NO EFFECT beyond calibration and noise"
-        };
-        writeln!(text, "CAUSE   {said}")?;
-    }
-    for cause in &diagnosis.causes {
-        writeln!(
-            text,
-            "CAUSE   {} at {}, probability {:.3}, {:.0} % of what is explained",
-            cause.effect,
-            cause.locality,
-            cause.probability,
-            100.0 * cause.share
-        )?;
-        writeln!(text, "        {}", cause.physics)?;
-        for sized in cause.parameters.iter().take(PRINTED) {
-            writeln!(
-                text,
-                "        {} = {:.4e} +- {:.1e} {}",
-                sized.parameter.name,
-                sized.value,
-                1.96 * sized.sigma,
-                sized.parameter.unit
-            )?;
-        }
-        if cause.parameters.len() > PRINTED {
-            writeln!(text, "        and {} more parameters", cause.parameters.len() - PRINTED)?;
-        }
-        if cause.is_suspicious {
-            writeln!(
-                text,
-                "        more than five times its usual size: it may stand for something else"
-            )?;
-        }
-        writeln!(
-            text,
-            "        where {}; when {}",
-            subject.names(cause.channels.iter().copied()).join(" "),
-            cause.when
-        )?;
-        if let Some(which) = &cause.which {
-            writeln!(text, "        which: {which}")?;
-        }
-        writeln!(text, "        confirm: {}", cause.confirm_by)?;
-    }
-    if !diagnosis.withdrawn.is_empty() {
-        writeln!(
-            text,
-            "        withdrawn (no shrink on held-out data, or too many at once): {}",
-            diagnosis.withdrawn.join(", ")
-        )?;
-    }
-    let others: Vec<String> = diagnosis
-        .alternatives
-        .iter()
-        .take(3)
-        .map(|(name, probability)| format!("{name} {probability:.3}"))
-        .collect();
-    if !others.is_empty() {
-        writeln!(text, "OR      {}", others.join(", "))?;
-    }
-    for set in &diagnosis.indistinguishable {
-        writeln!(text, "        this motion cannot tell apart: {}", set.join(", "))?;
-    }
-    writeln!(
-        text,
-        "NONE    something outside the library is needed with probability {:.3}",
-        diagnosis.none_of_these
-    )?;
-    for aspect in diagnosis
-        .leftover
-        .aspects
-        .iter()
-        .take(3)
-        .filter(|_| diagnosis.none_of_these > 0.5)
-    {
-        writeln!(text, "        left: {} ({:.1} sigma)", aspect.what, aspect.size)?;
-    }
-    if let Some(p) = diagnosis.leftover.again.filter(|_| diagnosis.none_of_these > 0.5) {
-        writeln!(
-            text,
-            "        the first of them is as large on the held-out windows as it is by chance with probability {p:.3}"
-        )?;
-    }
-    Ok(())
 }
 
 /// The held-out gap in three lines: channels, attitude, what got worse.

@@ -268,3 +268,21 @@ fn an_onset_beside_other_variants_is_moved_to_where_it_is() {
         supply.which
     );
 }
+
+#[test]
+fn one_of_a_set_that_cannot_be_told_apart_is_a_cause_and_corrects_nothing() {
+    // A sine of one frequency: a delay and a lag are the same.
+    let folder = erring(|t_s| rate(t_s - 0.02) - rate(t_s), "");
+    let (subject, said) = diagnosed_in(&folder, &[]);
+    let cause = said.causes.first().expect("a cause");
+    assert!(
+        cause.probability < 0.5 && cause.any() > 0.9,
+        "{} of {}",
+        cause.probability,
+        cause.any()
+    );
+    assert!(said.indistinguishable.iter().any(|set| set.contains(&cause.effect)));
+    assert!(said.correction.is_none() && said.known.is_empty());
+    let screen = terminal::screen(&subject, &said, "");
+    assert!(screen.contains("perhaps"), "{screen}");
+}
