@@ -6,7 +6,7 @@
 
 use crate::{
     attribute::attribute,
-    belief::{Belief, Promised, promises, second_keys},
+    belief::{Belief, Promised, UNKNOWN_PRIOR, promises, second_keys},
     case::Subject,
     cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, share_out},
     confusion, contribution,
@@ -140,15 +140,17 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     } else {
         Vec::new()
     };
-    if explanation.is_empty() {
-        // Without the effects what is left is all there was.
-        left = gate.clone();
-        let found = left.aspects.first().filter(|_| left.p < DOUBTFUL);
-        left.again = found.and_then(|aspect| {
+    // Without effects what is left is all there was.
+    let all_there_was = || {
+        let found = gate.aspects.first().filter(|_| gate.p < DOUBTFUL);
+        let again = found.and_then(|aspect| {
             progress("again", 0.0);
             subject.held.recurrence(&subject.twin, &subject.reference, &aspect.what)
         });
-        shrink = subject.held.judge(without);
+        (Leftover { again, ..gate.clone() }, subject.held.judge(without))
+    };
+    if explanation.is_empty() {
+        (left, shrink) = all_there_was();
     }
 
     progress("confusion", 0.0);
@@ -172,6 +174,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier than
     // not.
     let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|cause| cause.any() >= SAID);
+    let mut none_of_these = belief.unknown;
+    if causes.is_empty() && !unnamed.is_empty() {
+        // What is not likely enough to be said may be there, or something else.
+        (left, shrink) = all_there_was();
+        let is_not = unnamed.iter().map(|cause| 1.0 - cause.any().min(1.0)).product::<f64>();
+        none_of_these = none_of_these.max(left.unknown(UNKNOWN_PRIOR) * is_not);
+    }
     let is_decided = causes.iter().all(|cause| cause.probability >= SAID);
     share_out(&mut causes);
     let mut alternatives = alternatives(&library, found, &explanation.refused);
@@ -223,7 +232,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         gate,
         alternatives,
         indistinguishable: confusion::sets(&library, found),
-        none_of_these: belief.unknown,
+        none_of_these,
         leftover: left,
         shrink,
         alone: alone(&library, found),
