@@ -4,11 +4,12 @@
 //! name. A test that looks at many shapes at once sees none of them well, so each suspicion has a sum of its own. Of a
 //! channel, and of all channels of a kind together, for what is small in each of twelve is large in all: its energy; slow
 //! shapes in time; shapes in time and motion together ([`super::shapes`]); the motion itself; neighbouring samples alike
-//! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone ([`super::spectrum`]); heavy tails; the size
-//! of the fitted calibration, without which an unknown effect hides in the calibration; steps between levels of one
-//! quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of all channels together: the energy of a stretch of time; the same vector in all
-//! sensors of a kind; the same factor, as of a supply they share; the same small rotation in all sensors, which a loose
-//! mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
+//! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone
+//! ([`super::spectrum`]); heavy tails; the size of the fitted calibration, without which an unknown effect hides in the
+//! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of
+//! a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that comes and
+//! goes in all of a kind; the same vector in all sensors of a kind; the same factor, as of a supply they share; the same small
+//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
 //! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
 //! it claims, and outliers the size and the distance from the sample before, no more and no less: a law of outliers "anywhere in
 //! the range" would else stand for any, values that are sent again among them; and whether channels that scatter each by itself
@@ -22,7 +23,7 @@ use super::{
     shapes::{BINS, Shapes},
     spectrum::{Spectrum, strongest},
     strength::Strength,
-    sums::{alike, between_levels, mean_logarithm, outliers, squares, tails},
+    sums::{Bursts, alike, between_levels, mean_logarithm, outliers, squares, tails},
     together,
 };
 use crate::place::octaves;
@@ -33,6 +34,9 @@ const NEAR: f64 = 1.2;
 
 /// Stretches in which vectors, factors and rotations common to sensors are sought: of seconds, and of a minute.
 const COMMON: [usize; 2] = [60, 12];
+
+/// Stretches in which the noise of a kind of sensor comes and goes: of seconds.
+const BURSTS: [usize; 2] = [150, 60];
 
 const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
 
@@ -152,6 +156,7 @@ impl<'a> Sights<'a> {
             of_all.extend(COMMON.map(|stretches| format!("{name}: a common vector in stretches of 1/{stretches}")));
             of_all.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
             of_all.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
+            of_all.extend(BURSTS.map(|stretches| format!("{name}: noise that comes and goes in 1/{stretches}")));
         }
         of_all.extend(self.parts().map(|part| {
             let names: Vec<&str> = self
@@ -233,6 +238,7 @@ impl<'a> Sights<'a> {
         let mut together = vec![[0.0; EACH]; kinds];
         let mut common = vec![DMatrix::zeros(BINS, 3); kinds];
         let mut stretches = vec![[0.0; STRETCHES]; kinds];
+        let mut bursts: Vec<_> = (0..kinds).map(|_| BURSTS.map(Bursts::new)).collect();
         let mut shares = Vec::new();
         for (index, (view, shapes)) in self.views.iter().zip(&self.shapes).enumerate() {
             let rest = &fitted.rest[index];
@@ -241,13 +247,14 @@ impl<'a> Sights<'a> {
             let along = shapes.along(rest, &binned);
             let transform = self.spectra[index].of(values);
             shares.push(transform.shares());
+            let squares = squares(values);
             let mut own = vec![
                 rest.norm_squared(),
                 along.slow,
                 along.any,
                 along.motion,
                 alike(values),
-                alike(&squares(values)),
+                alike(&squares),
                 transform.plainness(),
                 tails(values),
                 fitted.nuisance[index].norm_squared(),
@@ -259,9 +266,13 @@ impl<'a> Sights<'a> {
             (together[view.kind].iter_mut().zip(&own)).for_each(|(all, own)| *all += own);
             sums.extend(own);
             common[view.kind] += &binned * view.axis_b.transpose();
-            for (phase, value) in view.phase.iter().zip(values).filter(|_| !view.is_limited) {
+            if view.is_limited {
+                continue;
+            }
+            for (phase, value) in view.phase.iter().zip(values) {
                 stretches[view.kind][place(*phase, STRETCHES)] += value * value;
             }
+            (bursts[view.kind].iter_mut()).for_each(|bursts| bursts.add(&view.phase, &squares));
         }
         for kind in 0..kinds {
             sums.extend(together[kind]);
@@ -269,6 +280,7 @@ impl<'a> Sights<'a> {
             sums.extend(self.vectors[kind].iter().map(|vector| vector.sum(fitted)));
             sums.extend(self.factors[kind].iter().map(|factor| factor.sum(fitted)));
             sums.extend(stretches[kind]);
+            sums.extend(bursts[kind].iter().map(Bursts::sum));
         }
         sums.extend(
             self.parts()

@@ -2,7 +2,7 @@
 //!
 //! In: residuals in units of noise. Out: numbers that noise alone keeps small, for [`super::aspects`].
 
-use super::LEVELS;
+use super::{LEVELS, aspects::place};
 
 /// Lags of the whiteness tests.
 const LAGS: usize = 10;
@@ -45,6 +45,39 @@ pub fn squares(values: &[f64]) -> Vec<f64> {
     let square = |value: &f64| value.clamp(-CUT, CUT).powi(2);
     let mean = values.iter().map(square).sum::<f64>() / values.len().max(1) as f64;
     values.iter().map(|value| square(value) - mean).collect()
+}
+
+/// Squares of several channels in stretches of time: noise that comes and goes does so in all of a kind at once, and in each
+/// of them it may be weak.
+pub struct Bursts {
+    stretches: Vec<(f64, f64)>,
+}
+
+impl Bursts {
+    /// None yet, in so many stretches.
+    pub fn new(stretches: usize) -> Self {
+        Bursts {
+            stretches: vec![(0.0, 0.0); stretches],
+        }
+    }
+
+    /// Adds a channel: squares about their mean, and the place of each sample in time, 0 to 1. Over their spread, or louder
+    /// noise would come and go more.
+    pub fn add(&mut self, phases: &[f64], squares: &[f64]) {
+        let of = self.stretches.len();
+        let energy: f64 = squares.iter().map(|square| square * square).sum();
+        let spread = (energy / squares.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+        for (phase, square) in phases.iter().zip(squares) {
+            let (sum, count) = &mut self.stretches[place(*phase, of)];
+            (*sum, *count) = (*sum + square / spread, *count + 1.0);
+        }
+    }
+
+    /// The energy of their means.
+    pub fn sum(&self) -> f64 {
+        let energy = |(sum, count): &(f64, f64)| sum * sum / f64::max(*count, 1.0);
+        self.stretches.iter().map(energy).sum()
+    }
 }
 
 /// Energy of the means of the levels.

@@ -138,3 +138,16 @@ fn an_effect_on_the_scatter_is_held_to_the_energy_that_it_claims() {
     };
     assert!(p_with(true) > 0.05 && p_with(false) < 0.01);
 }
+
+#[test]
+fn noise_that_comes_and_goes_in_all_of_a_kind_is_seen_where_it_is_weak_in_each() {
+    // Half a sigma more, in an eighth of the time.
+    let left = judged(|_, residual| {
+        (residual.iter_mut().enumerate()).for_each(|(row, value)| *value *= if row / 20 % 8 == 3 { 1.6 } else { 1.0 });
+    });
+    let first = &left.aspects[0].what;
+    assert!(
+        left.p < 0.01 && first.contains("gyros: noise that comes and goes"),
+        "{left:?}"
+    );
+}
