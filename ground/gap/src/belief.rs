@@ -9,6 +9,7 @@ use crate::{
     attribute::Chosen,
     cause::Cause,
     crossval::{self, Key},
+    events::Events,
     held::{
         Held,
         strength::{Claimed, Promise},
@@ -128,6 +129,7 @@ pub fn promises(
     model: &Model,
     chosen: &[Chosen],
     louder: &[f64],
+    events: Option<&Events>,
     causes: &mut [Cause],
 ) -> Vec<Promised> {
     if causes.len() != model.components.len() || chosen.len() != causes.len() {
@@ -150,6 +152,7 @@ pub fn promises(
             after: &model.predicted,
             sigmas: &problem.sigmas,
             louder,
+            events,
         })?;
         let confidence = promise.confidence();
         let believed = cause.probability;
