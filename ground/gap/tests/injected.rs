@@ -227,6 +227,18 @@ fn packets_that_are_lost_again_in_the_held_out_windows_are_lost_packets() {
 }
 
 #[test]
+fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
+    // Nine prior sigmas: two of half the size would be likelier by a quarter of 9^2 nats, did they count as two.
+    let warm = diagnosed_in(&erring(|t_s| 0.027 * (-t_s / 57.0).exp(), ""), &[]).1;
+    let names: Vec<&str> = warm.promises.iter().map(|promised| promised.effect).collect();
+    assert_eq!((names.as_slice(), warm.causes.len()), (["gyro-warm-up"].as_slice(), 1));
+    let which = warm.causes[0].which.as_deref().expect("a time constant");
+    let tau_s: f64 = which.split(' ').find_map(|word| word.parse().ok()).expect("a number");
+    // A fiftieth of its amplitude is noise, and its zero is open.
+    assert!((tau_s - 57.0).abs() < 4.0, "{which}");
+}
+
+#[test]
 fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     let folder = rewritten(case(|_| 0.02), |cells| cells[2].clear());
     let (subject, diagnosis) = diagnosed_in(&folder, &[]);
