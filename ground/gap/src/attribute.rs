@@ -20,7 +20,7 @@ pub use self::rival::Rival;
 use self::{
     passing::{always, bounded, fitted, stretches, taken},
     rival::compare,
-    variant::is_same,
+    variant::is_any_same,
 };
 use crate::{
     library::Library,
@@ -92,12 +92,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     for round in 0..MOST_EFFECTS {
         progress(round as f64 / MOST_EFFECTS as f64);
         let base = estimate_of(library, &scores, &set);
-        let mut gains = gains(library, &scores, &set, base);
-        for (candidate, gain) in gains.iter_mut().enumerate() {
-            if set.iter().any(|member| is_same(problem, library, *member, candidate)) {
-                *gain = f64::NEG_INFINITY;
-            }
-        }
+        let mut gains = gains(problem, library, &scores, &set, base);
         let stretches = stretches(problem, library, &set, &best, nothing, &mut gains);
         if round < DISCRETE_ROUNDS {
             add_discrete(problem, library, &set, &best, &mut gains);
@@ -107,7 +102,8 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         }
         let is_contested = stretches.iter().any(Option::is_some);
         let mut found: Option<(f64, Vec<usize>)> = None;
-        for candidate in leading(&gains, CANDIDATES) {
+        let candidates = leading(&gains, CANDIDATES);
+        for (at, candidate) in candidates.iter().copied().enumerate() {
             let mut larger = set.clone();
             larger.push(candidate);
             let refined = fitted(
@@ -116,7 +112,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
                 &larger,
                 &best.thetas,
                 stretches[candidate],
-                is_contested,
+                is_contested && !is_any_same(problem, library, &candidates[..at], candidate),
             );
             let gain = refined.log_evidence - best.log_evidence + library.hypotheses[candidate].log_prior;
             if is_physical(library, &larger, &refined) && found.as_ref().is_none_or(|(most, _)| gain > *most) {
@@ -224,17 +220,17 @@ fn places(library: &Library, set: &[usize]) -> Vec<usize> {
 
 fn estimate_of(library: &Library, scores: &[f64], set: &[usize]) -> f64 {
     let places = places(library, set);
-    let all: Vec<usize> = (0..places.len()).collect();
-    let estimate = library.screen(&places, scores).estimate(&all);
-    estimate.map_or(f64::NEG_INFINITY, |estimate| estimate.log_evidence)
+    let log_evidence = library.screen(&places, scores).log_evidence();
+    log_evidence.unwrap_or(f64::NEG_INFINITY)
 }
 
-/// Gain of adding each hypothesis to a set, prior odds included; one that adds no column gains nothing.
-fn gains(library: &Library, scores: &[f64], set: &[usize], base: f64) -> Vec<f64> {
+/// Gain of adding each hypothesis to a set, prior odds included; one that adds no column, or that the set has with another
+/// value, gains nothing.
+fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], base: f64) -> Vec<f64> {
     let known = places(library, set);
     let gain = |(index, hypothesis): (usize, &crate::library::Hypothesis)| {
         let is_new = !hypothesis.places.is_empty() && hypothesis.places.iter().all(|place| !known.contains(place));
-        if !is_new || set.contains(&index) {
+        if !is_new || set.contains(&index) || is_any_same(problem, library, set, index) {
             return f64::NEG_INFINITY;
         }
         let mut larger = set.to_vec();

@@ -9,6 +9,7 @@ use crate::{
     attribute::Chosen,
     cause::Cause,
     crossval::{self, Key},
+    events::Events,
     fit_error::FitError,
     held::{
         Held,
@@ -130,6 +131,7 @@ pub fn promises(
     model: &Model,
     chosen: &[Chosen],
     louder: &[f64],
+    events: Option<&Events>,
     causes: &mut [Cause],
 ) -> Vec<Promised> {
     if causes.len() != model.components.len() || chosen.len() != causes.len() {
@@ -148,6 +150,7 @@ pub fn promises(
             after: &model.predicted,
             sigmas: &problem.sigmas,
             louder,
+            events,
         })?;
         let confidence = promise.confidence();
         let believed = cause.probability;

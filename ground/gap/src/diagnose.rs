@@ -12,6 +12,7 @@ use crate::{
     confusion, contribution,
     correction::Correction,
     crossval::Key,
+    events::Events,
     explain::{Explanation, SAID},
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
@@ -129,10 +130,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         recalibrated: &quiet.predicted,
         after: &quiet.predicted,
         louder: &as_described,
+        events: None,
     };
+    let events = Events::of(&problem, &explanation.model);
     let mut shrink = subject.held.judge(Finished {
         after: &explanation.model.predicted,
         louder: &explanation.louder,
+        events: events.as_ref(),
         ..without
     });
     let withdrawn = if !shrink.supports_the_effect() || explanation.is_patchwork() {
@@ -165,6 +169,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         model,
         &found.chosen,
         &explanation.louder,
+        events.as_ref(),
         &mut causes,
     );
     let belief = Belief::of(&left, explanation.energy(&quiet), &promises);
@@ -208,6 +213,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         Finished {
             after: &model.predicted,
             louder: &explanation.louder,
+            events: events.as_ref(),
             ..without
         }
     } else {

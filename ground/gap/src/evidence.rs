@@ -9,7 +9,7 @@
 //! Probabilities are `P(e) ~ prior_e Z_e^(1/tau)`. `tau` is above 1 because the truth may lie outside the list, where a
 //! posterior would otherwise be certain of the least wrong (Yao, Vehtari, Simpson and Gelman 2018).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::gram::log_determinant;
 
@@ -62,13 +62,7 @@ impl Screen {
     pub fn estimate(&self, columns: &[usize]) -> Option<Estimate> {
         let width = columns.len();
         let sigma = |index: usize| self.prior_sigmas[columns[index]];
-        // In units of the prior the matrix is I plus something positive: as well conditioned as it gets.
-        let scaled = DMatrix::from_fn(width, width, |row, column| {
-            f64::from(u8::from(row == column))
-                + sigma(row) * self.information[(columns[row], columns[column])] * sigma(column)
-        });
-        let score = DVector::from_fn(width, |row, _| sigma(row) * self.score[columns[row]]);
-        let factor = Cholesky::new(scaled)?;
+        let (factor, score) = self.factored(columns)?;
         let solved = factor.solve(&score);
         let fall = score.dot(&solved);
         let log_evidence = 0.5 * fall - 0.5 * log_determinant(&factor);
@@ -82,6 +76,27 @@ impl Screen {
             energy_explained: fall,
         };
         estimate.log_evidence.is_finite().then_some(estimate)
+    }
+
+    /// [nats] over the model without them, of all columns: what [`Screen::estimate`] says, for a third of the work.
+    pub fn log_evidence(&self) -> Option<f64> {
+        let all: Vec<usize> = (0..self.prior_sigmas.len()).collect();
+        let (factor, mut score) = self.factored(&all)?;
+        factor.l_dirty().solve_lower_triangular_mut(&mut score);
+        let log_evidence = 0.5 * score.norm_squared() - 0.5 * log_determinant(&factor);
+        log_evidence.is_finite().then_some(log_evidence)
+    }
+
+    /// Information, factored, and score in units of the prior: I plus something positive, as well conditioned as it gets.
+    fn factored(&self, columns: &[usize]) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+        let width = columns.len();
+        let sigma = |index: usize| self.prior_sigmas[columns[index]];
+        let scaled = DMatrix::from_fn(width, width, |row, column| {
+            f64::from(u8::from(row == column))
+                + sigma(row) * self.information[(columns[row], columns[column])] * sigma(column)
+        });
+        let score = DVector::from_fn(width, |row, _| sigma(row) * self.score[columns[row]]);
+        Some((Cholesky::new(scaled)?, score))
     }
 
     /// Of the energy that parameters `theta` of some columns put into the data, the share that other columns can imitate,

@@ -10,8 +10,10 @@
 //! ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
 //!
 //! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
-//! [`strength`]; in [`recurrence`], whether what nothing explains is there too.
+//! [`strength`]; in [`recurrence`], whether what nothing explains is there too. What happens at random happens here at instants
+//! of its own ([`course`]).
 
+mod course;
 mod recurrence;
 pub mod stages;
 pub mod strength;
@@ -21,7 +23,8 @@ use core::fmt;
 use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use crate::log::Series;
+use self::course::Said;
+use crate::{events::Events, log::Series};
 
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
@@ -64,6 +67,19 @@ pub struct Finished<'a> {
     pub after: &'a [Vec<f64>],
     /// How much more a sample scatters with a noise-type effect in, one a channel.
     pub louder: &'a [f64],
+    /// What of the effect happens again at random.
+    pub events: Option<&'a Events>,
+}
+
+impl<'a> Finished<'a> {
+    fn said(&self) -> Said<'a> {
+        Said {
+            after: self.after,
+            sigmas: self.sigmas,
+            louder: self.louder,
+            events: self.events,
+        }
+    }
 }
 
 /// One channel's gap.
@@ -174,7 +190,9 @@ impl Held {
     pub fn judge(&self, finished: Finished) -> Shrink {
         let first_s = finished.start_s.first().copied().unwrap_or(0.0);
         let last_s = finished.start_s.last().copied().unwrap_or(0.0);
+        let block_of = |row: usize| ((finished.start_s[row] - first_s) / BLOCK_S) as usize;
         let mut blocks = vec![Sums::default(); ((last_s - first_s) / BLOCK_S) as usize + 1];
+        let course = self.course(finished.said());
         let mut channels = Vec::new();
         for (index, series) in self.channels.iter().enumerate() {
             let louder = finished.louder[index];
@@ -191,12 +209,12 @@ impl Held {
                     samples: 1.0,
                     before: (errors[0] / sigma).powi(2),
                     recalibrated: (errors[1] / sigma).powi(2),
-                    after: (errors[2] / sigma / louder).powi(2),
+                    after: course.mean(index, row, |after| ((value - after) / sigma / louder).powi(2)),
                 };
                 sums.add(one);
-                blocks[((finished.start_s[row] - first_s) / BLOCK_S) as usize].add(one);
+                blocks[block_of(row)].add(one);
                 rms[0] += errors[0] * errors[0];
-                rms[1] += errors[2] * errors[2];
+                rms[1] += course.mean(index, row, |after| (value - after).powi(2));
             }
             channels.push(ChannelShrink {
                 samples: sums.samples as usize,
@@ -206,6 +224,9 @@ impl Held {
                 before_rms: sums.gap(rms[0]),
                 after_rms: sums.gap(rms[1]),
             });
+        }
+        for (row, surprise) in course.surprise.iter().enumerate() {
+            blocks[block_of(row)].after += surprise;
         }
         blocks.retain(|block| block.samples > 0.0);
         let mut total = Sums::default();
@@ -279,6 +300,7 @@ mod tests {
             recalibrated: &level(recalibrated),
             after: &level(after),
             louder: &[1.0],
+            events: None,
         })
     }
 

@@ -24,6 +24,7 @@ pub mod contribution;
 pub mod correction;
 pub mod crossval;
 pub mod diagnose;
+pub mod events;
 pub mod evidence;
 pub mod explain;
 pub mod fit_error;

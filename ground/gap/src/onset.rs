@@ -96,10 +96,7 @@ pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sig
             screen.information -= open.tr_mul(&open);
             screen.score -= open.tr_mul(residual);
         }
-        let all: Vec<usize> = (0..sigmas.len()).collect();
-        screen
-            .estimate(&all)
-            .map_or(f64::NEG_INFINITY, |estimate| estimate.log_evidence)
+        screen.log_evidence().unwrap_or(f64::NEG_INFINITY)
     };
     let best = |edges: &[f64], is_tried: &dyn Fn(f64, f64) -> bool| -> Option<(f64, (f64, f64))> {
         let sums = sums(edges);

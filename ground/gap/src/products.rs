@@ -3,7 +3,7 @@
 //! In: columns in units of noise, channel by channel. Out: `e'P f` and `e'P r`. A screen needs each hypothesis' own products
 //! and those with what is already chosen, which is a thousandth of all pairs of a library of two thousand columns.
 
-use std::{cell::RefCell, collections::HashMap};
+use std::cell::RefCell;
 
 use nalgebra::DVector;
 
@@ -19,7 +19,8 @@ pub struct Products {
     columns: Vec<Entries>,
     /// For each column and channel `L^-1 N'e`, so that `e'P f = e'f - open_e'open_f`.
     open: Vec<Entries>,
-    known: RefCell<HashMap<(usize, usize), f64>>,
+    /// Of each column with itself and those before it; NaN for not yet.
+    known: RefCell<Vec<Vec<f64>>>,
 }
 
 impl Products {
@@ -27,6 +28,7 @@ impl Products {
     pub fn push(&mut self, problem: &Problem, column: Entries) -> usize {
         self.open.push(open_part(problem, &column));
         self.columns.push(column);
+        self.known.get_mut().push(vec![f64::NAN; self.columns.len()]);
         self.columns.len() - 1
     }
 
@@ -34,9 +36,9 @@ impl Products {
     pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
         self.open[place] = open_part(problem, &column);
         self.columns[place] = column;
-        self.known
-            .borrow_mut()
-            .retain(|(one, other), _| *one != place && *other != place);
+        let known = self.known.get_mut();
+        known[place].fill(f64::NAN);
+        known.iter_mut().skip(place).for_each(|row| row[place] = f64::NAN);
     }
 
     /// After the weights of the problem's samples, channel by channel, were these.
@@ -49,7 +51,7 @@ impl Products {
                 .for_each(|(channel, values)| values.component_mul_assign(&factors[*channel]));
             self.open[place] = open_part(problem, column);
         }
-        self.known.borrow_mut().clear();
+        self.known.get_mut().iter_mut().for_each(|row| row.fill(f64::NAN));
     }
 
     /// A column.
@@ -69,12 +71,13 @@ impl Products {
 
     /// `e'P f`.
     pub fn product(&self, one: usize, other: usize) -> f64 {
-        let key = (one.min(other), one.max(other));
-        if let Some(known) = self.known.borrow().get(&key) {
-            return *known;
+        let (before, after) = (one.min(other), one.max(other));
+        let known = self.known.borrow()[after][before];
+        if !known.is_nan() {
+            return known;
         }
         let value = inner(&self.columns[one], &self.columns[other]) - inner(&self.open[one], &self.open[other]);
-        self.known.borrow_mut().insert(key, value);
+        self.known.borrow_mut()[after][before] = value;
         value
     }
 

@@ -193,6 +193,54 @@ fn a_reading_that_is_late_by_less_than_its_instant_is_known_is_no_effect() {
     }
 }
 
+/// What three gyros whose packets are numbered say of readings that are `late_s` [s] late.
+fn of_late(late_s: impl Fn(f64) -> f64) -> Diagnosis {
+    let folder = erring(|t_s| rate(t_s + late_s(t_s)) - rate(t_s), "");
+    let change = |name: &str, of: &dyn Fn(String) -> String| {
+        let file = folder.path().join(name);
+        let text = fs::read_to_string(&file).expect("a file");
+        fs::write(file, of(text)).expect("a file");
+    };
+    change("unit.toml", &|unit| {
+        format!("cycle_s = {}\n{unit}", 1.0 / RATE_HZ as f64)
+    });
+    // The last second was read after the record of the motion ends.
+    change("case.toml", &|case| case.replace("240.0]", "239.0]"));
+    diagnosed_in(&folder, &[]).1
+}
+
+#[test]
+fn packets_that_are_lost_again_in_the_held_out_windows_are_lost_packets() {
+    let since = |t_s: f64, onset_s: f64| f64::from(t_s >= onset_s);
+    // One is lost in the fit windows, which end at 120 s, and two after them.
+    let lost = of_late(|t_s| 0.2 * (since(t_s, 61.0) + since(t_s, 150.0) + since(t_s, 201.0)));
+    let names: Vec<&str> = lost.causes.iter().map(|cause| cause.effect).collect();
+    assert_eq!(names, ["packet-loss"]);
+    assert!(
+        lost.none_of_these < 0.1 && lost.shrink.after < 1.05,
+        "{:?}",
+        lost.shrink
+    );
+    let promise = lost.promises[0].promise;
+    assert!((promise.factor - 1.0).abs() < 0.05, "{promise:?}");
+    // What else delays it after them is none of these.
+    let other = of_late(|t_s| 0.2 * since(t_s, 61.0) + 0.3 * since(t_s, 150.0));
+    let believed: f64 = other.causes.iter().map(|cause| cause.probability).sum();
+    assert!(believed < 0.5 && other.none_of_these > 0.9, "{:?}", other.causes);
+}
+
+#[test]
+fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
+    // Nine prior sigmas: two of half the size would be likelier by a quarter of 9^2 nats, did they count as two.
+    let warm = diagnosed_in(&erring(|t_s| 0.027 * (-t_s / 57.0).exp(), ""), &[]).1;
+    let names: Vec<&str> = warm.promises.iter().map(|promised| promised.effect).collect();
+    assert_eq!((names.as_slice(), warm.causes.len()), (["gyro-warm-up"].as_slice(), 1));
+    let which = warm.causes[0].which.as_deref().expect("a time constant");
+    let tau_s: f64 = which.split(' ').find_map(|word| word.parse().ok()).expect("a number");
+    // A fiftieth of its amplitude is noise, and its zero is open.
+    assert!((tau_s - 57.0).abs() < 4.0, "{which}");
+}
+
 #[test]
 fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     let folder = rewritten(case(|_| 0.02), |cells| cells[2].clear());

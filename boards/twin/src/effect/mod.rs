@@ -244,6 +244,12 @@ pub trait Effect: Sync {
         None
     }
 
+    /// The variant that says that it happened before the log began, of an effect that happens at random: when it did is of one
+    /// log, how often and how much is of the unit.
+    fn happened(&self) -> Option<f64> {
+        None
+    }
+
     /// How many times its prior sigma a parameter is sought in, of a variant whose sizes are of another order.
     fn reach(&self, _variant: f64) -> f64 {
         1.0

@@ -37,6 +37,11 @@ impl Effect for PacketLoss {
         Some(format!("from {variant:.0} s on"))
     }
 
+    /// Any packet may be the next that is lost.
+    fn happened(&self) -> Option<f64> {
+        Some(f64::NEG_INFINITY)
+    }
+
     /// Onsets [s].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         onsets(starts_s).collect()

@@ -2,7 +2,7 @@
 //!
 //! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
 
-use super::{CANDIDATES, Chosen, estimate_of, fitted, gains, is_physical, leading, stretches};
+use super::{CANDIDATES, Chosen, estimate_of, fitted, gains, is_any_same, is_physical, leading, stretches};
 use crate::{
     library::Library,
     problem::Problem,
@@ -45,11 +45,12 @@ pub(super) fn compare(
         gain: own_gain,
         span: library.hypotheses[own].span,
     }];
-    let mut linear = gains(library, scores, &others, base);
+    let mut linear = gains(problem, library, scores, &others, base);
     linear[own] = f64::NEG_INFINITY;
     let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
     let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
-    for rival in leading(&linear, CANDIDATES) {
+    let candidates = leading(&linear, CANDIDATES);
+    for (number, rival) in candidates.iter().copied().enumerate() {
         let with_gain = |gain: f64| Rival {
             hypothesis: rival,
             gain,
@@ -61,7 +62,9 @@ pub(super) fn compare(
         }
         let mut tried = others.clone();
         tried.push(rival);
-        let refined = fitted(problem, library, &tried, &thetas, stretches[rival], is_contested);
+        // Of values with others between them one that is as good as it gets is enough.
+        let is_moved = is_contested && !is_any_same(problem, library, &candidates[..number], rival);
+        let refined = fitted(problem, library, &tried, &thetas, stretches[rival], is_moved);
         if is_physical(library, &tried, &refined) {
             let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
             rivals.push(with_gain(gain));

@@ -18,7 +18,7 @@ const HALVINGS: usize = 10;
 /// Values tried by which two of an effect with values between them are apart at least: either may move some way to the other.
 const APART: usize = 5;
 
-/// [nats] that make another value a better one.
+/// [nats] that make another value a better one; where both neighbours are as good but for less, no value between is.
 const SHARPER: f64 = 0.1;
 
 /// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step
@@ -33,12 +33,17 @@ pub(super) fn sharpened(problem: &Problem, library: &mut Library, set: &[usize],
     };
     let mut best = best;
     for _ in 0..HALVINGS {
+        let mut is_flat = true;
         for tried in [variant - step, variant + step] {
             let refined = at_variant(problem, library, set, &best, tried);
+            is_flat &= (refined.log_evidence - best.log_evidence).abs() < SHARPER;
             if refined.log_evidence > best.log_evidence + SHARPER {
                 (variant, best) = (tried, refined);
                 break;
             }
+        }
+        if is_flat {
+            break;
         }
         step *= 0.5;
     }
@@ -57,20 +62,29 @@ fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
 }
 
 /// Whether two hypotheses are one with values between the variants tried: a warm-up of 80 s and one of 160 s are both one of
-/// 120 s, in two halves that the prior takes for smaller.
-pub fn is_same(problem: &Problem, library: &Library, member: usize, candidate: usize) -> bool {
+/// 120 s, in two halves that the prior takes for smaller; and so are one of a gyro and one of all gyros.
+fn is_same(problem: &Problem, library: &Library, member: usize, candidate: usize) -> bool {
     let [member, candidate] = [member, candidate].map(|index| &library.hypotheses[index].cause);
     let effect = member.effect;
-    if !effect.has_values_between()
-        || effect.page().name != candidate.effect.page().name
-        || member.locality != candidate.locality
-    {
+    if !effect.has_values_between() || effect.page().name != candidate.effect.page().name {
+        return false;
+    }
+    let unit = problem.twin.unit();
+    let own = member.channels(unit);
+    if candidate.channels(unit).iter().all(|channel| !own.contains(channel)) {
         return false;
     }
     let mut grid = effect.variants(problem.twin.starts_s());
     grid.sort_by(f64::total_cmp);
     let place = |variant: f64| grid.partition_point(|value| *value <= variant);
     place(member.variant).abs_diff(place(candidate.variant)) < APART
+}
+
+/// Whether a hypothesis is one of these.
+pub(super) fn is_any_same(problem: &Problem, library: &Library, members: &[usize], candidate: usize) -> bool {
+    members
+        .iter()
+        .any(|member| is_same(problem, library, *member, candidate))
 }
 
 /// A set refitted with another variant of its last member, whose columns are made anew.

@@ -90,13 +90,14 @@ impl Held {
             });
             cleaned.collect()
         };
+        let after = self.course(finished.said()).predicted();
         let nominal: Vec<Response> = twin.unit().channels.iter().map(Response::nominal).collect();
         let estimation = Estimation::new(twin, rows);
         let truth = estimation.track(finished.before, &nominal);
         let mut tracks: Vec<Track> = [
             measured.clone(),
             without(finished.recalibrated),
-            without(finished.after),
+            without(&after),
             perfect(&measured, &finished, &|channel, row| finished.sigmas[channel][row]),
         ]
         .iter()

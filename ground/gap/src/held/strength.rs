@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Held;
-use crate::{fit_error::FitError, leftover::odds, next::erfc};
+use super::{Held, course::Said};
+use crate::{events::Events, fit_error::FitError, leftover::odds, next::erfc};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,8 @@ pub struct Claimed<'a> {
     pub sigmas: &'a [Vec<f64>],
     /// How much more a sample scatters than that, one a channel.
     pub louder: &'a [f64],
+    /// What of the model happens again at random.
+    pub events: Option<&'a Events>,
 }
 
 /// An effect's strength on the held-out windows over that on the fit windows.
@@ -62,15 +64,21 @@ impl Promise {
 impl Held {
     /// How strong an effect is here, apart from what the calibration may still do; nothing where it adds nothing.
     pub fn promise(&self, claimed: Claimed) -> Option<Promise> {
+        let course = self.course(Said {
+            after: claimed.after,
+            sigmas: claimed.sigmas,
+            louder: claimed.louder,
+            events: claimed.events,
+        });
         let (mut energy, mut along) = (0.0, 0.0);
         let mut by_parameter = DVector::zeros(claimed.error.slopes.len());
         for ((channel, added), open) in claimed.added.iter().zip(claimed.open) {
             let series = &self.channels[*channel];
             let sigma = |row: usize| claimed.sigmas[*channel][row] * claimed.louder[*channel];
-            let after = &claimed.after[*channel];
+            let after = |row: usize| course.mean(*channel, row, |after| after);
             let samples = series.rows.iter().map(|row| *row as usize).zip(&series.values);
             let seen: Vec<(usize, f64)> = samples
-                .map(|(row, value)| (row, (value - after[row]) / sigma(row)))
+                .map(|(row, value)| (row, (value - after(row)) / sigma(row)))
                 .filter(|(row, rest)| rest.is_finite() && added[*row].is_finite())
                 .collect();
             let own = DVector::from_iterator(seen.len(), seen.iter().map(|(row, _)| added[*row] / sigma(*row)));
@@ -145,6 +153,7 @@ mod tests {
             after: &after,
             sigmas: &[vec![0.1; SAMPLES]],
             louder: &[1.0],
+            events: None,
         };
         held.promise(claimed).expect("it adds something")
     }

@@ -283,6 +283,36 @@ fn eddy_currents_delay_the_field_to_first_order() {
 }
 
 #[test]
+fn a_packet_that_is_lost_takes_all_sensors_of_it_thermometers_too() {
+    /// The first row that is another's.
+    const LOST: usize = 300;
+    let nominal = twin(DENSE);
+    let loss = Active {
+        cause: Cause {
+            effect: by_name("packet-loss").unwrap(),
+            locality: Locality::Unit,
+            variant: DENSE.1 * LOST as f64,
+        },
+        theta: vec![DENSE.1],
+    };
+    let (with, without) = (nominal.predict(&[loss]), nominal.predict(&[]));
+    for (channel, (with, without)) in nominal.unit().channels.iter().zip(with.iter().zip(&without)) {
+        let resolved = 1e-6 * channel.sigma();
+        let apart = |rows: core::ops::Range<usize>, later: usize| {
+            rows.map(|row| (with[row] - without[row + later]).abs())
+                .fold(0.0, f64::max)
+        };
+        assert!(apart(0..LOST, 0) < resolved, "{}", channel.name);
+        assert!(apart(LOST..DENSE.0 - 1, 1) < resolved, "{}", channel.name);
+        assert!(
+            apart(LOST..DENSE.0 - 1, 0) > 1e3 * resolved,
+            "{} is not moved",
+            channel.name
+        );
+    }
+}
+
+#[test]
 fn a_gradient_is_the_same_field_where_the_centre_is_and_another_at_the_plates() {
     // A unit carried along x in a gradient dBx/dx = 2 uT/m: its x reading rises by 2 uT for every metre, plates included.
     let nominal = twin(SPARSE);
