@@ -264,7 +264,7 @@ mod tests {
         let course = held.course(said);
         let more = |row: usize| course.mean(0, row, |predicted| predicted / STEP);
         assert!((more(699) - 1.0).abs() < 1e-3, "{}", more(699));
-        // An even row lies between none and one more, and says nothing.
-        assert!(more(761) < 1e-3, "{}", more(761));
+        // A new event or two, of which a row of either sign tells little by itself.
+        assert!(more(760) < 3.0 * RATE, "{}", more(760));
     }
 }
