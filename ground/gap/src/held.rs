@@ -29,6 +29,9 @@ use crate::{events::Events, log::Series};
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
 
+/// Part of the gap by which recalibration and an effect may differ and shrink it as much.
+const SAME: f64 = 0.01;
+
 /// Bootstrap samples: the 2.5 % quantile then stands on 25 of them.
 const RESAMPLES: usize = 1000;
 
@@ -158,9 +161,9 @@ impl Sums {
 
 impl Shrink {
     /// Whether the held-out samples speak for the effect: the gap shrinks with 97.5 %, and recalibration alone does not
-    /// shrink it more. An attribution that fails this is withdrawn, whatever its evidence.
+    /// shrink it more; where both shrink it as much, it is the size of that calibration which speaks. An attribution that fails this is withdrawn, whatever its evidence.
     pub fn supports_the_effect(&self) -> bool {
-        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= 0.0
+        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= -SAME * (self.before - 1.0).max(0.0)
     }
 }
 
