@@ -6,10 +6,10 @@
 //! another strength on the held-out windows than on the fitted ones.
 
 use crate::{
-    attribute::Chosen,
     cause::Cause,
     crossval::{self, Key},
     events::Events,
+    explain::Explanation,
     fit_error::FitError,
     held::{
         Held,
@@ -128,12 +128,11 @@ pub fn promises(
     held: &Held,
     problem: &Problem,
     library: &Library,
-    model: &Model,
-    chosen: &[Chosen],
-    louder: &[f64],
+    explanation: &Explanation,
     events: Option<&Events>,
     causes: &mut [Cause],
 ) -> Vec<Promised> {
+    let (model, chosen) = (&explanation.model, &explanation.found.chosen);
     if causes.len() != model.components.len() || chosen.len() != causes.len() {
         // They were withdrawn.
         return Vec::new();
@@ -149,7 +148,7 @@ pub fn promises(
             error: &error.with_value(problem, model, index, hypothesis),
             after: &model.predicted,
             sigmas: &problem.sigmas,
-            louder,
+            louder: &explanation.louder,
             events,
         })?;
         let confidence = promise.confidence();

@@ -166,9 +166,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &subject.held,
         &problem,
         &library,
-        model,
-        &found.chosen,
-        &explanation.louder,
+        &explanation,
         events.as_ref(),
         &mut causes,
     );
