@@ -70,3 +70,35 @@ pub(super) fn take_off_four<const N: usize>(
 fn less(element: f32, [k, u, k_2, u_2]: &Pull, [x, y, x_2, y_2]: &Pull) -> f32 {
     element - k * y - u * x - k_2 * y_2 - u_2 * x_2
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kalman::{Params, covariance::Covariance, state::VELOCITY};
+
+    #[test]
+    fn two_at_once_are_one_after_the_other_to_the_bit() {
+        let seen = |covariance: &Covariance, k: usize| Seen {
+            column: covariance.of_driven(k),
+            variance: covariance.of_driven(k).driven[k] + 0.1,
+        };
+        // Begun with a column that ties all states together.
+        let mut covariance = Covariance::new(&Params::ROOM);
+        let tie = Seen {
+            column: State {
+                driven: [0.1, -0.2, 0.3, 0.01, -0.02],
+                drivers: core::array::from_fn(|k| 1e-4 * (k as f32 - 5.0)),
+            },
+            variance: 7.0,
+        };
+        covariance.update(&tie, &Seen::NOTHING);
+        let [first, second] = [seen(&covariance, 0), seen(&covariance, VELOCITY)];
+        let mut one_by_one = covariance.clone();
+        one_by_one.update(&first, &Seen::NOTHING);
+        one_by_one.update(&second, &Seen::NOTHING);
+        covariance.update(&first, &second);
+        assert_eq!(covariance, one_by_one);
+        let matrix = covariance.matrix();
+        assert_eq!(matrix, matrix.transpose());
+    }
+}
