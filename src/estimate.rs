@@ -31,7 +31,7 @@ use crate::{
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
     increments::Increments,
-    kalman::{Filter, Outcome, Sampled, Step},
+    kalman::{Filter, Outcome, Sampled, Step, seconds},
     redundancy::{Known, Solution},
     sample::{Kind, NO_SLOT, Sample},
     triad,
@@ -189,7 +189,7 @@ impl Estimator {
         let since_us = self.last_us.map(|last_us| sample.start_us.saturating_sub(last_us));
         self.last_us = Some(sample.start_us);
         // Zero is a gap to the monitor: there is no cycle before the first.
-        let dt_s = since_us.unwrap_or_default() as f32 * 1e-6;
+        let dt_s = since_us.map_or(0.0, seconds);
         // The step that completes a window leaves what can wait to the next one, and that leaves its own to the one after.
         let closes = self.filter.closes_at(increments.end_us);
         if core::mem::replace(&mut self.closed, closes) {

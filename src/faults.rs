@@ -31,7 +31,7 @@ mod triads;
 mod vector_rate;
 mod watch;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     calibration::{Channel, Measured, Set},
@@ -191,7 +191,7 @@ impl Monitor {
         let (turning, unsure) = self.turning(&rate_b, set, dt_s);
         let values = without_lever_arms(set, &measured.acc, &turning);
         let rate = turning.speed + turning.missing;
-        let force_b = self.acc.step(
+        self.acc.step(
             &Cycle {
                 values: &values,
                 present: present.of(Kind::Accelerometer),
@@ -201,7 +201,7 @@ impl Monitor {
             },
             &Apart { rate, by_place: unsure },
         );
-        let field_b_ut = self.mag.step(
+        self.mag.step(
             &Cycle {
                 values: &measured.mag,
                 present: present.of(Kind::Magnetometer),
@@ -211,11 +211,11 @@ impl Monitor {
             },
             &Apart { rate, by_place: 0.0 },
         );
-        self.settle_gyros(measured, rate, dt_s, [&force_b, &field_b_ut, &rate_b]);
+        self.settle_gyros(measured, rate, dt_s, rate_b.used);
         self.last = Some(turning);
         let health = SensorHealth::default()
-            .unused(Kind::Accelerometer, 0xFFF & !force_b.used)
-            .unused(Kind::Magnetometer, 0xFFF & !field_b_ut.used)
+            .unused(Kind::Accelerometer, 0xFFF & !self.acc.solution.used)
+            .unused(Kind::Magnetometer, 0xFFF & !self.mag.solution.used)
             .unused(Kind::Gyro, 0xF & !rate_b.used)
             .with_if(SensorHealth::ACCELEROMETERS, self.acc.undecided)
             .with_if(SensorHealth::MAGNETOMETERS, self.mag.undecided)
@@ -225,8 +225,8 @@ impl Monitor {
                 measured.temperature_held || measured.beyond_validity,
             );
         Vectors {
-            force_b,
-            field_b_ut,
+            force_b: self.acc.solution,
+            field_b_ut: self.mag.solution,
             rate_b,
             health,
         }
@@ -257,19 +257,19 @@ impl Monitor {
         (turning, unsure)
     }
 
-    fn settle_gyros(&mut self, measured: &Measured, rate: f32, dt_s: Option<f32>, found: [&Solution; 3]) {
+    fn settle_gyros(&mut self, measured: &Measured, rate: f32, dt_s: Option<f32>, gyros: u16) {
         // The vectors are asked which gyro it is once the parity says that it may be one: what was before says nothing.
         if !self.gyro.is_doubted() {
             self.vector_rate.pause();
             return;
         }
-        let [force_b, field_b_ut, rate_b] = found;
+        let (force_b, field_b_ut) = (&self.acc.solution, &self.mag.solution);
         let still_gravity = GRAVITY.contains(&length(&force_b.vector_b));
         let directions = [
             direction(force_b, ACC_TIMING_S * rate).filter(|_| still_gravity && !self.acc.undecided),
             direction(field_b_ut, MAG_TIMING_S * rate).filter(|_| !self.mag.undecided),
         ];
-        let without = self.gyro.without_each(&measured.gyro, rate_b.used);
+        let without = self.gyro.without_each(&measured.gyro, gyros);
         let without = without.map(|rates_b| rates_b.map(|rate_b| rate_b - self.bias_b));
         let contradicted = self.vector_rate.step(without, dt_s, directions);
         if let Some(plate) = contradicted.filter(|_| self.gyro.suspect) {
@@ -297,9 +297,10 @@ fn without_lever_arms(set: &Set, along: &[f32; TRIAD_AXES], turning: &Turning) -
     let Turning {
         rate_b, acceleration_b, ..
     } = turning;
-    let at_place: [Vector3<f32>; PLATES] = set
-        .place_b
-        .map(|place_b| acceleration_b.cross(&place_b) + rate_b.cross(&rate_b.cross(&place_b)));
+    // w x (w x r) = (w w' - w^2) r.
+    let by_place = acceleration_b.cross_matrix() + rate_b * rate_b.transpose()
+        - Matrix3::from_diagonal_element(rate_b.norm_squared());
+    let at_place = set.place_b.map(|place_b| by_place * place_b);
     core::array::from_fn(|k| along[k] - set.acc[k].axis_b.dot(&at_place[k / 3]))
 }
 

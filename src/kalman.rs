@@ -41,8 +41,11 @@
 mod compare;
 mod covariance;
 mod field;
+mod field_sums;
 mod innovation;
 mod iron;
+mod joseph;
+mod measured;
 mod params;
 mod passage;
 mod path;
@@ -66,14 +69,16 @@ pub use self::{
     step::{Outcome, Refusal, Sampled, Step},
 };
 use self::{
+    field_sums::{FieldSums, MeanField},
     innovation::Correction,
+    measured::Measured,
     passage::walks,
     pending::{Pace, Pending},
     start::UNKNOWN,
-    state::{GYRO_MATRIX, State, are_finite},
-    window::{FieldSums, MeanField, Window},
+    state::are_finite,
+    window::Window,
 };
-use crate::attitude::{from_rotation_vector, renormalised};
+use crate::attitude::from_rotation_vector;
 
 /// The filter: its parameters and its whole state.
 #[derive(Clone, Debug)]
@@ -90,7 +95,11 @@ pub struct Filter {
     pub velocity_n: Vector2<f32>,
     /// Covariance of the error state, but for what is pending.
     covariance: Covariance,
-    /// What the latest window still has to do to it.
+    /// What the latest window measured.
+    measured: Measured,
+    /// What that corrects.
+    correction: Correction,
+    /// What it still has to do.
     pending: Pending,
     /// Nothing of it is to be done in the next step.
     spared: bool,
@@ -130,6 +139,8 @@ impl Filter {
             gyro_matrix: Matrix3::zeros(),
             velocity_n: Vector2::zeros(),
             covariance: Covariance::new(&params),
+            measured: Measured::nothing(),
+            correction: Correction::default(),
             pending: Pending::nothing(),
             spared: false,
             settlements: 0,
@@ -137,7 +148,7 @@ impl Filter {
             reference: params.field,
             iron: HardIron::none(&params),
             aligned: false,
-            window: Window::default(),
+            window: Window::EMPTY,
             rate_b: Vector3::zeros(),
             gyro_b: None,
             last_us: None,
@@ -205,7 +216,7 @@ impl Filter {
         let gap_s = since_s - covered_s;
         if self.silent_s + gap_s >= self.params.longest_gap_s {
             outcome.refusal = Some(Refusal::Gap);
-            self.lose(since_s);
+            self.lose(since_s, outcome);
             return;
         }
         let dcm_nb = self.propagate(step, covered_s, gap_s, rotation);
@@ -213,68 +224,70 @@ impl Filter {
             self.gather(step, &dcm_nb);
         }
         if self.window.duration_s >= self.params.window_s - HALF_A_MILLISECOND {
-            self.settle();
+            self.settle(outcome);
             self.close(outcome, step.lift_off);
-            if !self.is_finite() {
-                *self = Filter::new(self.params);
+            if since_s >= LONG_STEP_S {
+                self.correct_now(outcome);
             }
         } else if !self.pending.is_done() && !self.spared {
-            self.work(if since_s < LONG_STEP_S {
+            let pace = if since_s < LONG_STEP_S {
                 Pace::Small
             } else {
                 Pace::Large
-            });
+            };
+            self.work(pace, outcome);
         }
         self.spared = false;
     }
 
-    /// A window is complete: everything it measured. What that does to the covariance is pending.
+    /// A window is complete: everything it measured. What that says of the state, and does to the covariance, is pending.
     fn close(&mut self, outcome: &mut Outcome, lift_off: bool) {
         let means = self.window.means(&self.params, lift_off);
-        let following = self.window.following(&self.params);
         // The first window of a rest still holds how the motion ended.
         let rests = core::mem::replace(&mut self.rested, means.rest) && means.rest;
-        let iron_b = self.iron.iron_b;
-        if let Some(sums) = self.window.field()
-            && self.iron.learn(&self.params, means.duration_s, sums)
-        {
-            self.reference.have_other_iron(&self.params, &iron_b);
+        self.measured.means = means;
+        self.measured.sums = *self.window.field();
+        if !self.aligned {
+            self.learn_iron();
         }
+        let sums = self.measured.sums.if_any();
+        self.measured.field = sums.map(|sums| self.mean_field(sums));
         if !self.aligned {
             // Of what a window does to it nothing else lasts until there is an attitude.
             self.covariance.drift(&walks(&self.params, means.duration_s));
-            outcome.aligned = self.align(&means, UNKNOWN);
+            self.window.follow(&means);
+            outcome.aligned = self.align(UNKNOWN);
             if !outcome.aligned {
                 self.covariance.forget_attitude();
             }
             self.settlements = self.settlements.wrapping_add(1);
-            self.begin_window(outcome.aligned, following);
+            self.keep_finite();
             return;
         }
         self.velocity_n += means.velocity_change_n;
         self.pending.passage.become_of(&self.params, &self.window, &means);
-        self.pending.clear();
-        let mut correction = Correction::new(self.params.gate, &mut outcome.innovations);
-        if rests {
-            self.compare_rest(&means, &mut correction);
+        self.measured.bias_b =
+            rests.then(|| means.rate_b - self.q_nb.inverse_transform_vector(&self.params.earth_rate_n));
+        if let Some(sums) = self.measured.sums.if_any() {
+            let iron_b = &self.iron.iron_b;
+            self.reference.learn(&self.params, means.duration_s, sums, iron_b);
         }
-        let start = self.pending.passage.means_seen(&self.covariance);
-        let velocity = if means.vertical {
-            Some(self.compare_velocity(&means, &start, &mut correction))
-        } else {
-            self.velocity_n = Vector2::zeros();
-            None
-        };
-        let field = self.compare_field(&means, &start, &mut correction);
-        self.inject(&correction.error);
+        let (reference, params) = (&self.reference, &self.params);
+        self.measured.compared =
+            (self.measured.field.as_ref()).and_then(|mean| reference.compare(params, means.duration_s, mean));
+        self.window.follow(&means);
         self.pending.begin();
-        outcome.aligned = self.recover(&means, [velocity, field]);
-        self.begin_window(outcome.aligned, following);
     }
 
-    /// Another window. What the one that follows knows of the one before is in other axes if the attitude was found afresh.
-    fn begin_window(&mut self, afresh: bool, following: Window) {
-        self.window = if afresh { Window::default() } else { following };
+    /// The iron, from the window's field.
+    pub(super) fn learn_iron(&mut self) {
+        let (iron_b, duration_s) = (self.iron.iron_b, self.measured.means.duration_s);
+        if let Some(sums) = self.measured.sums.if_any()
+            && self.iron.learn(&self.params, duration_s, sums)
+        {
+            self.reference.have_other_iron(&self.params, &iron_b);
+        }
+        self.keep_finite();
     }
 
     /// The mean field of a window without the iron, as far as that is known.
@@ -284,39 +297,44 @@ impl Filter {
         mean
     }
 
-    fn inject(&mut self, error: &State) {
-        let [north, east, down, to_north, to_east] = error.driven;
-        let rotation_n = Vector3::new(north, east, down);
-        self.q_nb = renormalised(from_rotation_vector(rotation_n) * self.q_nb);
-        let (bias, matrix) = error.drivers.split_at(GYRO_MATRIX);
-        self.bias_b += Vector3::from_row_slice(bias);
-        self.gyro_matrix += Matrix3::from_row_slice(matrix);
-        self.velocity_n += Vector2::new(to_north, to_east);
+    /// Begins anew unless all is finite: nothing can lead there with finite input; the radiation that flips a bit can.
+    fn keep_finite(&mut self) {
+        if !self.is_finite() || !self.iron.is_finite() {
+            self.begin_anew();
+        }
     }
 
-    /// Of the state; the covariance is looked at when its work is done.
+    /// Not inlined: another filter would lie on the stack of every step.
+    #[cold]
+    #[inline(never)]
+    fn begin_anew(&mut self) {
+        *self = Filter::new(self.params);
+    }
+
+    /// Of the state; the covariance is looked at when its work is done, the iron when it is learnt.
     fn is_finite(&self) -> bool {
         are_finite(self.q_nb.as_vector().as_slice())
             && are_finite(self.bias_b.as_slice())
             && are_finite(self.gyro_matrix.as_slice())
             && are_finite(self.velocity_n.as_slice())
-            && self.iron.is_finite()
     }
 }
 
-/// [s] steps of this length or more take large stages of what is pending.
-const LONG_STEP_S: f32 = 0.1;
+/// [s] steps of this length or more have the correction with the window, and take large stages of what else is pending.
+const LONG_STEP_S: f32 = 0.05;
 
 /// Steps need not add up to a window to the microsecond.
 const HALF_A_MILLISECOND: f32 = 5e-4;
 
-/// Of microseconds. A conversion of 64 bits is a call on the target, and intervals seldom have them.
+/// Of microseconds. A conversion of 64 bits is a call on the target.
 pub(crate) fn seconds(us: u64) -> f32 {
-    let us = match u32::try_from(us) {
-        Ok(us) => us as f32,
-        Err(_) => us as f32,
-    };
-    us * 1e-6
+    let (high, low) = ((us >> 32) as u32, us as u32);
+    high as f32 * 4_294.967_3 + low as f32 * 1e-6
+}
+
+/// The number, or the floor if it is below that or none. `f32::max` is a call on the target.
+fn at_least(floor: f32, x: f32) -> f32 {
+    if x > floor { x } else { floor }
 }
 
 fn square(x: f32) -> f32 {

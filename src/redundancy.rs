@@ -77,18 +77,20 @@ pub fn solve(axes_b: &[Vector3<f32>], values: &[f32], variances: &[f32], wanted:
         (seen.value, seen.variance) = (*value, *variance);
     }
     let axes = values.len().min(variances.len()).min(AXES);
-    solve_seen(axes_b, &seen[..axes], wanted)
+    let mut solution = Solution::NOTHING;
+    solve_seen(axes_b, &seen[..axes], wanted, &mut solution);
+    solution
 }
 
-/// [`solve`] for axes whose values and variances lie together.
-pub fn solve_seen(axes_b: &[Vector3<f32>], seen: &[Seen], wanted: u16) -> Solution {
+/// [`solve`] for axes whose values and variances lie together, in the solution's place.
+pub fn solve_seen(axes_b: &[Vector3<f32>], seen: &[Seen], wanted: u16, solution: &mut Solution) {
     // Written out: a symmetric matrix has six elements, and this sum is most of what a cycle costs.
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut weighted = Vector3::zeros();
     // The bit of the axis; none beyond the sixteenth.
     let (mut bit, mut used) = (1, 0);
-    for (axis_b, seen) in axes_b.iter().zip(seen) {
-        let Seen { value, variance, .. } = *seen;
+    for k in 0..axes_b.len().min(seen.len()) {
+        let (axis_b, Seen { value, variance, .. }) = (&axes_b[k], seen[k]);
         let (axis, weight) = (bit, 1.0 / variance);
         bit <<= 1;
         // Comparisons with NaN are false.
@@ -108,12 +110,10 @@ pub fn solve_seen(axes_b: &[Vector3<f32>], seen: &[Seen], wanted: u16) -> Soluti
         weighted += row * value;
     }
     let (covariance_b, known) = gaps::invert(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
-    Solution {
-        vector_b: covariance_b * weighted,
-        covariance_b,
-        known,
-        used,
-    }
+    solution.vector_b = covariance_b * weighted;
+    solution.covariance_b = covariance_b;
+    solution.known = known;
+    solution.used = used;
 }
 
 /// Rate by least squares from values about those of four axes that are wanted, all weighing the same: `rate = matrix

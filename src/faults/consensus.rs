@@ -16,13 +16,6 @@ pub(super) const GATE: f32 = 6.0;
 /// An axis that explains itself to more than this part has no redundancy left.
 const UNCHECKED: f32 = 0.05;
 
-/// A vector out of those that agree.
-pub(super) struct Agreement {
-    pub(super) solution: Solution,
-    /// Whether it was decidable who agrees.
-    pub(super) decided: bool,
-}
-
 /// What disagrees with the others and by how much: against the vector of all but itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disagreement {
@@ -53,26 +46,29 @@ impl Disagreement {
     }
 }
 
-/// The vector of those of `candidates` that agree; every axis is held against it.
-pub(super) fn agreed(axes_b: &[Vector3<f32>; 12], seen: &mut [Seen; 12], candidates: u16) -> Agreement {
-    let mut found = Agreement {
-        solution: solve_seen(axes_b, seen, candidates),
-        decided: true,
-    };
-    let mut worst = held_against(&found.solution, axes_b, seen);
-    if found.solution.known != Known::All {
-        return found;
+/// The vector of those of `candidates` that agree, in its place; every axis is held against it. Whether it was decidable
+/// who agrees.
+pub(super) fn agreed(
+    axes_b: &[Vector3<f32>; 12],
+    seen: &mut [Seen; 12],
+    candidates: u16,
+    solution: &mut Solution,
+) -> bool {
+    solve_seen(axes_b, seen, candidates, solution);
+    let mut worst = held_against(solution, axes_b, seen);
+    if solution.known != Known::All {
+        return true;
     }
     while let Some(k) = worst {
-        let fewer = solve_seen(axes_b, seen, found.solution.used & !(1 << k));
+        let mut fewer = Solution::NOTHING;
+        solve_seen(axes_b, seen, solution.used & !(1 << k), &mut fewer);
         if fewer.known != Known::All {
-            found.decided = false;
-            break;
+            return false;
         }
-        found.solution = fewer;
-        worst = held_against(&found.solution, axes_b, seen);
+        *solution = fewer;
+        worst = held_against(solution, axes_b, seen);
     }
-    found
+    true
 }
 
 /// Holds every axis against a vector. The used one that disagrees most, if any beyond the gate: with the leverage `l` a
@@ -81,7 +77,9 @@ pub(super) fn agreed(axes_b: &[Vector3<f32>; 12], seen: &mut [Seen; 12], candida
 fn held_against(solution: &Solution, axes_b: &[Vector3<f32>; 12], seen: &mut [Seen; 12]) -> Option<usize> {
     let mut worst = (GATE, None);
     let mut used = solution.used;
-    for (k, (axis_b, seen)) in axes_b.iter().zip(seen).enumerate() {
+    // By number: in an image that checks its sums, walking two arrays together costs as much as what is done there.
+    for k in 0..axes_b.len() {
+        let (axis_b, seen) = (&axes_b[k], &mut seen[k]);
         let (expected, explained) = solution.along(axis_b);
         let (residual, free) = (seen.value - expected, seen.variance - explained);
         seen.off = (residual, explained);

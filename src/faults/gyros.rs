@@ -136,8 +136,10 @@ impl Gyros {
 
     /// Takes a cycle.
     pub(super) fn step(&mut self, cycle: &Cycle<PLATES>) -> Solution {
-        for k in (0..PLATES).filter(|k| cycle.frozen >> k & 1 == 1) {
-            self.blame(k, Verdict::Frozen);
+        if cycle.frozen != 0 {
+            for k in (0..PLATES).filter(|k| cycle.frozen >> k & 1 == 1) {
+                self.blame(k, Verdict::Frozen);
+            }
         }
         let candidates = cycle.present & !self.excluded();
         let systematic = self.systematic(cycle, candidates);
@@ -154,7 +156,7 @@ impl Gyros {
             solve(&self.axes_b, cycle.values, &variances, candidates)
         };
         if candidates == ALL {
-            solution = self.check(cycle, &variances, systematic, solution);
+            self.check(cycle, &variances, systematic, &mut solution);
         } else {
             self.suspect = false;
         }
@@ -193,8 +195,8 @@ impl Gyros {
         (scale * scale + direction * direction) * from_usual + self.timing_s * self.timing_s * acceleration
     }
 
-    /// The parity of all four; the rate of those left.
-    fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, all: Solution) -> Solution {
+    /// The parity of all four; the solution becomes that of those left.
+    fn check(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, solution: &mut Solution) {
         let parity = self.parity_of(cycle.values);
         let noise = self.parity.noise;
         let variance = noise + systematic + self.parity.offset_variance;
@@ -203,7 +205,8 @@ impl Gyros {
             if self.watches[leapt].alarm(LIMITS, &self.of_gyros[leapt].added()) >= 1.0 {
                 self.blame(leapt, Verdict::Disagreeing);
             }
-            return solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
+            *solution = solve(&self.axes_b, cycle.values, variances, ALL & !(1 << leapt));
+            return;
         }
         if self.leaping.is_none() {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
@@ -221,14 +224,8 @@ impl Gyros {
             self.doubted_for = QUIET_CYCLES;
         }
         self.suspect = alarm > 1.0 || (self.suspect && self.quiet_for < QUIET_CYCLES);
-        let widened = if self.suspect {
-            1.0 + parity * parity / variance
-        } else {
-            1.0
-        };
-        Solution {
-            covariance_b: all.covariance_b * widened,
-            ..all
+        if self.suspect {
+            solution.covariance_b *= 1.0 + parity * parity / variance;
         }
     }
 
@@ -285,6 +282,9 @@ impl Gyros {
     /// Watches the excluded gyro, if it is the only one that is missing.
     fn reconsider(&mut self, cycle: &Cycle<PLATES>, variances: &[f32; PLATES], systematic: f32, solution: &Solution) {
         let watched = cycle.present & self.excluded();
+        if watched == 0 {
+            return;
+        }
         for k in (0..PLATES).filter(|k| watched >> k & 1 == 1) {
             let (expected, variance) = solution.along(&self.axes_b[k]);
             let share = (variances[k] + variance) / variances[k];

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     calibration::{Axis, Uncertainty},
-    geometry::TRIAD_AXES,
+    geometry::{PLATES, TRIAD_AXES},
     redundancy::{Known, Seen, Solution, solve_seen},
 };
 
@@ -72,8 +72,10 @@ pub(super) struct Triads {
     cycles: f32,
     /// What the axes measured in the latest cycle, and how far that was from its vector.
     seen: [Seen; TRIAD_AXES],
-    /// Axes present, what was systematic, and the vector of the cycle before, if it is still to be watched.
-    late: Option<(u16, f32, Solution)>,
+    /// The vector of the latest cycle.
+    pub(super) solution: Solution,
+    /// Axes present and what was systematic in that cycle, if it is still to be watched.
+    late: Option<(u16, f32)>,
     /// It is not decidable which axis is at fault.
     pub(super) undecided: bool,
 }
@@ -96,6 +98,7 @@ impl Triads {
             last_b: None,
             cycles: 0.0,
             seen: [Seen::default(); TRIAD_AXES],
+            solution: Solution::NOTHING,
             late: None,
             undecided: false,
         }
@@ -119,7 +122,7 @@ impl Triads {
     }
 
     /// Takes a cycle.
-    pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) -> Solution {
+    pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) {
         let doubled = self.catch_up();
         if cycle.frozen != 0 {
             for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
@@ -127,36 +130,36 @@ impl Triads {
             }
         }
         let candidates = cycle.present & !self.excluded();
-        for ((seen, value), watch) in self.seen.iter_mut().zip(cycle.values).zip(&self.watches) {
-            seen.value = value - watch.offset;
+        for k in 0..TRIAD_AXES {
+            let (seen, watch) = (&mut self.seen[k], &self.watches[k]);
+            seen.value = cycle.values[k] - watch.offset;
             seen.variance = watch.noise + watch.offset_variance;
         }
         let systematic = self.systematic(cycle.dt_s, apart, &self.seen, candidates);
         for seen in &mut self.seen {
             seen.variance += systematic;
         }
-        let found = agreed(&self.axes_b, &mut self.seen, candidates);
-        self.undecided = !found.decided || doubled;
-        if found.solution.known != Known::All {
+        let decided = agreed(&self.axes_b, &mut self.seen, candidates, &mut self.solution);
+        self.undecided = !decided || doubled;
+        if self.solution.known != Known::All {
             self.last_b = None;
-        } else if found.decided {
+        } else if decided {
             if cycle.watched_later {
-                self.late = Some((cycle.present, systematic, found.solution));
+                self.late = Some((cycle.present, systematic));
             } else {
-                self.watch(cycle.present, systematic, &found.solution);
+                self.watch(cycle.present, systematic);
             }
-            self.remember(&found.solution);
+            self.remember();
         }
-        found.solution
     }
 
     /// Watches the cycle before, if that was put off: nothing has asked since. Whether it was not isolable then.
     fn catch_up(&mut self) -> bool {
-        let Some((present, systematic, solution)) = self.late.take() else {
+        let Some((present, systematic)) = self.late.take() else {
             return false;
         };
         self.undecided = false;
-        self.watch(present, systematic, &solution);
+        self.watch(present, systematic);
         self.undecided
     }
 
@@ -172,7 +175,7 @@ impl Triads {
             (Some(last_b), Some(dt_s)) => (rough_b - last_b).norm_squared() / (dt_s * dt_s),
             _ => 0.0,
         };
-        let timing = self.timing_s * self.timing_s * turned.max(changed);
+        let timing = self.timing_s * self.timing_s * larger(turned, changed);
         relative * from_usual + timing + apart.by_place * apart.by_place
     }
 
@@ -181,12 +184,12 @@ impl Triads {
     fn rough(&self, seen: &[Seen; TRIAD_AXES], candidates: u16) -> Vector3<f32> {
         let (mut nearest, mut least) = (None, f32::INFINITY);
         if let Some(last_b) = self.last_b {
-            let (axes, seen) = (self.axes_b.as_chunks::<3>().0, seen.as_chunks::<3>().0);
             let mut left = candidates;
-            for ([x_b, y_b, z_b], [x, y, z]) in axes.iter().zip(seen) {
+            for plate in 0..PLATES {
                 if left & 0b111 == 0b111 {
                     // Near enough to rotations, whatever the calibration.
-                    let vector_b = x_b * x.value + y_b * y.value + z_b * z.value;
+                    let along = |axis: usize| self.axes_b[3 * plate + axis] * seen[3 * plate + axis].value;
+                    let vector_b = along(0) + along(1) + along(2);
                     let off = (vector_b - last_b).norm_squared();
                     if off < least {
                         (nearest, least) = (Some(vector_b), off);
@@ -195,20 +198,25 @@ impl Triads {
                 left >>= 3;
             }
         }
-        nearest.unwrap_or_else(|| solve_seen(&self.axes_b, seen, candidates).vector_b)
+        nearest.unwrap_or_else(|| {
+            let mut of_all = Solution::NOTHING;
+            solve_seen(&self.axes_b, seen, candidates, &mut of_all);
+            of_all.vector_b
+        })
     }
 
     /// Notes what each axis disagrees by; judges if one that is believed raises an alarm.
     #[inline(never)]
-    fn watch(&mut self, present: u16, systematic: f32, solution: &Solution) {
+    fn watch(&mut self, present: u16, systematic: f32) {
         let offsets = self.watches.iter().map(|watch| watch.offset_variance);
         let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
         let place = self.of_all.push(root(counted));
         let added = self.of_all.added();
         let bounds = self.of_all.bounds(LIMITS, &added, QUIET, self.least_relative);
         let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
-        let (mut read, mut used) = (present, solution.used);
-        for ((watch, alarm), seen) in self.watches.iter_mut().zip(&mut alarms).zip(&self.seen) {
+        let (mut read, mut used) = (present, self.solution.used);
+        for (k, alarm) in (0..TRIAD_AXES).zip(&mut alarms) {
+            let (watch, seen) = (&mut self.watches[k], &self.seen[k]);
             let disagreement = if read & 1 == 1 {
                 Disagreement::of(seen, used & 1 == 1)
             } else {
@@ -247,22 +255,21 @@ impl Triads {
         if !doubted && loudest < 1.0 {
             return;
         }
-        let seen = &{ self.seen };
         if doubted {
             let doubted = present & self.excluded();
             for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
-                self.resemble(k, seen, solution);
+                self.resemble(k);
             }
         }
         if loudest >= 1.0 {
-            self.judge(&alarms, seen, solution);
+            self.judge(&alarms);
         }
     }
 
     /// Excludes the axis with the loudest alarm.
-    fn judge(&mut self, alarms: &[f32; TRIAD_AXES], seen: &[Seen; TRIAD_AXES], solution: &Solution) {
+    fn judge(&mut self, alarms: &[f32; TRIAD_AXES]) {
         let worst = (0..TRIAD_AXES).fold(0, |worst, k| if alarms[k] > alarms[worst] { k } else { worst });
-        if self.has_double(worst, seen, solution) {
+        if self.has_double(worst) {
             self.undecided = true;
             return;
         }
@@ -283,9 +290,10 @@ impl Triads {
     }
 
     /// Whether a fault of another used axis would look the same as one of `k`.
-    fn has_double(&self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) -> bool {
+    fn has_double(&self, k: usize) -> bool {
+        let solution = &self.solution;
         let moved_b = solution.covariance_b * self.axes_b[k];
-        let free = |j: usize| seen[j].variance - solution.along(&self.axes_b[j]).1;
+        let free = |j: usize| self.seen[j].variance - solution.along(&self.axes_b[j]).1;
         (0..TRIAD_AXES)
             .filter(|j| *j != k && solution.used >> j & solution.used >> k & 1 == 1)
             .any(|j| {
@@ -295,17 +303,18 @@ impl Triads {
     }
 
     /// Compares an excluded axis with its negative and with its sensor's other axes.
-    fn resemble(&mut self, k: usize, seen: &[Seen; TRIAD_AXES], solution: &Solution) {
-        let expected = |k: usize| solution.along(&self.axes_b[k]).0;
+    fn resemble(&mut self, k: usize) {
+        let expected = |k: usize| self.solution.along(&self.axes_b[k]).0;
         let plate = k / 3 * 3;
         let (next, after) = (plate + (k + 1) % 3, plate + (k + 2) % 3);
-        let measured = seen[k].value + self.watches[k].offset;
+        let seen = &self.seen[k];
+        let measured = seen.value + self.watches[k].offset;
         for (kept, other) in
             self.likeness[k]
                 .iter_mut()
                 .zip([expected(k), -expected(k), expected(next), expected(after)])
         {
-            let off = (measured - other) * (measured - other) / seen[k].variance;
+            let off = (measured - other) * (measured - other) / seen.variance;
             *kept = if *kept == 0.0 {
                 off
             } else {
@@ -323,10 +332,11 @@ impl Triads {
         }
     }
 
-    fn remember(&mut self, solution: &Solution) {
+    fn remember(&mut self) {
+        let vector_b = self.solution.vector_b;
         self.cycles = (self.cycles + 1.0).min(super::watch::MEMORY);
-        let usual_b = self.usual_b.get_or_insert(solution.vector_b);
-        *usual_b += (solution.vector_b - *usual_b) / self.cycles;
-        self.last_b = Some(solution.vector_b);
+        let usual_b = self.usual_b.get_or_insert(vector_b);
+        *usual_b += (vector_b - *usual_b) / self.cycles;
+        self.last_b = Some(vector_b);
     }
 }

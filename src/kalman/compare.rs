@@ -1,22 +1,66 @@
-//! What a window measured against the state: bias at rest, velocity, field.
+//! What a window measured against the state: bias at rest, velocity, field; and the correction that makes.
 //!
-//! In: the window's means and the covariance before it. Out: the correction, scalar by scalar, and whether each kind was
-//! accepted.
+//! In: the window's measurements and the covariance before it. Out: the correction, scalar by scalar, whether each kind was
+//! accepted, and the state with the correction. In four stages, which may be as many steps ([`super::pending`]): what
+//! gyros go on to say meanwhile turns the attitude on the side of b, and its error stands on that of n. Only what the
+//! gyros' own error adds to it meanwhile comes with it, by the drive of the window that has begun.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::{
-    Filter, Quantity,
+    Filter, Outcome, Quantity,
     innovation::{Correction, Noise, Scalar},
+    pending::Pending,
     square,
-    state::{Row, State, VELOCITY},
-    window::Means,
+    state::{GYRO_MATRIX, Row, State, VELOCITY, dot},
 };
+use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
 impl Filter {
+    /// First: the bias at rest, and what the means see of the covariance.
+    pub(super) fn look(&mut self) {
+        self.correction.begin(self.params.gate);
+        if let Some(bias_b) = self.measured.bias_b {
+            self.compare_rest(&bias_b);
+        }
+        self.pending
+            .passage
+            .means_seen(&self.covariance, &mut self.measured.seen);
+    }
+
+    /// Fourth: the state has the correction, or is found afresh.
+    pub(super) fn correct(&mut self, outcome: &mut Outcome) {
+        let error = self.correction.error;
+        let [north, east, down, to_north, to_east] = error.driven;
+        let mut rotation_n = Vector3::new(north, east, down);
+        if self.window.duration_s > 0.0 {
+            rotation_n += Vector3::from(self.window.drive.each_ref().map(|drive| dot(drive, &error.drivers)));
+        }
+        self.turn(&from_rotation_vector(rotation_n));
+        let (bias, matrix) = error.drivers.split_at(GYRO_MATRIX);
+        self.bias_b += Vector3::from_row_slice(bias);
+        self.gyro_matrix += Matrix3::from_row_slice(matrix);
+        self.velocity_n += Vector2::new(to_north, to_east);
+        // There is room for all.
+        let _ = outcome.innovations.extend_from_slice(&self.correction.innovations);
+        outcome.aligned = self.recover();
+        if !self.is_finite() {
+            self.begin_anew();
+        }
+    }
+
+    /// Turns the axes of n: the attitude, and what is gathered in them.
+    pub(super) fn turn(&mut self, rotation: &UnitQuaternion<f32>) {
+        self.q_nb = renormalised(rotation * self.q_nb);
+        self.window.turn_axes(&dcm_nb(rotation));
+    }
+
     /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
     /// whatever was believed before.
-    pub(super) fn compare_rest(&mut self, means: &Means, correction: &mut Correction) {
-        let earth_b = self.q_nb.inverse_transform_vector(&self.params.earth_rate_n);
-        let noise = Noise::white(square(self.params.rest.bias_sd) + means.rate_variance);
+    ///
+    /// [`Params::recovery_s`]: super::Params::recovery_s
+    fn compare_rest(&mut self, bias_b: &Vector3<f32>) {
+        let noise = Noise::white(square(self.params.rest.bias_sd) + self.measured.means.rate_variance);
         if self.bias_rejected_s >= self.params.recovery_s {
             self.bias_rejected_s = 0.0;
             self.covariance.forget_bias(self.params.bias_sd);
@@ -26,27 +70,33 @@ impl Filter {
             let scalar = Scalar {
                 quantity: Quantity::Bias,
                 predicted: self.bias_b[axis],
-                measured: means.rate_b[axis] - earth_b[axis],
+                measured: bias_b[axis],
                 row: Row::Driver(axis),
                 noise,
             };
-            accepted &= self.compare(&scalar, &self.covariance.of_driver(axis), correction);
+            let start = self.covariance.of_driver(axis);
+            accepted &= compare(&mut self.pending, &mut self.correction, &scalar, &start);
         }
         self.bias_rejected_s = if accepted {
             0.0
         } else {
-            self.bias_rejected_s + means.duration_s
+            self.bias_rejected_s + self.measured.means.duration_s
         };
     }
 
-    /// The velocity is bounded: zero is measured of it. What it gained in the window, it gained by the mean tilt.
-    pub(super) fn compare_velocity(&mut self, means: &Means, start: &[State; 3], correction: &mut Correction) -> bool {
-        let tilt = self.pending.passage.tilt;
+    /// Second. The velocity is bounded: zero is measured of it. What it gained in the window, it gained by the mean tilt.
+    pub(super) fn compare_velocity(&mut self) {
+        let (tilt, means) = (self.pending.passage.tilt, &self.measured.means);
+        self.measured.velocity_accepted = None;
+        if !means.vertical {
+            self.velocity_n = Vector2::zeros();
+            return;
+        }
         let noise = Noise::lasting(means.velocity_variance, self.params.velocity_lasts_s, means.duration_s);
         let mut accepted = true;
-        for (axis, (mean, factor)) in [(&start[1], -tilt), (&start[0], tilt)].into_iter().enumerate() {
+        for (axis, (seen, factor)) in [(1, -tilt), (0, tilt)].into_iter().enumerate() {
             let mut column = self.covariance.of_driven(VELOCITY + axis);
-            column.add(mean, factor);
+            column.add(&self.measured.seen[seen], factor);
             let scalar = Scalar {
                 quantity: Quantity::Velocity,
                 predicted: self.velocity_n[axis],
@@ -54,47 +104,29 @@ impl Filter {
                 row: Row::Velocity(axis),
                 noise,
             };
-            accepted &= self.compare(&scalar, &column, correction);
+            accepted &= compare(&mut self.pending, &mut self.correction, &scalar, &column);
         }
-        accepted
+        self.measured.velocity_accepted = Some(accepted);
     }
 
-    /// A scalar, of whose `P h'` the passage is still to be made.
-    fn compare(&mut self, scalar: &Scalar, start: &State, correction: &mut Correction) -> bool {
-        let Some((before, own)) = self.pending.next(start, &scalar.row) else {
-            return true;
+    /// Third. The mean field against the reference, across it: east and in the meridian. Where the field is too disturbed
+    /// its rejection says nothing of the attitude.
+    pub(super) fn compare_field(&mut self) {
+        self.measured.field_accepted = None;
+        let Some(compared) = &self.measured.compared else {
+            return;
         };
-        let accepted = correction.compare(scalar, before, own);
-        if accepted {
-            self.pending.keep();
-        }
-        accepted
-    }
-
-    /// The mean field against the reference, across it: east and in the meridian. `None` where the field is too
-    /// disturbed for its rejection to say anything of the attitude.
-    pub(super) fn compare_field(
-        &mut self,
-        means: &Means,
-        start: &[State; 3],
-        correction: &mut Correction,
-    ) -> Option<bool> {
-        let sums = self.window.field()?;
-        self.reference
-            .learn(&self.params, means.duration_s, sums, &self.iron.iron_b);
-        let mean = self.mean_field(sums);
-        let compared = self.reference.compare(&self.params, means.duration_s, &mean)?;
         let disturbed = compared.disturbance > square(self.params.field_gate);
         self.disturbed_s = if disturbed {
-            self.disturbed_s + means.duration_s
+            self.disturbed_s + self.measured.means.duration_s
         } else {
             0.0
         };
-        correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
+        self.correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
         let mut accepted = true;
         for scalar in &compared.scalars {
             let row = self.pending.passage.mean_row(&scalar.row_n);
-            let column = State::combined(start, &scalar.row_n);
+            let column = State::combined(&self.measured.seen, &scalar.row_n);
             let scalar = Scalar {
                 quantity: scalar.quantity,
                 predicted: 0.0,
@@ -102,9 +134,21 @@ impl Filter {
                 row: Row::Of(&row),
                 noise: scalar.noise,
             };
-            accepted &= self.compare(&scalar, &column, correction);
+            accepted &= compare(&mut self.pending, &mut self.correction, &scalar, &column);
         }
-        correction.usable = true;
-        (!disturbed).then_some(accepted)
+        self.correction.usable = true;
+        self.measured.field_accepted = (!disturbed).then_some(accepted);
     }
+}
+
+/// A scalar, of whose `P h'` the passage is still to be made.
+fn compare(pending: &mut Pending, correction: &mut Correction, scalar: &Scalar, start: &State) -> bool {
+    let Some((before, own)) = pending.next(start, &scalar.row) else {
+        return true;
+    };
+    let accepted = correction.compare(scalar, before, own);
+    if accepted {
+        pending.keep();
+    }
+    accepted
 }

@@ -15,6 +15,7 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::{
     Params,
+    joseph::{Seen, interleaved, take_off, take_off_four},
     passage::Passage,
     square,
     state::{DRIVEN, DRIVERS, GYRO_MATRIX, STATES, State, VELOCITY, are_finite, dot},
@@ -33,15 +34,6 @@ pub struct Covariance {
     across: [[f32; DRIVERS]; DRIVEN],
     /// Drivers with drivers.
     drivers: [[f32; DRIVERS]; DRIVERS],
-}
-
-/// What a scalar saw of it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Seen {
-    /// `p = P h'`.
-    pub column: State,
-    /// `s = h P h' + r`.
-    pub variance: f32,
 }
 
 impl Covariance {
@@ -116,71 +108,56 @@ impl Covariance {
     }
 
     /// Times a vector that is one at a driven state and `drivers` at the drivers.
+    ///
+    /// Not inlined: from where the whole filter begins, an element is too far for an offset of the FPU's loads.
+    #[inline(never)]
     pub(super) fn times(&self, driven: usize, drivers: &[f32; DRIVERS], product: &mut State) {
         // A copy stays in registers.
         let drivers = *drivers;
-        let parts = self.driven[driven].iter().zip(&self.across);
-        for (sum, (own, row)) in product.driven.iter_mut().zip(parts) {
-            *sum = own + dot(row, &drivers);
+        for k in 0..DRIVEN {
+            product.driven[k] = self.driven[driven][k] + dot(&self.across[k], &drivers);
         }
-        let parts = self.across[driven].iter().zip(&self.drivers);
-        for (sum, (own, row)) in product.drivers.iter_mut().zip(parts) {
-            *sum = own + dot(row, &drivers);
+        for k in 0..DRIVERS {
+            product.drivers[k] = self.across[driven][k] + dot(&self.drivers[k], &drivers);
         }
     }
 
-    /// Over a window: attitude and bias, gyro matrix. The velocity has [`Covariance::predict_velocity`] after it.
-    pub(super) fn predict_attitude(&mut self, passage: &Passage) {
+    /// Over a window. `velocity` is the velocity's columns at its end, which are what its scalars see ([`Passage::carry`]);
+    /// `None` where nothing is known of it any more.
+    pub(super) fn predict(&mut self, passage: &Passage, velocity: Option<&[State; 2]>) {
         // The true horizontal force is left out of F: it is known only as well as its noisy samples, and a filter that
         // believes them sees heading in the noise.
-        let tilt = passage.tilt;
-        self.add_driven(VELOCITY, 1, -tilt);
-        self.add_driven(VELOCITY + 1, 0, tilt);
-        for (k, drive) in passage.drives().iter().enumerate().take(VELOCITY) {
-            self.gain(k, drive, passage);
+        for (k, drive) in passage.drive.iter().enumerate() {
+            self.gain(k, drive, &passage.drive);
+            self.driven[k][k] += passage.angle_variance;
         }
-    }
-
-    /// Over a window: the rest of it.
-    pub(super) fn predict_velocity(&mut self, passage: &Passage) {
-        for (k, drive) in passage.drives().iter().enumerate().skip(VELOCITY) {
-            self.gain(k, drive, passage);
+        for (k, column) in (VELOCITY..).zip(velocity.into_iter().flatten()) {
+            self.across[k] = column.drivers;
+            for (row, part) in self.driven.iter_mut().zip(&column.driven) {
+                row[k] = *part;
+            }
         }
         mirror(&mut self.driven);
-        self.wander(passage);
+        if velocity.is_none() {
+            self.forget_velocity(passage.velocity_sd);
+        }
         self.drift(&passage.walks);
     }
 
-    /// Driven state `k` gains `drive` times the drivers: with those, and in the upper triangle with the other driven, old
-    /// and new.
-    fn gain(&mut self, k: usize, drive: &[f32; DRIVERS], passage: &Passage) {
-        let drives = passage.drives();
+    /// Axis `k` of the attitude gains `drive` times the drivers: with those, and in the upper triangle with the other axes,
+    /// old and new.
+    fn gain(&mut self, k: usize, drive: &[f32; DRIVERS], drives: &[[f32; DRIVERS]; 3]) {
         let old = self.across[k];
-        for (l, other) in drives.iter().enumerate().take(k + 1) {
-            self.driven[l][k] += dot(&old, other);
+        for (row, other) in self.driven.iter_mut().zip(drives).take(k + 1) {
+            row[k] += dot(&old, other);
         }
         let row = *drive;
         for (sum, column) in self.across[k].iter_mut().zip(&self.drivers) {
             *sum += dot(column, &row);
         }
         let new = self.across[k];
-        for (l, other) in drives.iter().enumerate().skip(k) {
-            self.driven[k][l] += dot(&new, other);
-        }
-    }
-
-    /// The attitude's random walk over the window, what it does to the velocity meanwhile, and the velocity's own.
-    fn wander(&mut self, passage: &Passage) {
-        for axis in 0..VELOCITY {
-            self.driven[axis][axis] += passage.angle_variance;
-        }
-        for (velocity, axis, both) in [(VELOCITY, 1, -passage.both), (VELOCITY + 1, 0, passage.both)] {
-            self.driven[velocity][velocity] += passage.velocity_variance;
-            self.driven[velocity][axis] += both;
-            self.driven[axis][velocity] += both;
-        }
-        if passage.velocity_lost {
-            self.forget_velocity(passage.velocity_sd);
+        for (sum, other) in self.driven[k].iter_mut().zip(drives).skip(k) {
+            *sum += dot(&new, other);
         }
     }
 
@@ -191,42 +168,22 @@ impl Covariance {
         }
     }
 
-    /// Driven state `row` gains `factor` times `of`.
-    fn add_driven(&mut self, row: usize, of: usize, factor: f32) {
-        let source = self.of_driven(of);
-        for (sum, part) in self.across[row].iter_mut().zip(&source.drivers) {
-            *sum += factor * part;
-        }
-        let own = self.driven[row][row] + factor * (2.0 * self.driven[row][of] + factor * self.driven[of][of]);
-        for column in 0..DRIVEN {
-            let sum = self.driven[row][column] + factor * source.driven[column];
-            self.driven[row][column] = sum;
-            self.driven[column][row] = sum;
-        }
-        self.driven[row][row] = own;
-    }
-
-    /// After a scalar: Joseph's form.
-    pub(super) fn update(&mut self, seen: &Seen) {
-        let p = &seen.column;
-        let (per_variance, half) = (1.0 / seen.variance, 0.5 * seen.variance);
-        let mut gain = State::default();
-        gain.add(p, per_variance);
-        let mut rest = *p;
-        rest.add(&gain, -half);
-        let (driven, drivers) = ([&gain.driven, &rest.driven], [&gain.drivers, &rest.drivers]);
-        for (k, row) in self.driven.iter_mut().enumerate() {
-            take_off(row, driven.map(|part| part[k]), driven);
-        }
+    /// After a scalar, or after one and then another: Joseph's form.
+    pub(super) fn update(&mut self, first: &Seen, second: &Seen) {
+        let ([k, u], [k_2, u_2]) = (first.pulls(), second.pulls());
+        let driven = interleaved(&k.driven, &u.driven, &k_2.driven, &u_2.driven);
+        let drivers = interleaved(&k.drivers, &u.drivers, &k_2.drivers, &u_2.drivers);
+        take_off(&mut self.driven, &driven, &driven);
         let (fours, last) = self.across.as_chunks_mut::<4>();
-        for (n, four) in fours.iter_mut().enumerate() {
-            take_off_four(four, driven.map(|part| fours_of(part, n)), drivers);
+        let (of_fours, of_last) = driven.as_chunks::<4>();
+        for (four, of_four) in fours.iter_mut().zip(of_fours) {
+            take_off_four(four, *of_four, &drivers, 0);
         }
-        for row in last {
-            take_off(row, driven.map(|part| part[DRIVEN - 1]), drivers);
-        }
-        for (n, four) in self.drivers.as_chunks_mut::<4>().0.iter_mut().enumerate() {
-            take_off_four(four, drivers.map(|part| fours_of(part, n)), drivers);
+        take_off(last, of_last, &drivers);
+        // The upper triangle.
+        let fours = self.drivers.as_chunks_mut::<4>().0.iter_mut();
+        for (n, (four, of_four)) in fours.zip(drivers.as_chunks::<4>().0).enumerate() {
+            take_off_four(four, *of_four, &drivers, 4 * n);
         }
         mirror(&mut self.driven);
         mirror(&mut self.drivers);
@@ -324,30 +281,6 @@ impl Covariance {
             self.drivers.as_flattened(),
         ];
         are_finite(driven) && are_finite(across) && are_finite(drivers)
-    }
-}
-
-/// The `n`-th four of them.
-fn fours_of<const N: usize>(parts: &[f32; N], n: usize) -> [f32; 4] {
-    parts.as_chunks::<4>().0.get(n).copied().unwrap_or_default()
-}
-
-/// Takes `k u' + u k'` off a row: `[k, u]` for the row and for its columns.
-fn take_off<const N: usize>(row: &mut [f32; N], [k, u]: [f32; 2], [k_c, u_c]: [&[f32; N]; 2]) {
-    for ((element, x), y) in row.iter_mut().zip(u_c).zip(k_c) {
-        *element = *element - k * x - u * y;
-    }
-}
-
-/// The same of four rows, so that what belongs to a column is loaded once for four.
-#[inline(never)]
-fn take_off_four<const N: usize>([a, b, c, d]: &mut [[f32; N]; 4], [k, u]: [[f32; 4]; 2], [k_c, u_c]: [&[f32; N]; 2]) {
-    for column in 0..N {
-        let (x, y) = (u_c[column], k_c[column]);
-        a[column] = a[column] - k[0] * x - u[0] * y;
-        b[column] = b[column] - k[1] * x - u[1] * y;
-        c[column] = c[column] - k[2] * x - u[2] * y;
-        d[column] = d[column] - k[3] * x - u[3] * y;
     }
 }
 

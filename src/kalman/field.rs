@@ -15,9 +15,9 @@ use nalgebra::{ComplexField, Matrix3, RealField, Vector3};
 
 use super::{
     Params, Quantity,
+    field_sums::{FieldSums, MeanField},
     innovation::Noise,
     square,
-    window::{FieldSums, MeanField},
 };
 use crate::attitude::sin_cos;
 
@@ -42,6 +42,7 @@ pub struct Reference {
 }
 
 /// A scalar of the field.
+#[derive(Clone, Copy, Debug)]
 pub struct Scalar {
     pub quantity: Quantity,
     pub residual: f32,
@@ -51,6 +52,7 @@ pub struct Scalar {
 }
 
 /// The field of a window.
+#[derive(Clone, Copy, Debug)]
 pub struct Compared {
     pub scalars: [Scalar; 2],
     /// [1] square of what norm and dip show of a disturbance.

@@ -1,7 +1,8 @@
 //! One record for every scalar compared, and the correction that the scalars of a window add up to.
 
 use super::{
-    covariance::Seen,
+    at_least,
+    joseph::Seen,
     state::{Row, State},
 };
 
@@ -64,7 +65,7 @@ impl Noise {
     pub fn lasting(variance: f32, lasts_s: f32, duration_s: f32) -> Noise {
         Noise {
             alone: variance,
-            lasting: variance * (lasts_s / duration_s).max(1.0),
+            lasting: variance * at_least(1.0, lasts_s / duration_s),
         }
     }
 
@@ -78,14 +79,15 @@ impl Noise {
 }
 
 /// What the scalars of a window correct together.
-pub(super) struct Correction<'a> {
+#[derive(Clone, Debug, Default)]
+pub(super) struct Correction {
     gate: f32,
     /// Scalars compared while this is `false` are recorded and not used.
     pub usable: bool,
     /// The error state as estimated so far.
     pub error: State,
     /// What was compared.
-    innovations: &'a mut Innovations,
+    pub innovations: Innovations,
 }
 
 /// A scalar to be compared.
@@ -100,14 +102,13 @@ pub(super) struct Scalar<'a> {
     pub noise: Noise,
 }
 
-impl<'a> Correction<'a> {
-    pub fn new(gate: f32, innovations: &'a mut Innovations) -> Self {
-        Correction {
-            gate,
-            usable: true,
-            error: State::default(),
-            innovations,
-        }
+impl Correction {
+    /// Of another window.
+    pub fn begin(&mut self, gate: f32) {
+        self.gate = gate;
+        self.usable = true;
+        self.error = State::default();
+        self.innovations.clear();
     }
 
     /// Compares a scalar. Whether it was accepted. The column of `own` is `P h'` of the covariance at the end of the window
@@ -122,8 +123,14 @@ impl<'a> Correction<'a> {
             noise,
         } = *scalar;
         let residual = measured - predicted - row.of(&self.error);
-        for seen in before {
-            own.column.add(&seen.column, -(row.of(&seen.column) / seen.variance));
+        let part = |seen: &Seen| -(row.of(&seen.column) / seen.variance);
+        let (twos, last) = before.as_chunks::<2>();
+        for [one, other] in twos {
+            own.column
+                .add_two([&one.column, &other.column], [part(one), part(other)]);
+        }
+        for seen in last {
+            own.column.add(&seen.column, part(seen));
         }
         let of_state = row.of(&own.column);
         own.variance = of_state + noise.lasting;
@@ -165,18 +172,18 @@ mod tests {
                 row: Row::Driver(0),
                 noise: Noise::lasting(VARIANCE, lasts_s, 1.0),
             };
-            let mut innovations = Innovations::new();
+            let mut correction = Correction::default();
             for _ in 0..60 {
-                innovations.clear();
+                correction.begin(5.0);
                 let mut own = Seen {
                     column: covariance.of_driver(0),
                     variance: 0.0,
                 };
-                Correction::new(5.0, &mut innovations).compare(&scalar, &[], &mut own);
-                covariance.update(&own);
+                correction.compare(&scalar, &[], &mut own);
+                covariance.update(&own, &Seen::NOTHING);
             }
             let known = covariance.bias()[(0, 0)];
-            let shown = innovations[0].variance - VARIANCE;
+            let shown = correction.innovations[0].variance - VARIANCE;
             assert!(shown > 0.0 && shown < 1.2 * known, "{shown} {known}");
             known
         };

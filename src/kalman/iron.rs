@@ -1,7 +1,7 @@
 //! Hard iron that came with the unit after its calibration: a field fixed in b, learnt from motion.
 //!
-//! In: a window's sums of the field in n, of the field in b and of the attitude. Out: `iron_b`, by which the field is
-//! corrected before it is compared. The field of the site is the same throughout a window, `m_n = F + R_k iron_b`, and
+//! In: a window's sums of the field in n, of the field in b and of the attitude. Out: `iron_b`, by which the field of later
+//! windows is corrected before it is compared. The field of the site is the same throughout a window, `m_n = F + R_k iron_b`, and
 //! turns of the unit within it part the two: with `F` eliminated, a window of `N` samples tells
 //!
 //! `(1 - (sum R)'(sum R)/N^2) iron_b = (sum m_b - (sum R)'(sum m_n)/N)/N`.
@@ -17,7 +17,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Params, square, window::FieldSums};
+use super::{Params, at_least, field_sums::FieldSums, square, state::are_finite};
 
 /// The latest windows are explained by one iron while the field moves by less than so many times what else moves it (as
 /// variances).
@@ -73,7 +73,7 @@ impl Equations {
     /// [uT^2] how far the field goes on moving within a window with `iron_b` taken off.
     fn unrest(&self, iron_b: &Vector3<f32>) -> f32 {
         let squares = self.squares - 2.0 * iron_b.dot(&self.seen) + iron_b.dot(&(self.parted * iron_b));
-        (squares / self.windows).max(0.0)
+        at_least(0.0, squares / self.windows)
     }
 }
 
@@ -98,11 +98,17 @@ impl HardIron {
         }
         let noise = square(params.iron_noise_ut);
         let window = Equations::of(sums);
-        let kept = (1.0 - duration_s / params.iron_change_s).max(0.0);
+        let kept = at_least(0.0, 1.0 - duration_s / params.iron_change_s);
         let recent = window.after(&self.recent, kept);
         let unknown = Matrix3::from_diagonal_element(1.0 / square(params.iron_change_sd_ut));
-        let latest = HardIron::solved(recent, recent.parted / noise + unknown, recent.seen / noise);
-        let left = latest.recent.unrest(&latest.iron_b);
+        let mut latest = HardIron {
+            information: recent.parted / noise + unknown,
+            weighted: recent.seen / noise,
+            recent,
+            ..*self
+        };
+        latest.solve();
+        let left = recent.unrest(&latest.iron_b);
         self.recent = if left > EXPLAINED * noise { window } else { recent };
         if left <= EXPLAINED * noise && recent.unrest(&self.iron_b) > noise + QUIETER * left {
             *self = latest;
@@ -111,38 +117,33 @@ impl HardIron {
         // What the present iron leaves moving is not all the world's while it is not yet known well.
         let unrest = window.unrest(&self.iron_b).min(left);
         let weight = 1.0 / (noise + params.iron_per_spread * unrest);
-        let information = self.information + window.parted * weight;
-        *self = HardIron::solved(self.recent, information, self.weighted + window.seen * weight);
+        self.information += window.parted * weight;
+        self.weighted += window.seen * weight;
+        self.solve();
         false
     }
 
-    fn solved(recent: Equations, information: Matrix3<f32>, weighted: Vector3<f32>) -> HardIron {
+    fn solve(&mut self) {
         // Information is a sum that began positive definite; rounding does not take that away.
-        let covariance = information.try_inverse().unwrap_or_else(Matrix3::zeros);
-        HardIron {
-            iron_b: covariance * weighted,
-            covariance,
-            information,
-            weighted,
-            recent,
-        }
+        self.covariance = self.information.try_inverse().unwrap_or_else(Matrix3::zeros);
+        self.iron_b = self.covariance * self.weighted;
     }
 
     /// [uT^2] variance of a component of a window's mean field by what is not known of the iron.
     pub(super) fn variance(&self, sums: &FieldSums) -> f32 {
         let turned = sums.turned / sums.count;
-        (turned * self.covariance * turned.transpose()).trace() / 3.0
+        // The trace of T P T'.
+        (turned * self.covariance).dot(&turned) / 3.0
     }
 
     pub(super) fn is_finite(&self) -> bool {
         let Equations {
             parted, seen, squares, ..
         } = &self.recent;
-        [&self.covariance, &self.information, parted]
-            .into_iter()
-            .flat_map(|matrix| matrix.iter())
-            .chain([&self.iron_b, &self.weighted, seen].into_iter().flat_map(|v| v.iter()))
-            .chain([squares])
-            .all(|part| part.is_finite())
+        let matrices = [&self.covariance, &self.information, parted];
+        let vectors = [&self.iron_b, &self.weighted, seen];
+        matrices.into_iter().all(|matrix| are_finite(matrix.as_slice()))
+            && vectors.into_iter().all(|vector| are_finite(vector.as_slice()))
+            && squares.is_finite()
     }
 }

@@ -14,7 +14,7 @@
 use nalgebra::Vector3;
 
 use super::{
-    Params,
+    Params, at_least,
     covariance::Covariance,
     square,
     state::{DRIVEN, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
@@ -57,7 +57,7 @@ impl Passage {
         let tilt = params.gravity * means.vertical_s;
         let variance = window.angle_variance;
         self.drive = window.drive;
-        let per_second = 1.0 / window.duration_s.max(f32::MIN_POSITIVE);
+        let per_second = 1.0 / at_least(f32::MIN_POSITIVE, window.duration_s);
         for (mean, integral) in self.mean_drive.iter_mut().zip(&window.drive_integral) {
             for (mean, integral) in mean.iter_mut().zip(integral) {
                 *mean = integral * per_second;
@@ -94,12 +94,10 @@ impl Passage {
 
     /// `P h'` at the end of the window for each axis of n as a mean over the window sees it, still without passage:
     /// the covariance at its start times `(1 on the axis, B' on the drivers)`.
-    pub fn means_seen(&self, covariance: &Covariance) -> [State; 3] {
-        let mut seen = [State::default(); 3];
-        for (axis, (drive, seen)) in self.mean_drive.iter().zip(&mut seen).enumerate() {
+    pub fn means_seen(&self, covariance: &Covariance, seen: &mut [State; 3]) {
+        for (axis, (drive, seen)) in self.mean_drive.iter().zip(seen).enumerate() {
             covariance.times(axis, drive, seen);
         }
-        seen
     }
 
     /// Makes `P h'` at the end, for a row `h` there, of `P F' h'` at the start.

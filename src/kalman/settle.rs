@@ -1,18 +1,21 @@
-//! When the covariance's work for a window is done, and what may be asked of it meanwhile.
+//! The work for a window, stage by stage, and what may be asked of the covariance meanwhile.
 //!
 //! In: what is [`super::pending`]. Out: the covariance as of the last window, or as it was when it was last complete.
 
-use super::{Filter, HALF_A_MILLISECOND, covariance::Covariance, pending::Pace, seconds};
+use super::{
+    Filter, HALF_A_MILLISECOND, Outcome,
+    covariance::Covariance,
+    pending::{Pace, Stage},
+    seconds,
+};
 
 impl Filter {
     /// Covariance of the error state as of the last window; what is pending is done on a copy.
     pub fn covariance(&self) -> Covariance {
-        let (mut covariance, mut pending) = (self.covariance.clone(), self.pending.clone());
-        while !pending.is_done() {
-            pending.work(&mut covariance, Pace::Large);
-        }
-        covariance.keep_bounds();
-        covariance
+        let mut copy = self.clone();
+        copy.settle(&mut Outcome::default());
+        copy.covariance.keep_bounds();
+        copy.covariance
     }
 
     /// The covariance as it was when it was last complete, and how often that was so, round and round; `None` while the
@@ -36,22 +39,57 @@ impl Filter {
     }
 
     /// One stage of what is pending; at its end the covariance is looked at.
-    pub(super) fn work(&mut self, pace: Pace) {
+    pub(super) fn work(&mut self, pace: Pace, outcome: &mut Outcome) {
+        let stage = self.pending.stage();
+        self.pending.go_on();
+        match stage {
+            Stage::Look => self.look(),
+            Stage::Velocity => self.compare_velocity(),
+            Stage::Field => self.compare_field(),
+            Stage::Correct => self.correct(outcome),
+            Stage::Learn => {
+                self.learn_iron();
+                if pace == Pace::Large {
+                    self.work_on_covariance(pace);
+                }
+            }
+            _ => self.work_on_covariance(pace),
+        }
+    }
+
+    fn work_on_covariance(&mut self, pace: Pace) {
         self.pending.work(&mut self.covariance, pace);
         if self.pending.is_done() {
             self.settlements = self.settlements.wrapping_add(1);
             self.unsound = !self.covariance.keep_bounds();
             if !self.covariance.is_finite() {
                 // Nothing can lead here with finite input; the radiation that flips a bit of the state can.
-                *self = Filter::new(self.params);
+                self.begin_anew();
             }
         }
     }
 
+    /// What is pending of the state.
+    pub(super) fn correct_now(&mut self, outcome: &mut Outcome) {
+        while self.pending.corrects() {
+            self.work(Pace::Large, outcome);
+        }
+    }
+
     /// All that is pending.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn settle(&mut self, outcome: &mut Outcome) {
+        self.correct_now(outcome);
+        self.settle_covariance();
+    }
+
+    /// What is pending of the covariance, and of the iron before it.
+    pub(super) fn settle_covariance(&mut self) {
+        if self.pending.stage() == Stage::Learn {
+            self.pending.go_on();
+            self.learn_iron();
+        }
         while !self.pending.is_done() {
-            self.work(Pace::Large);
+            self.work_on_covariance(Pace::Large);
         }
     }
 }

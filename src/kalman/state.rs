@@ -26,6 +26,12 @@ pub struct State {
 }
 
 impl State {
+    /// Nothing.
+    pub const ZERO: State = State {
+        driven: [0.0; DRIVEN],
+        drivers: [0.0; DRIVERS],
+    };
+
     /// Scalar product.
     pub fn dot(&self, other: &State) -> f32 {
         dot(&self.driven, &other.driven) + dot(&self.drivers, &other.drivers)
@@ -47,6 +53,16 @@ impl State {
         }
         for (sum, part) in self.drivers.iter_mut().zip(&other.drivers) {
             *sum += part * factor;
+        }
+    }
+
+    /// Adds two, each times its factor, the first one first.
+    pub fn add_two(&mut self, [a, b]: [&State; 2], [x, y]: [f32; 2]) {
+        for k in 0..DRIVEN {
+            self.driven[k] = self.driven[k] + a.driven[k] * x + b.driven[k] * y;
+        }
+        for k in 0..DRIVERS {
+            self.drivers[k] = self.drivers[k] + a.drivers[k] * x + b.drivers[k] * y;
         }
     }
 }

@@ -56,7 +56,7 @@ pub enum Refusal {
 pub struct Outcome {
     /// What was wrong with it.
     pub refusal: Option<Refusal>,
-    /// One for each scalar compared, when it closed a window.
+    /// One for each scalar of a window, when the state has its correction.
     pub innovations: Innovations,
     /// The attitude was found afresh with TRIAD.
     pub aligned: bool,

@@ -5,10 +5,10 @@
 
 use nalgebra::{ComplexField, Matrix3, Vector2, Vector3};
 
-use super::{Params, innovation::Noise, square, state::DRIVERS};
+use super::{Params, at_least, field_sums::FieldSums, innovation::Noise, square, state::DRIVERS};
 
 /// Running sums.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Window {
     /// [s] so far, gaps included.
     pub duration_s: f32,
@@ -30,50 +30,8 @@ pub struct Window {
     mag: FieldSums,
 }
 
-/// Sums of the field's samples.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FieldSums {
-    /// Samples.
-    pub count: f32,
-    /// [uT] in n.
-    pub total_n: Vector3<f32>,
-    /// [uT] in b.
-    pub total_b: Vector3<f32>,
-    /// Attitude matrices that took b to n.
-    pub turned: Matrix3<f32>,
-    squares: f32,
-    variance: f32,
-}
-
-/// The mean field of a window without hard iron.
-#[derive(Clone, Copy, Debug)]
-pub struct MeanField {
-    /// [uT] in n.
-    pub mag_n: Vector3<f32>,
-    /// [uT^2] mean square distance of the samples from it.
-    pub spread: f32,
-    /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise, and by what is not
-    /// known of the iron.
-    pub white: f32,
-}
-
-impl FieldSums {
-    /// Without `iron_b` \[uT\]; there must be samples.
-    pub fn mean(&self, iron_b: &Vector3<f32>) -> MeanField {
-        let mag_n = (self.total_n - self.turned * iron_b) / self.count;
-        let squares = (self.squares - 2.0 * iron_b.dot(&self.total_b)) / self.count + iron_b.norm_squared();
-        let noise = self.variance / self.count;
-        let spread = (squares - mag_n.norm_squared() - 3.0 * noise).max(0.0);
-        MeanField {
-            mag_n,
-            spread,
-            white: (spread + noise) / self.count,
-        }
-    }
-}
-
 /// Sum of a vector's samples.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Sum {
     count: f32,
     total_n: Vector3<f32>,
@@ -88,6 +46,16 @@ struct Sum {
 }
 
 impl Sum {
+    const NONE: Sum = Sum {
+        count: 0.0,
+        total_n: Vector3::new(0.0, 0.0, 0.0),
+        squares: 0.0,
+        variance: 0.0,
+        unforeseen: 0.0,
+        before_n: [None; 2],
+        began_n: None,
+    };
+
     fn take(&mut self, sample_n: &Vector3<f32>, variance: f32) {
         self.count += 1.0;
         self.total_n += sample_n;
@@ -110,7 +78,10 @@ impl Sum {
 
     /// Mean square distance from the mean, all axes, without the samples' own noise.
     fn spread(&self) -> f32 {
-        (self.squares / self.count - self.mean().norm_squared() - 3.0 * self.noise()).max(0.0)
+        at_least(
+            0.0,
+            self.squares / self.count - self.mean().norm_squared() - 3.0 * self.noise(),
+        )
     }
 
     /// Variance of a component of a sample: the sensor's, or that of what moved too fast for the samples if it shows
@@ -131,7 +102,7 @@ impl Sum {
 }
 
 /// What a window measured.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Means {
     /// [s] it lasted.
     pub duration_s: f32,
@@ -160,6 +131,8 @@ pub struct Means {
     /// [rad2] of the direction of mean specific force as the vertical.
     pub tilt_variance: f32,
     acc_spread: f32,
+    /// [m/s2] by how much specific force exceeded one g for seconds.
+    excess: f32,
 }
 
 /// The mean specific force of a window is taken for the vertical within this part of one g: a second of hard shaking
@@ -180,9 +153,25 @@ const SAMPLE_NEAR_ONE_G: f32 = 0.1;
 const START_TILT_SD: f32 = 0.0175;
 
 /// Part of the spread of specific force that its mean over the first window may still hold.
-const START_SPREAD: f32 = 0.2;
+pub(super) const START_SPREAD: f32 = 0.2;
 
 impl Window {
+    /// Nothing gathered yet. A constant: a value that is made first is then copied here, word by word.
+    pub const EMPTY: Window = Window {
+        duration_s: 0.0,
+        drive: [[0.0; DRIVERS]; 3],
+        drive_integral: [[0.0; DRIVERS]; 3],
+        angle_variance: 0.0,
+        gyro_variance: 0.0,
+        covered_s: 0.0,
+        angle_b: Vector3::new(0.0, 0.0, 0.0),
+        rate_square: 0.0,
+        acc: Sum::NONE,
+        far_from_one_g: false,
+        excess_before: 0.0,
+        mag: FieldSums::NONE,
+    };
+
     /// A step: mean attitude over it, what the gyros saw, and the variance it adds.
     pub fn turn(&mut self, dcm_nb: &Matrix3<f32>, gyro_b: &Vector3<f32>, covered_s: f32, gap_s: f32, variance: f32) {
         self.duration_s += covered_s + gap_s;
@@ -217,13 +206,13 @@ impl Window {
         self.acc.take(acc_n, variance);
     }
 
-    /// The window that follows this one, in the same axes.
-    pub fn following(&self, params: &Params) -> Window {
-        let mut next = Window::default();
-        next.acc.before_n = self.acc.before_n;
-        next.acc.began_n = self.acc.before_n[0];
-        next.excess_before = self.excess(params);
-        next
+    /// Becomes the window that follows this one, whose means are these, in the same axes.
+    pub fn follow(&mut self, means: &Means) {
+        let before_n = self.acc.before_n;
+        *self = Window::EMPTY;
+        self.acc.before_n = before_n;
+        self.acc.began_n = before_n[0];
+        self.excess_before = means.excess;
     }
 
     /// [m/s2] by how much specific force exceeds one g, this window included.
@@ -238,23 +227,40 @@ impl Window {
 
     /// A sample of the field.
     pub fn take_mag(&mut self, mag_b: &Vector3<f32>, dcm_nb: &Matrix3<f32>, variance: f32) {
-        let sums = &mut self.mag;
-        sums.count += 1.0;
-        sums.total_n += dcm_nb * mag_b;
-        sums.total_b += mag_b;
-        sums.turned += dcm_nb;
-        sums.squares += mag_b.norm_squared();
-        sums.variance += variance;
+        self.mag.take(mag_b, dcm_nb, variance);
     }
 
-    /// The field, if it was sampled.
-    pub fn field(&self) -> Option<&FieldSums> {
-        (self.mag.count > 0.0).then_some(&self.mag)
+    /// What it gathered in n, in axes that are turned.
+    pub fn turn_axes(&mut self, turned: &Matrix3<f32>) {
+        let acc = &mut self.acc;
+        let [last_n, last_but_one_n] = &mut acc.before_n;
+        for vector_n in [last_n, last_but_one_n, &mut acc.began_n] {
+            *vector_n = vector_n.map(|vector_n| turned * vector_n);
+        }
+        if self.duration_s <= 0.0 {
+            return;
+        }
+        for drive in [&mut self.drive, &mut self.drive_integral] {
+            let old = *drive;
+            for (axis, row) in drive.iter_mut().enumerate() {
+                for (k, part) in row.iter_mut().enumerate() {
+                    *part =
+                        turned[(axis, 0)] * old[0][k] + turned[(axis, 1)] * old[1][k] + turned[(axis, 2)] * old[2][k];
+                }
+            }
+        }
+        acc.total_n = turned * acc.total_n;
+        self.mag.turn_axes(turned);
+    }
+
+    /// The field.
+    pub fn field(&self) -> &FieldSums {
+        &self.mag
     }
 
     /// What it all says.
     pub fn means(&self, params: &Params, lift_off: bool) -> Means {
-        let covered_s = self.covered_s.max(f32::MIN_POSITIVE);
+        let covered_s = at_least(f32::MIN_POSITIVE, self.covered_s);
         let rate_b = self.angle_b / covered_s;
         let rate_spread = self.rate_square / covered_s - rate_b.norm_squared();
         let sampled = self.acc.count > 0.0;
@@ -276,7 +282,8 @@ impl Window {
             && rate_spread < square(params.rest.rate_spread)
             && acc_spread < square(params.rest.acc_spread);
         let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
-        let tilt_variance = (START_SPREAD + 1.0 / self.acc.count.max(1.0)) * acc_spread / square(params.gravity);
+        let excess = self.excess(params);
+        let tilt_variance = (START_SPREAD + 1.0 / at_least(1.0, self.acc.count)) * acc_spread / square(params.gravity);
         Means {
             duration_s: self.duration_s,
             rate_b,
@@ -290,27 +297,14 @@ impl Window {
             velocity_change_variance: square(vertical_s)
                 * (square(params.acc_error)
                     + square(params.acc_scale_error) * acc_spread
-                    + square(params.acc_excess * self.excess(params))
+                    + square(params.acc_excess * excess)
                     + missed),
             velocity_variance: if rest { square(params.velocity_rest_sd) } else { moving },
             angle_variance: self.angle_variance,
             tilt_variance: square(START_TILT_SD) + tilt_variance,
             acc_spread,
+            excess,
         }
-    }
-}
-
-impl MeanField {
-    /// [uT^2] variance of a component of the mean in a window like others.
-    pub fn unrest(&self, params: &Params) -> f32 {
-        square(params.field_spread) * self.spread + self.white
-    }
-
-    /// [rad] of its direction at the start, `disturbance` being the square of what is seen of one.
-    pub fn direction_sd(&self, params: &Params, disturbance: f32) -> f32 {
-        let unrest = (START_SPREAD * self.spread + self.white) / self.mag_n.norm_squared().max(f32::MIN_POSITIVE);
-        let disturbed = square(params.disturbance) * disturbance;
-        ComplexField::sqrt(square(params.start_field_sd) + disturbed + unrest)
     }
 }
 

@@ -1,11 +1,11 @@
 //! What one update of an attitude filter costs on the unit's processor, ours beside those of published crates.
 //!
-//! In: nothing; the motion is a tumble computed here, the same exact rates, specific force and field for each. Out: the
-//! static `COSTS`, ticks of the processor's clock for every update of every filter, which the emulated board reads when
+//! In: nothing; the motion is a tumble computed here, the same exact rates, specific force and field for each; for ours a rest
+//! as well, where it compares more. Out: the static `COSTS`, ticks of the processor's clock for every update of every filter, which the emulated board reads when
 //! `DONE` is one. On that board a tick is an instruction.
 //!
 //! Every filter has its own defaults. Ours gathers samples and updates once a second ([`emems::kalman`]), so most of its
-//! steps are cheap and one in fifty is not; the others do the same at every sample.
+//! steps are cheap and the eight or ten after that are not; the others do the same at every sample.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -25,8 +25,8 @@ mod counted {
     use nalgebra::{UnitQuaternion, Vector3};
     use vqf_rs::VQF;
 
-    /// Filters.
-    const FILTERS: usize = 3;
+    /// Filters, ours twice.
+    const FILTERS: usize = 4;
     /// Updates of each: twelve seconds, after eight in which they find the attitude.
     const UPDATES: usize = 600;
     const SETTLING: usize = 400;
@@ -80,11 +80,16 @@ mod counted {
         (made, before.wrapping_sub(SYST::get_current()) & COUNTER)
     }
 
-    /// Ticks that `update` takes for each sample, kept as those of `filter`.
-    fn count(filter: usize, mut update: impl FnMut(&Sample)) {
+    /// Ticks that `update` takes for each sample of the tumble, or of a rest, kept as those of `filter`.
+    fn count(filter: usize, turns: bool, mut update: impl FnMut(&Sample)) {
         let mut q_nb = UnitQuaternion::identity();
         for step in 0..SETTLING + UPDATES {
-            let sample = motion(step, &mut q_nb);
+            let mut sample = motion(step, &mut q_nb);
+            if !turns {
+                sample.rate_b = Vector3::zeros();
+                sample.force_b = FORCE_N;
+                sample.field_b_ut = FIELD_N_UT;
+            }
             let ((), ticks) = ticks(|| update(&sample));
             if let Some(update) = step.checked_sub(SETTLING) {
                 COSTS[filter * UPDATES + update].store(ticks, Ordering::Relaxed);
@@ -93,9 +98,9 @@ mod counted {
     }
 
     #[inline(never)]
-    fn ours() {
+    fn ours(n: usize, turns: bool) {
         let mut filter = Filter::new(Params::ROOM);
-        count(0, |sample| {
+        count(n, turns, |sample| {
             let sampled = |value_b: Vector3<f32>, variance: f32| {
                 Some(Sampled {
                     value_b,
@@ -122,7 +127,7 @@ mod counted {
     #[inline(never)]
     fn madgwick() {
         let mut filter = Madgwick::<f32>::new(DT_S, 0.1);
-        count(1, |sample| {
+        count(2, true, |sample| {
             let old = |vector: &Vector3<f32>| nalgebra_034::Vector3::new(vector.x, vector.y, vector.z);
             let (rate, force, field) = (old(&sample.rate_b), old(&sample.force_b), old(&sample.field_b_ut));
             let _ = core::hint::black_box(filter.update(&rate, &force, &field).is_ok());
@@ -133,7 +138,7 @@ mod counted {
     #[inline(never)]
     fn vqf() {
         let mut filter = VQF::new(DT_S, None, None, None);
-        count(2, |sample| {
+        count(3, true, |sample| {
             filter.update(
                 sample.rate_b.into(),
                 sample.force_b.into(),
@@ -150,7 +155,8 @@ mod counted {
             core.SYST.set_reload(COUNTER);
             core.SYST.clear_current();
             core.SYST.enable_counter();
-            ours();
+            ours(0, true);
+            ours(1, false);
             madgwick();
             vqf();
             super::whole::count();

@@ -14,8 +14,9 @@ use twin::{
 };
 
 /// As in the image, in its order.
-const FILTERS: [&str; 3] = [
+const FILTERS: [&str; 4] = [
     "emems, gathers for a second and then updates",
+    "the same at rest",
     "Madgwick (ahrs)",
     "VQF (vqf-rs)",
 ];

@@ -218,7 +218,11 @@ impl Mekf {
         );
         self.update(&mut error, &h, residual, &noise);
         let small: Vector3<f64> = error.fixed_rows::<3>(0).into();
-        self.q_nb = UnitQuaternion::from_scaled_axis(small) * self.q_nb;
+        let turned = UnitQuaternion::from_scaled_axis(small);
+        self.q_nb = turned * self.q_nb;
+        for before_n in &mut self.acc_before_n {
+            *before_n = turned * *before_n;
+        }
         self.bias_b += error.fixed_rows::<3>(3);
         for axis in 0..3 {
             for about in 0..3 {
