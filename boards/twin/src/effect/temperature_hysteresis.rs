@@ -1,7 +1,8 @@
 //! Thermal hysteresis: while the temperature moves, the die is not at the temperature the thermometer tells.
 //!
-//! A zero that follows the die's temperature, which lags by `tau`, is off by `k_T tau dT/dt`: the loop in a plot of shift
-//! against temperature has this width.
+//! A zero that follows the die's temperature, which follows the thermometer's with a time constant `tau`, is off by
+//! `k_T (T - T_die) = k_T tau x`, where `x` is `dT/dt` through a low-pass of `tau`: the loop in a plot of shift against
+//! temperature has this width.
 
 use super::{Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
@@ -12,7 +13,7 @@ pub struct TemperatureHysteresis;
 const PAGE: Page = Page {
     name: "gyro-temperature-hysteresis",
     physics: "Warming and cooling, the gyro's zero is different at the same temperature.",
-    equation: "y = n.w + k dT/dt",
+    equation: "y = n.w + k x, tau x' + x = dT/dt",
     source: "A cousin part (ADIS16460): up to 0.1 deg/s",
     excited_by: "a ramp of temperature up and down",
     siblings: &["gyro-bias-temperature", "gyro-warm-up"],
@@ -28,8 +29,25 @@ impl Effect for TemperatureHysteresis {
         &PAGE
     }
 
-    fn act<'a>(&self, theta: &'a [f64], _variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
+    fn act<'a>(&self, theta: &'a [f64], variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
         let k = theta[0];
-        chain.add(move |feel, _| k * feel.temperature_rate);
+        if variant > 0.0 {
+            chain.add_lagging(variant, move |feel| k * feel.temperature_rate);
+        } else {
+            chain.add(move |feel, _| k * feel.temperature_rate);
+        }
+    }
+
+    fn told(&self, variant: f64) -> Option<String> {
+        (variant > 0.0).then(|| format!("a die that follows in {variant:.0} s"))
+    }
+
+    /// Time constants [s]: at once, or as packages and boards follow.
+    fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
+        vec![0.0, 5.0, 15.0]
+    }
+
+    fn has_values_between(&self) -> bool {
+        true
     }
 }
