@@ -116,7 +116,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
             parameters,
             share: total,
             when: match hypothesis.span {
-                Some(span) => format!("from {:.1} to {:.1} s", span.from, span.to),
+                Some(on) => on.to_string(),
                 None => regime::when(&feels, &energy),
             },
             which: hypothesis.cause.effect.told(hypothesis.cause.variant),

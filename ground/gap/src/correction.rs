@@ -291,7 +291,7 @@ mod tests {
     fn what_passes_or_is_the_references_fault_is_not_the_units_to_correct() {
         let twin = twin();
         let mut iron = component("hard-iron", Locality::Common, &[1.0, 0.0, 0.0]);
-        iron.span = Some(Span { from: 0.0, to: 5.0 });
+        iron.span = Some(Span { from: 0.0, to: 5.0 }.into());
         let tilt = component("table-tilt", Locality::Unit, &[0.01, 0.0]);
         assert!(Correction::of(&twin, &[iron, tilt]).is_none());
     }

@@ -200,9 +200,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     alternatives.dedup_by_key(|(name, _)| *name);
 
     let is_named = !causes.is_empty();
-    if is_named && let Some(span) = model.components.iter().find_map(|component| component.span) {
+    let mut once = model.components.iter().filter_map(|component| component.span);
+    if is_named && let Some(on) = once.find(|on| on.every_s.is_none()) {
         // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
-        place.passage = Some(Passage::of(&problem, span));
+        place.passage = Some(Passage::of(&problem, on.stretch));
     }
     let correction = (is_named && is_decided)
         .then(|| Correction::of(&subject.twin, &model.components))

@@ -14,7 +14,7 @@ use twin::{
     predict::Column,
 };
 
-use crate::{library::Hypothesis, model::Model, problem::Problem, windows::Span};
+use crate::{library::Hypothesis, model::Model, on::On, problem::Problem};
 
 /// Times the slope is taken anew over one standard deviation of what was found: an onset has no slope over less than a cycle.
 const ROUNDS: usize = 3;
@@ -126,7 +126,7 @@ fn slope(problem: &Problem, model: &Model, at: usize, step: f64, prior: f64) -> 
 }
 
 /// A column while a component is on.
-fn within(problem: &Problem, mut column: Column, span: Option<Span>) -> Column {
+fn within(problem: &Problem, mut column: Column, span: Option<On>) -> Column {
     let Some(span) = span else { return column };
     for (_, values) in &mut column.entries {
         for (value, start_s) in values.iter_mut().zip(problem.twin.starts_s()) {

@@ -12,6 +12,7 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
+pub mod again;
 pub mod attitude;
 pub mod attribute;
 pub mod baseline;
@@ -38,6 +39,7 @@ pub mod library;
 pub mod log;
 pub mod model;
 pub mod next;
+pub mod on;
 pub mod onset;
 pub mod open;
 pub mod page;

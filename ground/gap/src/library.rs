@@ -13,9 +13,9 @@ use twin::{
 
 use crate::{
     evidence::Screen,
+    on::On,
     problem::{Component, Problem},
     products::Products,
-    windows::Span,
 };
 
 /// An effect at a place.
@@ -30,7 +30,7 @@ pub struct Hypothesis {
     /// Logarithm of its prior odds against nothing.
     pub log_prior: f64,
     /// When it is on; `None` for always.
-    pub span: Option<Span>,
+    pub span: Option<On>,
 }
 
 impl Hypothesis {

@@ -13,14 +13,7 @@ use twin::{
     predict::{Column, Kind, Twin},
 };
 
-use crate::{
-    gram::Normal,
-    joint::Columns,
-    log::Series,
-    open::calibration,
-    reference::Reference,
-    windows::{Fit, Span},
-};
+use crate::{gram::Normal, joint::Columns, log::Series, on::On, open::calibration, reference::Reference, windows::Fit};
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
 /// in it.
@@ -32,7 +25,7 @@ pub struct Component {
     /// What and how large.
     pub active: Active,
     /// When; `None` for always.
-    pub span: Option<Span>,
+    pub span: Option<On>,
 }
 
 /// One channel of the fit windows.
@@ -69,6 +62,20 @@ impl Frame {
             }
             None => open.fill(0.0),
         }
+    }
+
+    /// What of a residual the calibration does not take up.
+    pub fn left(&self, residual: &DVector<f64>) -> DVector<f64> {
+        let mut left = residual.clone();
+        if let Some(factor) = &self.factor {
+            left.gemv(
+                -1.0,
+                &self.nuisance,
+                &factor.solve(&self.nuisance.tr_mul(residual)),
+                1.0,
+            );
+        }
+        left
     }
 
     /// Weighs its samples anew: the noise of each is so many times what it was taken for.
@@ -326,7 +333,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A column at the rows that are fitted, in units of noise.
-    pub fn in_noise(&self, column: &Column, span: Option<Span>) -> Vec<(usize, DVector<f64>)> {
+    pub fn in_noise(&self, column: &Column, span: Option<On>) -> Vec<(usize, DVector<f64>)> {
         let starts_s = self.twin.starts_s();
         let at = |(channel, values): &(usize, Vec<f64>)| {
             let frame = &self.frames[*channel];

@@ -4,10 +4,7 @@ mod gyros;
 
 use std::fs;
 
-use gap::{
-    attribute::attribute, case::Subject, command::taught, diagnose::Diagnosis, fit_error::FitError, library::Library,
-    model::Model, problem::Problem, terminal, verdict::Verdict,
-};
+use gap::{case::Subject, command::taught, diagnose::Diagnosis, terminal, verdict::Verdict};
 use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -230,18 +227,6 @@ fn packets_that_are_lost_again_in_the_held_out_windows_are_lost_packets() {
 }
 
 #[test]
-fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
-    // Nine prior sigmas: two of half the size would be likelier by a quarter of 9^2 nats, did they count as two.
-    let warm = diagnosed_in(&erring(|t_s| 0.027 * (-t_s / 57.0).exp(), ""), &[]).1;
-    let names: Vec<&str> = warm.promises.iter().map(|promised| promised.effect).collect();
-    assert_eq!((names.as_slice(), warm.causes.len()), (["gyro-warm-up"].as_slice(), 1));
-    let which = warm.causes[0].which.as_deref().expect("a time constant");
-    let tau_s: f64 = which.split(' ').find_map(|word| word.parse().ok()).expect("a number");
-    // A fiftieth of its amplitude is noise, and its zero is open.
-    assert!((tau_s - 57.0).abs() < 4.0, "{which}");
-}
-
-#[test]
 fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     let folder = rewritten(case(|_| 0.02), |cells| cells[2].clear());
     let (subject, diagnosis) = diagnosed_in(&folder, &[]);
@@ -269,68 +254,4 @@ fn a_tone_is_not_called_a_walk_of_the_zero() {
     let hummed = diagnosed_in(&erring(tone, ""), &[]).1;
     assert!(hummed.causes.is_empty(), "{:?}", hummed.causes);
     assert!(hummed.none_of_these > 0.9, "{}", hummed.none_of_these);
-}
-
-/// [s] time constants of a warm-up, none of which is tried as it is.
-const TAUS_S: [f64; 6] = [55.0, 66.0, 95.0, 110.0, 128.0, 140.0];
-
-/// How far the time constant that is found for a warm-up of `tau_s` is off, in standard deviations of what it is said to be
-/// off by.
-fn off(tau_s: f64) -> f64 {
-    let folder = erring(|t_s| 0.02 * (-t_s / tau_s).exp(), "");
-    let subject = Subject::open(folder.path()).expect("opens");
-    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
-    let mut library = Library::new(&problem, &[], &|_| {});
-    let found = attribute(&problem, &mut library, &|_| {});
-    let hypothesis = &library.hypotheses[found.chosen[0].hypothesis];
-    assert_eq!(hypothesis.effect(), "gyro-warm-up", "{tau_s} s");
-    let model = Model::around(&problem, found.model(&library));
-    let error = FitError::of(&problem, &model).with_value(&problem, &model, 0, hypothesis);
-    let variance = error.covariance[(error.slopes.len() - 1, error.slopes.len() - 1)];
-    let found_s = hypothesis.cause.variant;
-    println!("{tau_s} s: {found_s:.1} +- {:.1} s", variance.sqrt());
-    (found_s - tau_s) / variance.sqrt()
-}
-
-#[test]
-fn a_time_constant_is_off_by_as_much_as_is_said() {
-    let off = TAUS_S.map(off);
-    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
-    // Moved as long as that is worth a tenth of a nat, which is half a standard deviation; one log of noise.
-    assert!((0.2..1.5).contains(&rms), "{off:?}");
-}
-
-#[test]
-fn an_onset_beside_other_variants_is_moved_to_where_it_is() {
-    // A supply's variants are a ramp and onsets; 71 s is none of them.
-    let folder = erring(|t_s| if t_s > 71.0 { 0.02 } else { 0.0 }, "");
-    let said = diagnosed_in(&folder, &["gyro-bias"]).1;
-    let supply = said
-        .causes
-        .iter()
-        .find(|cause| cause.effect == "gyro-supply")
-        .expect("a supply");
-    assert!(
-        supply.which.as_deref().is_some_and(|told| told.contains("71")),
-        "{:?}",
-        supply.which
-    );
-}
-
-#[test]
-fn one_of_a_set_that_cannot_be_told_apart_is_a_cause_and_corrects_nothing() {
-    // A sine of one frequency: a delay and a lag are the same.
-    let folder = erring(|t_s| rate(t_s - 0.02) - rate(t_s), "");
-    let (subject, said) = diagnosed_in(&folder, &[]);
-    let cause = said.causes.first().expect("a cause");
-    assert!(
-        cause.probability < 0.5 && cause.any() > 0.9,
-        "{} of {}",
-        cause.probability,
-        cause.any()
-    );
-    assert!(said.indistinguishable.iter().any(|set| set.contains(&cause.effect)));
-    assert!(said.correction.is_none() && said.known.is_empty());
-    let screen = terminal::screen(&subject, &said, "");
-    assert!(screen.contains("perhaps"), "{screen}");
 }

@@ -250,6 +250,11 @@ pub trait Effect: Sync {
         None
     }
 
+    /// Whether this variant comes again and again, with a period that is to be found: it is on in such stretches only.
+    fn repeats(&self, _variant: f64) -> bool {
+        false
+    }
+
     /// How many times its prior sigma a parameter is sought in, of a variant whose sizes are of another order.
     fn reach(&self, _variant: f64) -> f64 {
         1.0

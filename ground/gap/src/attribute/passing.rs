@@ -7,11 +7,12 @@ use nalgebra::DVector;
 
 use super::variant::sharpened;
 use crate::{
+    again::again,
     library::{Entries, Hypothesis, Library},
+    on::On,
     onset,
     problem::Problem,
     refine::{Refined, model_of, refine},
-    windows::Span,
 };
 
 /// Part of what a set explains that an effect must bring to be seen coming and going beside it: what another effect's law
@@ -27,7 +28,7 @@ pub(super) fn stretches(
     best: &Refined,
     nothing: f64,
     gains: &mut [f64],
-) -> Vec<Option<Span>> {
+) -> Vec<Option<On>> {
     let model = model_of(library, set, &best.thetas);
     let least = PASSING_PART * (best.log_evidence - nothing);
     let rest: Vec<DVector<f64>> = (0..problem.frames.len())
@@ -36,7 +37,8 @@ pub(super) fn stretches(
     let starts_s = problem.twin.starts_s();
     let stretch = |(hypothesis, gain): (&Hypothesis, &mut f64)| {
         let effect = hypothesis.cause.effect;
-        if !gain.is_finite() || !effect.page().passes || effect.variants(starts_s).len() > 1 {
+        let repeats = effect.repeats(hypothesis.cause.variant);
+        if !gain.is_finite() || !effect.page().passes || !repeats && effect.variants(starts_s).len() > 1 {
             return None;
         }
         let places = hypothesis.places.iter();
@@ -44,7 +46,15 @@ pub(super) fn stretches(
         let sigmas: Vec<f64> = (hypothesis.parameters.iter())
             .map(|parameter| parameter.prior_sigma)
             .collect();
-        let (span, more) = onset::stretch(problem, &rest, &slopes, &sigmas)?;
+        let found = match repeats {
+            true => again(problem, &rest, &slopes, &sigmas),
+            false => onset::stretch(problem, &rest, &slopes, &sigmas).map(|(span, more)| (span.into(), more)),
+        };
+        let Some((span, more)) = found else {
+            // What is on always is another effect.
+            *gain = if repeats { f64::NEG_INFINITY } else { *gain };
+            return None;
+        };
         (*gain + more > least).then(|| {
             *gain += more;
             span
@@ -60,7 +70,7 @@ pub(super) fn taken(
     library: &mut Library,
     set: &[usize],
     start: &[DVector<f64>],
-    span: Option<Span>,
+    span: Option<On>,
 ) -> Refined {
     let refined = match span {
         Some(span) => passing(problem, library, set, start, span),
@@ -76,7 +86,7 @@ pub(super) fn fitted(
     library: &mut Library,
     set: &[usize],
     start: &[DVector<f64>],
-    span: Option<Span>,
+    span: Option<On>,
     is_contested: bool,
 ) -> Refined {
     match (span, set.last()) {
@@ -100,7 +110,7 @@ pub(super) fn fitted(
 
 /// A set with its last member on in a stretch of time only, refined. The library has its columns for that stretch from then
 /// on; [`always`] gives it back those it had.
-fn passing(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>], span: Span) -> Refined {
+fn passing(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>], span: On) -> Refined {
     let last = set[set.len() - 1];
     library.hypotheses[last].span = Some(span);
     let mut thetas = start.to_vec();
@@ -127,7 +137,7 @@ pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], b
     let Some((span, _)) = onset::stretch(problem, &rest, slopes, &sigmas) else {
         return best;
     };
-    let refined = passing(problem, library, set, &best.thetas, span);
+    let refined = passing(problem, library, set, &best.thetas, span.into());
     if refined.log_evidence > best.log_evidence {
         return refined;
     }

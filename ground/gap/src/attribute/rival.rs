@@ -5,9 +5,9 @@
 use super::{CANDIDATES, Chosen, estimate_of, fitted, gains, is_any_same, is_physical, leading, stretches};
 use crate::{
     library::Library,
+    on::On,
     problem::Problem,
     refine::{Refined, refine},
-    windows::Span,
 };
 
 /// [nats] behind the chosen effect from which a rival is not worth an exact fit.
@@ -21,7 +21,7 @@ pub struct Rival {
     /// [nats] over the model with neither, prior odds included.
     pub gain: f64,
     /// When it would be on; `None` for always.
-    pub span: Option<Span>,
+    pub span: Option<On>,
 }
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.

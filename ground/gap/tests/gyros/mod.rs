@@ -1,5 +1,7 @@
 //! Three gyros on a table, as files: what the cases made here have in common.
 
+#![allow(dead_code, reason = "each of the tests uses a part of it")]
+
 use std::{fmt::Write, fs};
 
 use gap::{

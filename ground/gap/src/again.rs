@@ -1,0 +1,229 @@
+//! When an effect is on that comes again and again: a transmitter with its beacon, a heater with its thermostat.
+//!
+//! In: an effect's slopes, and the residual without it. Out: the stretch of time that comes again in which it explains most,
+//! and by how much more than always. Residuals are folded at each period tried, and the one in whose phases they differ most
+//! is taken (epoch folding; Leahy et al. 1983); then all stretches of phases are compared by their evidence, finer and finer,
+//! as [`crate::onset`] does for one stretch. Having looked costs the logarithm of how many were compared.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::{
+    evidence::Screen,
+    library::Entries,
+    on::On,
+    problem::{Frame, Problem},
+    windows::Span,
+};
+
+/// Phases into which a period is folded.
+const PHASES: usize = 24;
+
+/// [s] the shortest period; the longest comes three times in the fitted time, so that it is seen to come again.
+const SHORTEST_S: f64 = 4.0;
+const FEWEST: f64 = 3.0;
+
+/// Steps of frequency in which the last cycle moves by a period.
+const STEPS: f64 = 4.0;
+
+/// Times the period and the edges are sought nearer.
+const ROUNDS: usize = 6;
+
+/// [nats] it must gain over always, beyond the price of having looked.
+const MARGIN: f64 = 10.0;
+
+/// The residuals of the channels that an effect touches.
+struct Folded<'a> {
+    channels: Vec<Channel<'a>>,
+    sigmas: &'a [f64],
+}
+
+/// One of them.
+struct Channel<'a> {
+    frame: &'a Frame,
+    /// [s] instants of its samples.
+    t_s: Vec<f64>,
+    slopes: DMatrix<f64>,
+    /// What the calibration leaves of its residual.
+    left: DVector<f64>,
+}
+
+/// The stretch that comes again in which the effect with these `slopes` is on, and the nats it gains over always; `None` for
+/// none that is much better. `rest` is the residual of every channel without it.
+pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(On, f64)> {
+    let folded = Folded::new(problem, rest, slopes, sigmas);
+    let instants = folded.channels.iter().flat_map(|channel| &channel.t_s);
+    let (from_s, to_s) = instants.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t_s| {
+        (from.min(*t_s), to.max(*t_s))
+    });
+    let span_s = to_s - from_s;
+    let (least_hz, most_hz) = (FEWEST / span_s, 1.0 / SHORTEST_S);
+    if !(span_s.is_finite() && least_hz < most_hz) {
+        return None;
+    }
+    let step_hz = 1.0 / (STEPS * span_s);
+    let steps = ((most_hz - least_hz) / step_hz) as usize;
+    let periods = (0..=steps).map(|step| 1.0 / (least_hz + step_hz * step as f64));
+    let mut every_s = periods
+        .map(|every_s| (folded.differ(every_s), every_s))
+        .max_by(|one, other| one.0.total_cmp(&other.0))?
+        .1;
+    let edges = |around: &[f64], step: f64| -> Vec<f64> {
+        let near = |edge: &f64| {
+            (-3..=3)
+                .map(|index| (edge + step * f64::from(index)).rem_euclid(1.0))
+                .collect::<Vec<_>>()
+        };
+        around.iter().flat_map(near).collect()
+    };
+    let mut all: Vec<f64> = (0..PHASES).map(|phase| phase as f64 / PHASES as f64).collect();
+    let (mut found, mut hz_step, mut edge_step) = (None, 0.5 * step_hz, 1.0 / PHASES as f64);
+    for _ in 0..ROUNDS {
+        let tried = (-2..=2).map(|index| 1.0 / (1.0 / every_s + hz_step * f64::from(index)));
+        let best = tried.filter_map(|every_s| folded.best(every_s, from_s, &all).map(|best| (best, every_s)));
+        let ((gain, [on, off]), period_s) = best.max_by(|one, other| one.0.0.total_cmp(&other.0.0))?;
+        every_s = period_s;
+        found = Some((gain, on, off));
+        (hz_step, edge_step) = (0.4 * hz_step, 0.4 * edge_step);
+        all = edges(&[on, off], edge_step);
+    }
+    let (gain, on, off) = found?;
+    let price = ((steps * PHASES * PHASES) as f64).ln();
+    let from = from_s + on * every_s;
+    let stretch = Span {
+        from,
+        to: from + (off - on).rem_euclid(1.0) * every_s,
+    };
+    let every_s = Some(every_s);
+    (gain > MARGIN + price).then_some((On { stretch, every_s }, gain - price))
+}
+
+impl<'a> Folded<'a> {
+    fn new(problem: &'a Problem<'a>, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &'a [f64]) -> Self {
+        let starts_s = problem.twin.starts_s();
+        let channels = (0..problem.frames.len()).filter_map(|channel| {
+            let of = |entries: &'_ Entries| {
+                let own = entries.iter().find(|(index, _)| *index == channel);
+                own.map(|(_, values)| values.clone())
+            };
+            let columns: Vec<Option<DVector<f64>>> = slopes.iter().map(of).collect();
+            if columns.iter().all(Option::is_none) {
+                return None;
+            }
+            let frame = &problem.frames[channel];
+            let none = DVector::zeros(frame.series.rows.len());
+            let columns: Vec<DVector<f64>> = columns
+                .into_iter()
+                .map(|own| own.unwrap_or_else(|| none.clone()))
+                .collect();
+            let t_s = frame.series.rows.iter().map(|row| starts_s[*row as usize]).collect();
+            Some(Channel {
+                frame,
+                t_s,
+                slopes: DMatrix::from_columns(&columns),
+                left: frame.left(&rest[channel]),
+            })
+        });
+        Folded {
+            channels: channels.collect(),
+            sigmas,
+        }
+    }
+
+    /// How much the phases of a period differ: the energy of their means.
+    fn differ(&self, every_s: f64) -> f64 {
+        let of_channel = |channel: &Channel| -> f64 {
+            let mut phases = [(0.0, 0.0); PHASES];
+            for (t_s, left) in channel.t_s.iter().zip(channel.left.iter()) {
+                let phase = ((t_s / every_s).rem_euclid(1.0) * PHASES as f64) as usize % PHASES;
+                phases[phase].0 += left;
+                phases[phase].1 += 1.0;
+            }
+            phases
+                .iter()
+                .map(|(sum, count)| sum * sum / f64::max(*count, 1.0))
+                .sum()
+        };
+        self.channels.iter().map(of_channel).sum()
+    }
+
+    /// The best stretch between two of these phases after `from_s`, and the nats it gains over always.
+    fn best(&self, every_s: f64, from_s: f64, edges: &[f64]) -> Option<(f64, [f64; 2])> {
+        let mut edges = edges.to_vec();
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let pieces = self.pieces(every_s, from_s, &edges);
+        let whole = pieces.iter().fold(self.none(), |sum, piece| sum.and(piece));
+        let always = self.evidence(&whole);
+        let mut best: Option<(f64, [f64; 2])> = None;
+        for on in 0..edges.len() {
+            let mut sum = self.none();
+            for length in 1..edges.len() {
+                sum = sum.and(&pieces[(on + length - 1) % edges.len()]);
+                let gain = self.evidence(&sum) - always;
+                if best.is_none_or(|(most, _)| gain > most) {
+                    best = Some((gain, [edges[on], edges[(on + length) % edges.len()]]));
+                }
+            }
+        }
+        best
+    }
+
+    fn none(&self) -> Piece {
+        let width = self.sigmas.len();
+        let open = |channel: &Channel| DMatrix::zeros(channel.frame.nuisance.ncols(), width);
+        Piece {
+            information: DMatrix::zeros(width, width),
+            score: DVector::zeros(width),
+            open: self.channels.iter().map(open).collect(),
+        }
+    }
+
+    /// Sums between each phase and the next.
+    fn pieces(&self, every_s: f64, from_s: f64, edges: &[f64]) -> Vec<Piece> {
+        let mut pieces: Vec<Piece> = edges.iter().map(|_| self.none()).collect();
+        for (at, channel) in self.channels.iter().enumerate() {
+            let mut rows: Vec<Vec<usize>> = vec![Vec::new(); edges.len()];
+            for (row, t_s) in channel.t_s.iter().enumerate() {
+                let phase = ((t_s - from_s) / every_s).rem_euclid(1.0);
+                let piece = edges.partition_point(|edge| *edge <= phase);
+                rows[(piece + edges.len() - 1) % edges.len()].push(row);
+            }
+            for (piece, rows) in pieces.iter_mut().zip(rows) {
+                let slopes = channel.slopes.select_rows(&rows);
+                piece.information += slopes.tr_mul(&slopes);
+                piece.score += slopes.tr_mul(&channel.left.select_rows(&rows));
+                piece.open[at] = channel.frame.nuisance.select_rows(&rows).tr_mul(&slopes);
+                channel.frame.solve_open(&mut piece.open[at]);
+            }
+        }
+        pieces
+    }
+
+    fn evidence(&self, piece: &Piece) -> f64 {
+        let mut screen = Screen::zeros(self.sigmas.to_vec());
+        screen.information.copy_from(&piece.information);
+        // What is left by the calibration has its part taken off already.
+        screen.score.copy_from(&piece.score);
+        piece
+            .open
+            .iter()
+            .for_each(|open| screen.information -= open.tr_mul(open));
+        screen.log_evidence().unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
+/// Sums of one stretch: products of the slopes, with what is left, and what the calibration can imitate.
+struct Piece {
+    information: DMatrix<f64>,
+    score: DVector<f64>,
+    open: Vec<DMatrix<f64>>,
+}
+
+impl Piece {
+    fn and(mut self, other: &Piece) -> Self {
+        self.information += &other.information;
+        self.score += &other.score;
+        (self.open.iter_mut().zip(&other.open)).for_each(|(sum, open)| *sum += open);
+        self
+    }
+}

@@ -1,0 +1,113 @@
+//! What of an effect is no parameter: a time constant, an onset, when it comes again; and which of those that are the same here.
+
+mod gyros;
+
+use gap::{
+    again::again, attribute::attribute, case::Subject, fit_error::FitError, library::Library, model::Model, on::On,
+    problem::Problem, terminal,
+};
+use gyros::{diagnosed_in, erring, rate};
+
+#[test]
+fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
+    // Nine prior sigmas: two of half the size would be likelier by a quarter of 9^2 nats, did they count as two.
+    let warm = diagnosed_in(&erring(|t_s| 0.027 * (-t_s / 57.0).exp(), ""), &[]).1;
+    let names: Vec<&str> = warm.promises.iter().map(|promised| promised.effect).collect();
+    assert_eq!((names.as_slice(), warm.causes.len()), (["gyro-warm-up"].as_slice(), 1));
+    let which = warm.causes[0].which.as_deref().expect("a time constant");
+    let tau_s: f64 = which.split(' ').find_map(|word| word.parse().ok()).expect("a number");
+    // A fiftieth of its amplitude is noise, and its zero is open.
+    assert!((tau_s - 57.0).abs() < 4.0, "{which}");
+}
+
+/// [s] time constants of a warm-up, none of which is tried as it is.
+const TAUS_S: [f64; 6] = [55.0, 66.0, 95.0, 110.0, 128.0, 140.0];
+
+/// How far the time constant that is found for a warm-up of `tau_s` is off, in standard deviations of what it is said to be
+/// off by.
+fn off(tau_s: f64) -> f64 {
+    let folder = erring(|t_s| 0.02 * (-t_s / tau_s).exp(), "");
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let mut library = Library::new(&problem, &[], &|_| {});
+    let found = attribute(&problem, &mut library, &|_| {});
+    let hypothesis = &library.hypotheses[found.chosen[0].hypothesis];
+    assert_eq!(hypothesis.effect(), "gyro-warm-up", "{tau_s} s");
+    let model = Model::around(&problem, found.model(&library));
+    let error = FitError::of(&problem, &model).with_value(&problem, &model, 0, hypothesis);
+    let variance = error.covariance[(error.slopes.len() - 1, error.slopes.len() - 1)];
+    let found_s = hypothesis.cause.variant;
+    println!("{tau_s} s: {found_s:.1} +- {:.1} s", variance.sqrt());
+    (found_s - tau_s) / variance.sqrt()
+}
+
+#[test]
+fn a_time_constant_is_off_by_as_much_as_is_said() {
+    let off = TAUS_S.map(off);
+    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
+    // Moved as long as that is worth a tenth of a nat, which is half a standard deviation; one log of noise.
+    assert!((0.2..1.5).contains(&rms), "{off:?}");
+}
+
+#[test]
+fn an_onset_beside_other_variants_is_moved_to_where_it_is() {
+    // A supply's variants are a ramp and onsets; 71 s is none of them.
+    let folder = erring(|t_s| if t_s > 71.0 { 0.02 } else { 0.0 }, "");
+    let said = diagnosed_in(&folder, &["gyro-bias"]).1;
+    let supply = said
+        .causes
+        .iter()
+        .find(|cause| cause.effect == "gyro-supply")
+        .expect("a supply");
+    assert!(
+        supply.which.as_deref().is_some_and(|told| told.contains("71")),
+        "{:?}",
+        supply.which
+    );
+}
+
+#[test]
+fn one_of_a_set_that_cannot_be_told_apart_is_a_cause_and_corrects_nothing() {
+    // A sine of one frequency: a delay and a lag are the same.
+    let folder = erring(|t_s| rate(t_s - 0.02) - rate(t_s), "");
+    let (subject, said) = diagnosed_in(&folder, &[]);
+    let cause = said.causes.first().expect("a cause");
+    assert!(
+        cause.probability < 0.5 && cause.any() > 0.9,
+        "{} of {}",
+        cause.probability,
+        cause.any()
+    );
+    assert!(said.indistinguishable.iter().any(|set| set.contains(&cause.effect)));
+    assert!(said.correction.is_none() && said.known.is_empty());
+    let screen = terminal::screen(&subject, &said, "");
+    assert!(screen.contains("perhaps"), "{screen}");
+}
+
+/// When a constant error of gz is on, and the nats that gains over always.
+fn when_on(error: impl Fn(f64) -> f64) -> Option<(On, f64)> {
+    let folder = erring(error, "");
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let rest: Vec<_> = (0..3).map(|channel| problem.residual(channel, &[])).collect();
+    let one = problem.frames[2].weights.map(|weight| 1.0 / weight);
+    again(&problem, &rest, &[vec![(2, one)]], &[0.01])
+}
+
+#[test]
+fn what_comes_again_is_found_with_its_period() {
+    const EVERY_S: f64 = 17.3;
+    let (on, gain) = when_on(|t_s| if (t_s / EVERY_S).fract() < 0.35 { 0.002 } else { 0.0 }).expect("it comes again");
+    let every_s = on.every_s.expect("a period");
+    assert!((every_s - EVERY_S).abs() < 0.05 && gain > 20.0, "{on}: {gain} nats");
+    let (from, length) = (on.stretch.from.rem_euclid(every_s), on.stretch.to - on.stretch.from);
+    assert!(
+        from.min(every_s - from) < 0.5 && (length - 0.35 * EVERY_S).abs() < 0.5,
+        "{on}"
+    );
+    // What is there once does not, nor does noise.
+    for error in [|_: f64| 0.0, |t_s: f64| if t_s > 50.0 { 0.002 } else { 0.0 }] {
+        let none = when_on(error);
+        assert!(none.is_none(), "{none:?}");
+    }
+}
