@@ -17,7 +17,9 @@ use indicatif::ProgressBar;
 use packets::stream::{Bytes5To8, Decoder, Item};
 
 use crate::{
-    broad, chapter6, counts,
+    broad,
+    chapter6::{self, calibrated::NotCalibrated},
+    counts,
     flight::{Comparison, Flight},
     log::{Cycle, Cycles},
     methods::{self, NoSet},
@@ -89,6 +91,9 @@ pub enum AttitudeError {
     /// A calibration set cannot be used.
     #[error(transparent)]
     Set(#[from] NoSet),
+    /// The twin's unit cannot be calibrated.
+    #[error(transparent)]
+    Calibration(#[from] NotCalibrated),
     /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
@@ -113,7 +118,10 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
         return table(folder, arguments.peers);
     }
     if arguments.theses {
-        print!("{}{}", chapter6::tables(SEED), orbit::table(SEED));
+        let bar = ProgressBar::new(chapter6::STEPS);
+        let tables = chapter6::tables(SEED, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        print!("{tables}{}", orbit::table(SEED));
         return Ok(());
     }
     let path = arguments.log.clone().unwrap_or_default();
