@@ -28,6 +28,9 @@ const STEPS: f64 = 4.0;
 /// Times the period and the edges are sought nearer.
 const ROUNDS: usize = 6;
 
+/// Part of what it explains that each third of the time must.
+const LEAST_THIRD: f64 = 0.1;
+
 /// [nats] it must gain over always, beyond the price of having looked.
 const MARGIN: f64 = 10.0;
 
@@ -93,8 +96,20 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
         from,
         to: from + (off - on).rem_euclid(1.0) * every_s,
     };
-    let every_s = Some(every_s);
-    (gain > MARGIN + price).then_some((On { stretch, every_s }, gain - price))
+    let on = On {
+        stretch,
+        every_s: Some(every_s),
+    };
+    // What comes again is there at all times: a few damaged samples are in some cycles of some period.
+    let third_s = span_s / 3.0;
+    let parts = (0..3).map(|third| {
+        let from = from_s + third_s * f64::from(third);
+        let to = if third == 2 { f64::INFINITY } else { from + third_s };
+        folded.within(on, Span { from, to })
+    });
+    let gains = folded.gains(parts.collect())?;
+    let is_there = gains.iter().all(|own| *own > LEAST_THIRD * gains.iter().sum::<f64>());
+    (gain > MARGIN + price && is_there).then_some((on, gain - price))
 }
 
 impl<'a> Folded<'a> {
@@ -189,17 +204,41 @@ impl<'a> Folded<'a> {
                 rows[(piece + edges.len() - 1) % edges.len()].push(row);
             }
             for (piece, rows) in pieces.iter_mut().zip(rows) {
-                let slopes = channel.slopes.select_rows(&rows);
-                piece.information += slopes.tr_mul(&slopes);
-                piece.score += slopes.tr_mul(&channel.left.select_rows(&rows));
-                piece.open[at] = channel.frame.nuisance.select_rows(&rows).tr_mul(&slopes);
-                channel.frame.solve_open(&mut piece.open[at]);
+                piece.add(at, channel, &rows);
             }
         }
         pieces
     }
 
+    /// What is there while it is on, in a part of the time.
+    fn within(&self, on: On, part: Span) -> Screen {
+        let mut piece = self.none();
+        for (at, channel) in self.channels.iter().enumerate() {
+            let is_in = |row: &usize| on.contains(channel.t_s[*row]) && part.contains(channel.t_s[*row]);
+            let rows: Vec<usize> = (0..channel.t_s.len()).filter(is_in).collect();
+            piece.add(at, channel, &rows);
+        }
+        self.screen(&piece)
+    }
+
+    /// [nats] what parameters that are fitted to some parts together explain of each.
+    fn gains(&self, parts: Vec<Screen>) -> Option<Vec<f64>> {
+        let mut whole = Screen::zeros(self.sigmas.to_vec());
+        for part in &parts {
+            whole.information += &part.information;
+            whole.score += &part.score;
+        }
+        let all: Vec<usize> = (0..self.sigmas.len()).collect();
+        let theta = whole.estimate(&all)?.parameters;
+        let gain = |part: &Screen| theta.dot(&part.score) - 0.5 * theta.dot(&(&part.information * &theta));
+        Some(parts.iter().map(gain).collect())
+    }
+
     fn evidence(&self, piece: &Piece) -> f64 {
+        self.screen(piece).log_evidence().unwrap_or(f64::NEG_INFINITY)
+    }
+
+    fn screen(&self, piece: &Piece) -> Screen {
         let mut screen = Screen::zeros(self.sigmas.to_vec());
         screen.information.copy_from(&piece.information);
         // What is left by the calibration has its part taken off already.
@@ -208,7 +247,7 @@ impl<'a> Folded<'a> {
             .open
             .iter()
             .for_each(|open| screen.information -= open.tr_mul(open));
-        screen.log_evidence().unwrap_or(f64::NEG_INFINITY)
+        screen
     }
 }
 
@@ -220,6 +259,16 @@ struct Piece {
 }
 
 impl Piece {
+    /// Adds samples of one channel, the `at`-th.
+    fn add(&mut self, at: usize, channel: &Channel, rows: &[usize]) {
+        let slopes = channel.slopes.select_rows(rows);
+        self.information += slopes.tr_mul(&slopes);
+        self.score += slopes.tr_mul(&channel.left.select_rows(rows));
+        let mut open = channel.frame.nuisance.select_rows(rows).tr_mul(&slopes);
+        channel.frame.solve_open(&mut open);
+        self.open[at] += open;
+    }
+
     fn and(mut self, other: &Piece) -> Self {
         self.information += &other.information;
         self.score += &other.score;
