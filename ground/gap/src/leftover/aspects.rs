@@ -239,14 +239,14 @@ impl<'a> Sights<'a> {
         let mut common = vec![DMatrix::zeros(BINS, 3); kinds];
         let mut stretches = vec![[0.0; STRETCHES]; kinds];
         let mut bursts: Vec<_> = (0..kinds).map(|_| BURSTS.map(Bursts::new)).collect();
-        let mut shares = Vec::new();
+        let mut powers = Vec::new();
         for (index, (view, shapes)) in self.views.iter().zip(&self.shapes).enumerate() {
             let rest = &fitted.rest[index];
             let values = rest.as_slice();
             let binned = shapes.binned(rest);
             let along = shapes.along(rest, &binned);
             let transform = self.spectra[index].of(values);
-            shares.push(transform.shares());
+            powers.push(transform.powers());
             let squares = squares(values);
             let mut own = vec![
                 rest.norm_squared(),
@@ -284,7 +284,7 @@ impl<'a> Sights<'a> {
         }
         sums.extend(
             self.parts()
-                .map(|part| strongest(self.of_part(part).map(|channel| &shares[channel]))),
+                .map(|part| strongest(self.of_part(part).map(|channel| &powers[channel]))),
         );
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));

@@ -2,7 +2,7 @@
 //!
 //! In: a residual. Out: a [`Transform`], and of it how far a line stands above its neighbours: noise and drift have no line,
 //! whatever spectrum they have, so this is what tells a tone from a walk of the zero that is as strong, or from noise that is
-//! as loud. And how much of the energy each frequency has (Fisher 1929), of one channel or of several that are one part's:
+//! as loud. And how much power each frequency has (the largest of a periodogram; Fisher 1929), of one channel or of several that are one part's:
 //! this sees a tone that is too weak for the neighbours to tell, or that stands between two frequencies.
 
 use std::{f64::consts::PI, sync::Arc};
@@ -95,23 +95,22 @@ impl Transform {
         self.bins[bin] * 0.5 - (below * turn + above * turn.conj()) * 0.25
     }
 
-    /// The power of each frequency over the mean of all, from [`SLOWEST`] cycles of the log on.
-    pub fn shares(&self) -> Vec<f64> {
-        let powers: Vec<f64> = self.bins.iter().skip(SLOWEST).map(Complex::norm_sqr).collect();
-        let mean = powers.iter().sum::<f64>() / powers.len().max(1) as f64;
-        powers
-            .into_iter()
-            .map(|power| if mean > 0.0 { power / mean } else { 0.0 })
-            .collect()
+    /// The power of each frequency in units of noise, one on the average, from [`SLOWEST`] cycles of the log on. Not over the
+    /// mean of what is there: where slow errors are allowed for, noise has less than one at high frequencies, and slow ones
+    /// would all be lines.
+    pub fn powers(&self) -> Vec<f64> {
+        let noise = self.count.max(1) as f64;
+        let bins = self.bins.iter().skip(SLOWEST);
+        bins.map(|bin| bin.norm_sqr() / noise).collect()
     }
 }
 
-/// The most that one frequency has in all of some channels together, given the [`Transform::shares`] of each.
+/// The most that one frequency has in all of some channels together, given the [`Transform::powers`] of each.
 pub fn strongest<'a>(channels: impl Iterator<Item = &'a Vec<f64>>) -> f64 {
     let mut sums: Vec<f64> = Vec::new();
-    for shares in channels {
-        sums.resize(sums.len().max(shares.len()), 0.0);
-        sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share);
+    for powers in channels {
+        sums.resize(sums.len().max(powers.len()), 0.0);
+        sums.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
     }
     sums.into_iter().fold(0.0, f64::max)
 }
@@ -166,13 +165,13 @@ mod tests {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
         let spectrum = Spectrum::new(COUNT);
         // Twelve cycles and a half, which have a third of their energy in no bin.
-        let mut shares = |amplitude: f64| {
+        let mut powers = |amplitude: f64| {
             let tone = |row: usize| amplitude * (row as f64 * 12.5 * 2.0 * PI / COUNT as f64).sin();
             let mut sample =
                 |row: usize| -> f64 { Distribution::<f64>::sample(&StandardNormal, &mut random) + tone(row) };
-            spectrum.of(&(0..COUNT).map(&mut sample).collect::<Vec<f64>>()).shares()
+            spectrum.of(&(0..COUNT).map(&mut sample).collect::<Vec<f64>>()).powers()
         };
-        let (alone, with) = ([(); 3].map(|()| shares(0.0)), [(); 3].map(|()| shares(0.2)));
+        let (alone, with) = ([(); 3].map(|()| powers(0.0)), [(); 3].map(|()| powers(0.2)));
         let strongest = |channels: &[Vec<f64>]| super::strongest(channels.iter());
         // The largest of 750 sums of three exponentials is 10 to 16.
         assert!(strongest(&alone) < 17.0, "{}", strongest(&alone));
@@ -186,7 +185,7 @@ mod tests {
             let spectrum = Spectrum::new(count);
             assert_eq!(spectrum.of(&vec![0.0; count]).plainness(), 0.0, "{count}");
             assert_eq!(
-                strongest([spectrum.of(&vec![0.0; count]).shares()].iter()),
+                strongest([spectrum.of(&vec![0.0; count]).powers()].iter()),
                 0.0,
                 "{count}"
             );
