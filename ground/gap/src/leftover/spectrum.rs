@@ -100,7 +100,8 @@ impl Transform {
     /// would all be lines.
     pub fn powers(&self) -> Vec<f64> {
         let noise = self.count.max(1) as f64;
-        let bins = self.bins.iter().skip(SLOWEST);
+        // Half a cycle a sample has one degree of freedom and not two, and the longer tail.
+        let bins = self.bins.iter().take(self.count.div_ceil(2)).skip(SLOWEST);
         bins.map(|bin| bin.norm_sqr() / noise).collect()
     }
 }
