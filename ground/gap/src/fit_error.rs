@@ -9,10 +9,7 @@
 //! others' parameters follow it by `-b`, so their covariance with it is `-b var` and among themselves `b b' var` more.
 
 use nalgebra::{DMatrix, DVector};
-use twin::{
-    effect::{Active, onsets},
-    predict::Column,
-};
+use twin::{effect::Active, predict::Column};
 
 use crate::{library::Hypothesis, model::Model, on::On, problem::Problem};
 
@@ -48,14 +45,20 @@ impl FitError {
     /// The same with the value of `model[at]`, a hypothesis' between its variants, if it has such a one.
     pub fn with_value(&self, problem: &Problem, model: &Model, at: usize, hypothesis: &Hypothesis) -> Self {
         let mut error = self.clone();
-        let Some(prior) = grid(problem, hypothesis).and_then(|grid| {
-            let value = model.components[at].active.cause.variant;
+        let cause = &model.components[at].active.cause;
+        let value = cause.variant;
+        let Some(prior) = hypothesis.values_between(problem.twin.starts_s()).and_then(|grid| {
             let above = grid.partition_point(|other| *other <= value).min(grid.len() - 1);
             Some(grid.get(above)? - grid.get(above.checked_sub(1)?)?)
         }) else {
             return error;
         };
-        let mut step = 0.1 * prior;
+        // A time constant or a limit has no other sign.
+        let most = match cause.effect.has_values_between() && value != 0.0 {
+            true => prior.min(0.5 * value.abs()),
+            false => prior,
+        };
+        let mut step = (0.1 * prior).min(most);
         for _ in 0..ROUNDS {
             let slope = slope(problem, model, at, step, prior);
             let column = whole(problem, &slope);
@@ -65,29 +68,10 @@ impl FitError {
             error.covariance = extended(&self.covariance, &-fitted.parameters, variance);
             error.slopes.truncate(self.slopes.len());
             error.slopes.push(refitted(problem, slope));
-            step = variance.sqrt().min(prior);
+            step = variance.sqrt().min(most);
         }
         error
     }
-}
-
-/// The values about that of a hypothesis between which others are possible, in order; `None` where there are none.
-pub fn grid(problem: &Problem, hypothesis: &Hypothesis) -> Option<Vec<f64>> {
-    let starts_s = problem.twin.starts_s();
-    let cause = &hypothesis.cause;
-    let mut grid = cause.effect.variants(starts_s);
-    if !cause.effect.has_values_between() {
-        let onsets: Vec<f64> = onsets(starts_s).collect();
-        let is_other = |value: &f64| !onsets.contains(value);
-        let others: Vec<f64> = grid.iter().copied().filter(is_other).collect();
-        let is_onset = grid.len() == others.len() + onsets.len() && !others.contains(&cause.variant);
-        if !is_onset || hypothesis.places.is_empty() {
-            return None;
-        }
-        grid = onsets;
-    }
-    grid.sort_by(f64::total_cmp);
-    Some(grid)
 }
 
 /// The covariance of parameters that follow a value of this variance by `along`, and of that value.

@@ -66,11 +66,7 @@ impl Joint {
 
     /// Fits one residual a channel.
     pub fn fit(&self, residuals: &[DVector<f64>]) -> Fitted {
-        let width = self
-            .channels
-            .first()
-            .map_or(0, |channel| channel.columns.effects.ncols());
-        let mut score = DVector::zeros(width);
+        let mut score = DVector::zeros(self.width());
         let mut alone = Vec::new();
         for (channel, residual) in self.channels.iter().zip(residuals) {
             let pull = channel.columns.nuisance.tr_mul(residual);
@@ -102,10 +98,16 @@ impl Joint {
         fitted
     }
 
-    /// Covariance of the effects' parameters.
+    /// Covariance of the effects' parameters; zero where numbers that are not finite let nothing be fitted.
     pub fn covariance(&self) -> DMatrix<f64> {
+        let width = self.width();
         let precision = self.precision.as_ref();
-        precision.map_or_else(|| DMatrix::zeros(0, 0), Cholesky::inverse)
+        precision.map_or_else(|| DMatrix::zeros(width, width), Cholesky::inverse)
+    }
+
+    fn width(&self) -> usize {
+        let first = self.channels.first();
+        first.map_or(0, |channel| channel.columns.effects.ncols())
     }
 
     /// Columns of each channel.
@@ -147,6 +149,15 @@ mod tests {
         }
         let estimate = screen.estimate(&[0, 1]).expect("finite");
         assert!((joint.parameters - estimate.parameters).norm() < ROUNDING);
+    }
+
+    #[test]
+    fn what_cannot_be_fitted_has_parameters_and_a_covariance_nevertheless() {
+        let mut broken = columns(0.1);
+        broken.effects[(3, 0)] = f64::NAN;
+        let joint = Joint::new(vec![broken], &[1.0, 1.0]);
+        let found = joint.fit(&[DVector::zeros(50)]).parameters;
+        assert_eq!(joint.covariance() * &found, found * 0.0);
     }
 
     #[test]

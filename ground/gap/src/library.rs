@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 use twin::{
-    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter},
+    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter, onsets},
     predict::Kind,
 };
 
@@ -45,6 +45,24 @@ impl Hypothesis {
             cause: self.cause.clone(),
             theta: theta.iter().copied().collect(),
         }
+    }
+
+    /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants [s];
+    /// `None` where there are none.
+    pub fn values_between(&self, starts_s: &[f64]) -> Option<Vec<f64>> {
+        let mut values = self.cause.effect.variants(starts_s);
+        if !self.cause.effect.has_values_between() {
+            let onsets: Vec<f64> = onsets(starts_s).collect();
+            let is_other = |value: &f64| !onsets.contains(value);
+            let others: Vec<f64> = values.iter().copied().filter(is_other).collect();
+            let is_onset = values.len() == others.len() + onsets.len() && !others.contains(&self.cause.variant);
+            if !is_onset || self.places.is_empty() {
+                return None;
+            }
+            values = onsets;
+        }
+        values.sort_by(f64::total_cmp);
+        Some(values)
     }
 
     /// It, when it is on.

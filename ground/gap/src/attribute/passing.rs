@@ -50,15 +50,14 @@ pub(super) fn stretches(
             true => again(problem, &rest, &slopes, &sigmas),
             false => onset::stretch(problem, &rest, &slopes, &sigmas).map(|(span, more)| (span.into(), more)),
         };
-        let Some((span, more)) = found else {
+        let found = found.filter(|(_, more)| *gain + more > least);
+        *gain = match found {
+            Some((_, more)) => *gain + more,
             // What is on always is another effect.
-            *gain = if repeats { f64::NEG_INFINITY } else { *gain };
-            return None;
+            None if repeats => f64::NEG_INFINITY,
+            None => *gain,
         };
-        (*gain + more > least).then(|| {
-            *gain += more;
-            span
-        })
+        found.map(|(span, _)| span)
     };
     library.hypotheses.iter().zip(gains).map(stretch).collect()
 }

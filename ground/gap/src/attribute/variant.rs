@@ -5,7 +5,6 @@
 
 use super::passing::renew;
 use crate::{
-    fit_error::grid,
     library::{Hypothesis, Library},
     problem::Problem,
     refine::{Refined, refine},
@@ -52,7 +51,8 @@ pub(super) fn sharpened(problem: &Problem, library: &mut Library, set: &[usize],
 
 /// Half the way to the farther neighbour of a hypothesis' variant; `None` where there is nothing between.
 fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
-    let (grid, variant) = (grid(problem, hypothesis)?, hypothesis.cause.variant);
+    let grid = hypothesis.values_between(problem.twin.starts_s())?;
+    let variant = hypothesis.cause.variant;
     let at = grid.iter().position(|value| *value == variant)?;
     let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
     let distances = neighbours
