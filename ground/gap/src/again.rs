@@ -116,7 +116,7 @@ impl<'a> Folded<'a> {
     fn new(problem: &'a Problem<'a>, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &'a [f64]) -> Self {
         let starts_s = problem.twin.starts_s();
         let channels = (0..problem.frames.len()).filter_map(|channel| {
-            let of = |entries: &'_ Entries| {
+            let of = |entries: &Entries| {
                 let own = entries.iter().find(|(index, _)| *index == channel);
                 own.map(|(_, values)| values.clone())
             };

@@ -9,7 +9,7 @@ use crate::{
     cause::Cause,
     crossval::{self, Key},
     events::Events,
-    explain::Explanation,
+    explain::{Explanation, REMAINDER},
     fit_error::FitError,
     held::{
         Held,
@@ -33,9 +33,6 @@ const DOUBT_STEP: f64 = 3.0;
 /// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
 /// from its law leaves a few parts in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.05;
-
-/// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
-pub const REMAINDER: f64 = 0.005;
 
 /// What is left over, and how much that says against names.
 pub struct Belief {

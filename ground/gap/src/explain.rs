@@ -11,7 +11,6 @@ use twin::part::signal::Noise;
 
 use crate::{
     attribute::{Attribution, Chosen, attribute},
-    belief::REMAINDER,
     cause::probability_of_any,
     contribution,
     library::Library,
@@ -26,6 +25,9 @@ const SCATTER_MARGIN: f64 = 3.0;
 
 /// Probability from which an effect is named.
 pub const SAID: f64 = 0.5;
+
+/// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
+pub const REMAINDER: f64 = 0.005;
 
 /// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
 const MOST_CAUSES: usize = 3;

@@ -31,28 +31,31 @@ pub struct Position {
     pub turns: Axis,
 }
 
-const fn position(inner_deg: f64, outer_deg: f64, turns: Axis) -> Position {
-    Position {
-        inner_deg,
-        outer_deg,
-        turns,
+impl Position {
+    /// Both axes at the start \[deg\], and the one that turns.
+    pub const fn new(inner_deg: f64, outer_deg: f64, turns: Axis) -> Self {
+        Self {
+            inner_deg,
+            outer_deg,
+            turns,
+        }
     }
 }
 
 /// Table 4.1: the twelve positions. 7 and 8 repeat 6 and 5, as printed.
 pub const TABLE_4_1: [Position; 12] = [
-    position(0.0, 0.0, Axis::Inner),
-    position(0.0, 180.0, Axis::Inner),
-    position(0.0, 0.0, Axis::Outer),
-    position(180.0, 0.0, Axis::Outer),
-    position(90.0, 0.0, Axis::Outer),
-    position(270.0, 0.0, Axis::Outer),
-    position(270.0, 0.0, Axis::Outer),
-    position(90.0, 0.0, Axis::Outer),
-    position(30.0, 0.0, Axis::Outer),
-    position(210.0, 0.0, Axis::Outer),
-    position(150.0, 0.0, Axis::Outer),
-    position(330.0, 0.0, Axis::Outer),
+    Position::new(0.0, 0.0, Axis::Inner),
+    Position::new(0.0, 180.0, Axis::Inner),
+    Position::new(0.0, 0.0, Axis::Outer),
+    Position::new(180.0, 0.0, Axis::Outer),
+    Position::new(90.0, 0.0, Axis::Outer),
+    Position::new(270.0, 0.0, Axis::Outer),
+    Position::new(270.0, 0.0, Axis::Outer),
+    Position::new(90.0, 0.0, Axis::Outer),
+    Position::new(30.0, 0.0, Axis::Outer),
+    Position::new(210.0, 0.0, Axis::Outer),
+    Position::new(150.0, 0.0, Axis::Outer),
+    Position::new(330.0, 0.0, Axis::Outer),
 ];
 
 /// A stretch of constant rate.
@@ -201,7 +204,7 @@ mod tests {
     #[test]
     fn gravity_follows_the_tables_law() {
         // In e: (cos b, sin a sin b, -cos a sin b); here alpha = 30 deg, beta = 40 deg, right after the move.
-        let table = RateTable::new(&[position(30.0, 40.0, Axis::Inner)], 1.0, 1.0);
+        let table = RateTable::new(&[Position::new(30.0, 40.0, Axis::Inner)], 1.0, 1.0);
         let gravity_b = table.at(DWELL_S + MOVE_S).attitude.q_nb.inverse() * Vector3::z();
         let (a, b) = (30.0_f64.to_radians(), 40.0_f64.to_radians());
         let [x_e, y_e, z_e] = [b.cos(), a.sin() * b.sin(), -a.cos() * b.sin()];

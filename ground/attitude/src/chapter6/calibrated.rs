@@ -61,21 +61,13 @@ const ATTITUDES: u64 = 230;
 /// Table 4.6: both axes at the start, and which of them goes once round in steps of 30 deg. Its rows 4 to 6 print theta
 /// from zero; the decompositions beside it hold for the outer axis' own angle, which is what stands here.
 const TABLE_4_6: [Position; 6] = [
-    start(0.0, 0.0, Axis::Outer),
-    start(270.0, 90.0, Axis::Inner),
-    start(270.0, 90.0, Axis::Outer),
-    start(180.0, 71.5655, Axis::Outer),
-    start(300.0, 71.5655, Axis::Outer),
-    start(60.0, 71.5655, Axis::Outer),
+    Position::new(0.0, 0.0, Axis::Outer),
+    Position::new(270.0, 90.0, Axis::Inner),
+    Position::new(270.0, 90.0, Axis::Outer),
+    Position::new(180.0, 71.5655, Axis::Outer),
+    Position::new(300.0, 71.5655, Axis::Outer),
+    Position::new(60.0, 71.5655, Axis::Outer),
 ];
-
-const fn start(inner_deg: f64, outer_deg: f64, turns: Axis) -> Position {
-    Position {
-        inner_deg,
-        outer_deg,
-        turns,
-    }
-}
 
 /// Why a method found no set.
 #[derive(Debug, thiserror::Error)]
@@ -108,7 +100,7 @@ pub fn mv_sec(seed: u64) -> Result<Set, NotCalibrated> {
         // Every direction of gravity in b is as likely, from either side of the outer axis.
         let level = (1.0 - 2.0 * random.uniform(3 * k)).acos().to_degrees();
         let side = if random.uniform(3 * k + 1) < 0.5 { -1.0 } else { 1.0 };
-        start(360.0 * random.uniform(3 * k + 2), side * level, Axis::Outer)
+        Position::new(360.0 * random.uniform(3 * k + 2), side * level, Axis::Outer)
     };
     let attitudes: Vec<Position> = (0..ATTITUDES).map(attitude).collect();
     let rests = at_rest(&attitudes, seed);
@@ -173,8 +165,8 @@ fn forces(seed: u64) -> Experiment {
     let round = |from: &Position| {
         let from = *from;
         (0..13).map(move |k| match from.turns {
-            Axis::Inner => start(from.inner_deg + 30.0 * f64::from(k), from.outer_deg, from.turns),
-            Axis::Outer => start(from.inner_deg, from.outer_deg + 30.0 * f64::from(k), from.turns),
+            Axis::Inner => Position::new(from.inner_deg + 30.0 * f64::from(k), from.outer_deg, from.turns),
+            Axis::Outer => Position::new(from.inner_deg, from.outer_deg + 30.0 * f64::from(k), from.turns),
         })
     };
     let positions: Vec<Position> = TABLE_4_6.iter().flat_map(round).collect();

@@ -9,11 +9,11 @@
 //! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of
 //! a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that comes and
 //! goes in all of a kind; the same vector in all sensors of a kind; the same factor, as of a supply they share; the same small
-//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows. Of a named effect: whether it is as strong everywhere
-//! as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length have the energy that
-//! it claims, and outliers the size and the distance from the sample before, no more and no less: a law of outliers "anywhere in
-//! the range" would else stand for any, values that are sent again among them; and whether channels that scatter each by itself
-//! go one way ([`super::together`]).
+//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows. Of a named
+//! effect: whether it is as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether
+//! waves of each length have the energy that it claims, and outliers the size and the distance from the sample before, no more
+//! and no less: a law of outliers "anywhere in the range" would else stand for any, values that are sent again among them; and
+//! whether channels that scatter each by itself go one way ([`super::together`]).
 
 use nalgebra::{DMatrix, Vector1};
 

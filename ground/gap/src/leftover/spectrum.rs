@@ -2,8 +2,8 @@
 //!
 //! In: a residual. Out: a [`Transform`], and of it how far a line stands above its neighbours: noise and drift have no line,
 //! whatever spectrum they have, so this is what tells a tone from a walk of the zero that is as strong, or from noise that is
-//! as loud. And how much power each frequency has (the largest of a periodogram; Fisher 1929), of one channel or of several that are one part's:
-//! this sees a tone that is too weak for the neighbours to tell, or that stands between two frequencies.
+//! as loud. And how much power each frequency has (the largest of a periodogram; Fisher 1929), of one channel or of several that
+//! are one part's: this sees a tone that is too weak for the neighbours to tell, or that stands between two frequencies.
 
 use std::{f64::consts::PI, sync::Arc};
 

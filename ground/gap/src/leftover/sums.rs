@@ -1,4 +1,4 @@
-//! Sums of one channel's residual that are squares or as good as such.
+//! Sums of residuals that are squares or as good as such: of one channel, and of bursts in several.
 //!
 //! In: residuals in units of noise. Out: numbers that noise alone keeps small, for [`super::aspects`].
 
