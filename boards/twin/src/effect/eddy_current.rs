@@ -1,7 +1,8 @@
 //! Eddy currents: a conducting case that turns in the field makes currents that oppose the change.
 //!
-//! The change of the field in b is `-w x m`; currents that decay within `tau` hold the field back by `tau` times it. To first
-//! order this is a delay of the magnetometers, and no motion tells the two apart.
+//! Currents that decay within `tau` make the field inside the case a first-order low-pass of the one outside, as the case sees
+//! it. To first order this is a delay of the magnetometers; to second it takes amplitude away, `(tau w)^2 / 2` of what turns
+//! with `w`, which only fast turning shows.
 
 use super::{Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
@@ -12,11 +13,11 @@ pub struct EddyCurrent;
 const PAGE: Page = Page {
     name: "eddy-current",
     physics: "Currents in the conducting case hold the field back while it turns.",
-    equation: "y = n.(m + tau w x m)",
+    equation: "tau y' + y = n.m, in b",
     source: "Spinning rockets: 3 deg and 0.1 deg/s of apparent motion (Rice 1979)",
     excited_by: "spin",
     siblings: &["mag-latency", "latency", "current-field"],
-    confirm_by: "Another case, or a coil driven at rest.",
+    confirm_by: "Another case; or spin faster: currents take amplitude away, a delay does not.",
     scope: Scope::Unit,
     sensors: &[Kind::Magnetometer],
     parameters: &[Symbol::positive("tau", "s", 5e-3)],
@@ -28,8 +29,7 @@ impl Effect for EddyCurrent {
         &PAGE
     }
 
-    fn act<'a>(&self, theta: &'a [f64], _variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
-        let (tau_s, axis_b) = (theta[0], site.channel.axis_b);
-        chain.add(move |feel, _| tau_s * axis_b.dot(&feel.rate_b.cross(&feel.field_b_ut)));
+    fn act<'a>(&self, theta: &'a [f64], _variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
+        chain.lag_s += theta[0];
     }
 }

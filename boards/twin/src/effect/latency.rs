@@ -84,7 +84,7 @@ pub const MAG: Page = Page {
     source: "HMC5883L data sheet: 6 ms a measurement, up to one period of 13 ms at 75 Hz",
     excited_by: "turning",
     siblings: &["eddy-current", "latency", "read-skew", "reference-lag"],
-    confirm_by: "A coil driven at rest: a delay answers late, eddy currents of the turning case do not.",
+    confirm_by: "Spin faster: a delay keeps the amplitude, eddy currents take from it.",
     scope: Scope::Plate,
     common: true,
     sensors: &[Kind::Magnetometer],

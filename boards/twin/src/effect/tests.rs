@@ -7,6 +7,7 @@ use crate::environment::Environment;
 use crate::motion::{Attitude, Jet, Motion, Pose};
 use crate::predict::{Scene, Twin, emems, thesis_slot_s};
 
+mod equations;
 mod past;
 mod physics;
 mod scatter;
