@@ -47,6 +47,8 @@ pub struct Response {
     pub bias: f64,
     /// Physical units per kelvin.
     pub bias_per_k: f64,
+    /// Physical units per kelvin squared.
+    pub bias_per_k2: f64,
     /// Relative change of the sensitivity per kelvin.
     pub scale_per_k: f64,
     /// [s] how much older a reading is than described.
@@ -62,6 +64,7 @@ impl Response {
             sensitivity_b: channel.axis_b,
             bias: channel.bias,
             bias_per_k: 0.0,
+            bias_per_k2: 0.0,
             scale_per_k: 0.0,
             delay_s: 0.0,
             lever_m: channel.lever_m,
@@ -172,8 +175,8 @@ impl<'a> Estimation<'a> {
                 let later_s = channel.slot_s - channel.tau_s() - response.delay_s - at_s;
                 let seen_b = UnitQuaternion::from_scaled_axis(rate_b * later_s) * response.sensitivity_b;
                 let carried = rate_dot_b.cross(&response.lever_m) + rate_b.cross(&rate_b.cross(&response.lever_m));
-                let along = (reading - response.bias - response.bias_per_k * above_k)
-                    / (1.0 + response.scale_per_k * above_k)
+                let of_warmth = (response.bias_per_k + response.bias_per_k2 * above_k) * above_k;
+                let along = (reading - response.bias - of_warmth) / (1.0 + response.scale_per_k * above_k)
                     - response.sensitivity_b.dot(&carried);
                 matrix += seen_b * seen_b.transpose() * *weight;
                 pull += seen_b * (along * weight);

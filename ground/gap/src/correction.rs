@@ -4,7 +4,7 @@
 //! ([`Response`]), and the set as text, in the format of `ground calibration` ([`bench::set`]), every channel in it.
 //!
 //! Bias, axis, scale and place are read off the effect's own action on the channel's chain; a temperature coefficient is
-//! the effect's parameter; a delay or a lag is a delay. What is not always on, what changes the scatter, and what is the
+//! the effect's parameter with its bend, which a scale has none of in the set; a delay or a lag is a delay. What is not always on, what changes the scatter, and what is the
 //! reference's fault is not the unit's to correct and is left out.
 //!
 //! The set's format has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
@@ -161,14 +161,25 @@ fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Resp
             response.lever_m += chain.aim.lever_m - channel.lever_m;
             response.delay_s += chain.lag_s;
         }
-        Way::BiasPerK => response.bias_per_k += theta,
-        Way::ScalePerK => response.scale_per_k += theta,
+        Way::BiasPerK => {
+            response.bias_per_k += theta;
+            response.bias_per_k2 += theta * active.cause.variant;
+        }
+        Way::ScalePerK => response.scale_per_k += theta * (1.0 + active.cause.variant * skew_k(twin)),
         Way::Delay => response.delay_s += theta,
         Way::Skew => response.delay_s -= theta * site.read_position() as f64,
     }
 }
 
-/// A channel of the set: `counts = (1 + k dT) S.x + b + b' dT`, its covariance that of the unit's description.
+/// [K] by which a parabola over the log's temperatures has the slope of a line: the unit's set has no bent scale.
+fn skew_k(twin: &Twin) -> f64 {
+    let standard_c = twin.environment().temperature_c;
+    let above_k = twin.feels(0).into_iter().map(|feel| feel.temperature_c - standard_c);
+    let (squares, cubes) = above_k.fold((0.0, 0.0), |(squares, cubes), k| (squares + k * k, cubes + k * k * k));
+    if squares > 0.0 { cubes / squares } else { 0.0 }
+}
+
+/// A channel of the set: `counts = (1 + k dT) S.x + b + b' dT + b'' dT^2`, its covariance that of the unit's description.
 fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64, f64)) -> Entry {
     let counts = 1.0 / channel.lsb;
     let is_warm = (response.bias_per_k != 0.0 || response.scale_per_k != 0.0) && range_c.0 < range_c.1;
@@ -176,6 +187,9 @@ fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64,
     let mut scale_per_k = Vec::new();
     if response.bias_per_k != 0.0 {
         bias_counts.push(response.bias_per_k * counts);
+    }
+    if response.bias_per_k2 != 0.0 {
+        bias_counts.push(response.bias_per_k2 * counts);
     }
     if response.scale_per_k != 0.0 {
         scale_per_k.push(response.scale_per_k);
@@ -215,84 +229,4 @@ fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64,
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::DVector;
-    use twin::{
-        effect::{Cause, Locality, by_name},
-        environment::Environment,
-        motion::Tumble,
-        predict::{Scene, emems},
-    };
-
-    use super::*;
-    use crate::windows::Span;
-
-    fn twin() -> Twin {
-        let environment = Environment::laboratory();
-        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 20.0, 0.05);
-        Twin::new(emems(|_| 0.0), environment, scene, vec![0.0, 5.0, 10.0]).expect("a twin")
-    }
-
-    fn component(effect: &str, locality: Locality, theta: &[f64]) -> Component {
-        let cause = Cause {
-            effect: by_name(effect).expect("in the library"),
-            locality,
-            variant: 0.0,
-        };
-        Component {
-            active: Active {
-                cause,
-                theta: DVector::from_column_slice(theta).iter().copied().collect(),
-            },
-            span: None,
-        }
-    }
-
-    #[test]
-    fn every_way_is_of_an_effect_in_the_library() {
-        assert!(WAYS.iter().all(|(name, _)| by_name(name).is_some()));
-    }
-
-    #[test]
-    fn the_set_of_hard_iron_and_a_scale_is_read_back_by_the_bench_and_the_unit() {
-        let twin = twin();
-        let iron = component("hard-iron", Locality::Common, &[1.0, -2.0, 0.5]);
-        let scale = component("gyro-scale", Locality::Channel("g2".to_owned()), &[0.01]);
-        let correction = Correction::of(&twin, &[iron, scale]).expect("correctable");
-        let set = Set::parse(&correction.set(&twin).expect("text")).expect("a set");
-        let of = |name: &str| {
-            let index = twin.unit().channel(name).expect("a channel");
-            let entry = set.channels.iter().find(|entry| entry.name == name).expect("an entry");
-            (&twin.unit().channels[index], entry)
-        };
-        let (channel, gyro) = of("g2");
-        assert!((gyro.sensitivity().norm() * channel.lsb - 1.01).abs() < 1e-12);
-        let (channel, mag) = of("m3y");
-        let expected = channel.axis_b.dot(&Vector3::new(1.0, -2.0, 0.5)) / channel.lsb;
-        assert!((mag.bias_counts[0] - expected).abs() < 1e-9);
-        let ranges = emems::calibration::Ranges::of(&emems::unit::Settings::NOMINAL);
-        let image = bench::set::image::image(&set, ranges).expect("the unit accepts it");
-        assert!(image.nominal.is_empty());
-    }
-
-    #[test]
-    fn delays_and_places_stand_in_the_set_and_are_passed_over() {
-        let twin = twin();
-        let late = component("gyro-latency", Locality::Common, &[0.012]);
-        let lever = component("lever-arm", Locality::Group("plate 2".to_owned()), &[0.01, 0.0, 0.0]);
-        let correction = Correction::of(&twin, &[late, lever]).expect("correctable");
-        let text = correction.set(&twin).expect("text");
-        assert_eq!(text.matches("delay_s = 0.012000").count(), 4, "{text}");
-        assert_eq!(text.matches("lever_m").count(), 3);
-        assert!(Set::parse(&text).is_ok());
-    }
-
-    #[test]
-    fn what_passes_or_is_the_references_fault_is_not_the_units_to_correct() {
-        let twin = twin();
-        let mut iron = component("hard-iron", Locality::Common, &[1.0, 0.0, 0.0]);
-        iron.span = Some(Span { from: 0.0, to: 5.0 }.into());
-        let tilt = component("table-tilt", Locality::Unit, &[0.01, 0.0]);
-        assert!(Correction::of(&twin, &[iron, tilt]).is_none());
-    }
-}
+mod tests;

@@ -50,7 +50,7 @@ impl Hypothesis {
     /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants [s];
     /// `None` where there are none.
     pub fn values_between(&self, starts_s: &[f64]) -> Option<Vec<f64>> {
-        let mut values = self.cause.effect.variants(starts_s);
+        let mut values = self.cause.effect.between(starts_s);
         if !self.cause.effect.has_values_between() {
             let onsets: Vec<f64> = onsets(starts_s).collect();
             let is_other = |value: &f64| !onsets.contains(value);

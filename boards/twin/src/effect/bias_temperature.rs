@@ -1,6 +1,10 @@
-//! Temperature coefficient of the zero: it moves in proportion to the distance from the temperature of the calibration.
+//! Temperature coefficient of the zero: it moves with the distance from the temperature of the calibration, nearly in
+//! proportion.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{
+    Effect, Page, Site, Symbol,
+    bend::{self, bent},
+};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -11,10 +15,22 @@ impl Effect for BiasTemperature {
         self.0
     }
 
-    fn act<'a>(&self, theta: &'a [f64], _variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
+    fn act<'a>(&self, theta: &'a [f64], bend: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
         let reference_c = site.environment.temperature_c;
         let k = theta[0];
-        chain.add(move |feel, _| k * (feel.temperature_c - reference_c));
+        chain.add(move |feel, _| k * bent(feel.temperature_c - reference_c, bend));
+    }
+
+    fn told(&self, bend: f64) -> Option<String> {
+        bend::told(bend)
+    }
+
+    fn has_values_between(&self) -> bool {
+        true
+    }
+
+    fn between(&self, _starts_s: &[f64]) -> Vec<f64> {
+        bend::RANGE.into()
     }
 }
 
@@ -22,7 +38,7 @@ impl Effect for BiasTemperature {
 pub const GYRO: Page = Page {
     name: "gyro-bias-temperature",
     physics: "The gyro's zero moves with its temperature.",
-    equation: "y = n.w + k (T - T0)",
+    equation: "y = n.w + k h(T - T0), h(d) = d (1 + c d)",
     source: "ADIS16265: 0.005 to 0.03 deg/s per degC, uncompensated",
     excited_by: "temperature, in both directions",
     siblings: &[
@@ -42,7 +58,7 @@ pub const GYRO: Page = Page {
 pub const ACCEL: Page = Page {
     name: "accel-bias-temperature",
     physics: "The accelerometer's zero moves with its temperature.",
-    equation: "y = n.f + k (T - T0)",
+    equation: "y = n.f + k h(T - T0), h(d) = d (1 + c d)",
     source: "LIS331HH data sheet: 0.4 mg per degC",
     excited_by: "temperature",
     siblings: &["accel-scale-temperature", "accel-bias"],
@@ -57,7 +73,7 @@ pub const ACCEL: Page = Page {
 pub const MAG: Page = Page {
     name: "mag-offset-temperature",
     physics: "The magnetometer's bridge offset moves with its temperature, where no set and reset pulses remove it.",
-    equation: "y = n.m + k (T - T0)",
+    equation: "y = n.m + k h(T - T0), h(d) = d (1 + c d)",
     source: "Anisotropic magnetoresistive bridges: 0.1 to 0.5 mG per degC without set and reset",
     excited_by: "temperature, in two attitudes",
     siblings: &["mag-scale-temperature", "hard-iron", "current-field"],

@@ -21,6 +21,7 @@
 
 mod accel_range;
 mod axis_order;
+mod bend;
 mod bias;
 mod bias_temperature;
 mod bias_walk;
@@ -260,9 +261,15 @@ pub trait Effect: Sync {
         1.0
     }
 
-    /// Whether values between the variants are possible too: the variants are then a grid to begin from.
+    /// Whether values other than the variants are possible too, [`Effect::between`] these: the variants are then where a search
+    /// begins.
     fn has_values_between(&self) -> bool {
         false
+    }
+
+    /// The values about its variants between which others are possible; by itself the variants.
+    fn between(&self, starts_s: &[f64]) -> Vec<f64> {
+        self.variants(starts_s)
     }
 
     /// Where it can be in this unit.

@@ -1,6 +1,9 @@
 //! Temperature coefficient of the scale.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{
+    Effect, Page, Site, Symbol,
+    bend::{self, bent},
+};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -11,10 +14,22 @@ impl Effect for ScaleTemperature {
         self.0
     }
 
-    fn act<'a>(&self, theta: &'a [f64], _variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
+    fn act<'a>(&self, theta: &'a [f64], bend: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
         let reference_c = site.environment.temperature_c;
         let k = theta[0];
-        chain.add(move |feel, input| k * (feel.temperature_c - reference_c) * input);
+        chain.add(move |feel, input| k * bent(feel.temperature_c - reference_c, bend) * input);
+    }
+
+    fn told(&self, bend: f64) -> Option<String> {
+        bend::told(bend)
+    }
+
+    fn has_values_between(&self) -> bool {
+        true
+    }
+
+    fn between(&self, _starts_s: &[f64]) -> Vec<f64> {
+        bend::RANGE.into()
     }
 }
 
@@ -22,7 +37,7 @@ impl Effect for ScaleTemperature {
 pub const GYRO: Page = Page {
     name: "gyro-scale-temperature",
     physics: "The gyro's scale factor moves with its temperature.",
-    equation: "y = (1 + k (T - T0)) n.w",
+    equation: "y = (1 + k h(T - T0)) n.w, h(d) = d (1 + c d)",
     source: "ADIS16265 data sheet: 40 to 110 ppm per degC",
     excited_by: "rates at two temperatures",
     siblings: &["gyro-scale", "gyro-bias-temperature", "gyro-nonlinearity"],
@@ -37,7 +52,7 @@ pub const GYRO: Page = Page {
 pub const ACCEL: Page = Page {
     name: "accel-scale-temperature",
     physics: "The accelerometer's scale factor moves with its temperature.",
-    equation: "y = (1 + k (T - T0)) n.f",
+    equation: "y = (1 + k h(T - T0)) n.f, h(d) = d (1 + c d)",
     source: "LIS331HH data sheet: 0.01 % per degC",
     excited_by: "one g up and down at two temperatures",
     siblings: &["accel-bias-temperature", "accel-scale"],
@@ -52,7 +67,7 @@ pub const ACCEL: Page = Page {
 pub const MAG: Page = Page {
     name: "mag-scale-temperature",
     physics: "The magnetometer's sensitivity falls as it warms, and nothing compensates it.",
-    equation: "y = (1 + k (T - T0)) n.m",
+    equation: "y = (1 + k h(T - T0)) n.m, h(d) = d (1 + c d)",
     source: "HMC5883L data sheet: -0.3 % per degC",
     excited_by: "temperature",
     siblings: &["mag-offset-temperature", "field-model"],

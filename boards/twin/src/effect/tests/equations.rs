@@ -3,6 +3,26 @@
 use super::{physics::changed_unit, *};
 
 #[test]
+fn a_temperature_coefficient_bends_by_its_part_of_a_degree() {
+    // 2e-4 rad/s a degree and 1 % more of it with each: told apart by hand from the temperatures felt.
+    let nominal = twin(SPARSE);
+    let index = nominal.unit().channel("g3").unwrap();
+    let cause = Cause {
+        effect: by_name("gyro-bias-temperature").unwrap(),
+        locality: Locality::Channel("g3".to_owned()),
+        variant: 0.01,
+    };
+    let theta = vec![2e-4];
+    let with = nominal.channel(index, &[Active { cause, theta }]).into_owned();
+    let without = nominal.channel(index, &[]);
+    for ((with, without), feel) in with.iter().zip(&*without).zip(nominal.feels(index)) {
+        let above_k = feel.temperature_c - 25.0;
+        let by_hand = 2e-4 * above_k + 2e-6 * above_k * above_k;
+        assert!((with - without - by_hand).abs() < 1e-6, "{} {by_hand}", with - without);
+    }
+}
+
+#[test]
 fn eddy_currents_obey_their_equation() {
     // tau y' + y = n.m, the derivative by central differences of units read a little earlier and later; what a delay of tau
     // leaves of it is of second order, and large by this measure.
