@@ -14,6 +14,8 @@ mod passing;
 mod rival;
 mod variant;
 
+use std::{iter::once, ops::Range};
+
 use nalgebra::{DMatrix, DVector};
 
 pub use self::rival::Rival;
@@ -91,8 +93,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     let mut alone = Vec::new();
     for round in 0..MOST_EFFECTS {
         progress(round as f64 / MOST_EFFECTS as f64);
-        let base = estimate_of(library, &scores, &set);
-        let mut gains = gains(problem, library, &scores, &set, base);
+        let mut gains = gains(problem, library, &scores, &set);
         let stretches = stretches(problem, library, &set, &best, nothing, &mut gains);
         if round < DISCRETE_ROUNDS {
             add_discrete(problem, library, &set, &best, &mut gains);
@@ -207,35 +208,40 @@ fn leading(values: &[f64], count: usize) -> Vec<usize> {
     order
 }
 
-/// Columns of a set in the library, the reference's first, and no column twice.
-fn places(library: &Library, set: &[usize]) -> Vec<usize> {
+/// Columns of a set in the library, the reference's first, and no column twice; and which of them are each member's.
+fn places(library: &Library, set: &[usize]) -> (Vec<usize>, Vec<Range<usize>>) {
     let mut places: Vec<usize> = (0..library.reference).collect();
-    for hypothesis in set {
-        places.extend(&library.hypotheses[*hypothesis].places);
-    }
-    places.sort_unstable();
-    places.dedup();
-    places
-}
-
-fn estimate_of(library: &Library, scores: &[f64], set: &[usize]) -> f64 {
-    let places = places(library, set);
-    let log_evidence = library.screen(&places, scores).log_evidence();
-    log_evidence.unwrap_or(f64::NEG_INFINITY)
+    let part = |hypothesis: &usize| {
+        let from = places.len();
+        for place in &library.hypotheses[*hypothesis].places {
+            if !places.contains(place) {
+                places.push(*place);
+            }
+        }
+        from..places.len()
+    };
+    let parts = set.iter().map(part).collect();
+    (places, parts)
 }
 
 /// Gain of adding each hypothesis to a set, prior odds included; one that adds no column, or that the set has with another
 /// value, gains nothing.
-fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &[usize], base: f64) -> Vec<f64> {
-    let known = places(library, set);
+fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &[usize]) -> Vec<f64> {
+    let (known, parts) = places(library, set);
+    let mut base = library.screen(&known, scores);
+    base.settle(parts);
+    let before = base.log_evidence().unwrap_or(f64::NEG_INFINITY);
     let gain = |(index, hypothesis): (usize, &crate::library::Hypothesis)| {
         let is_new = !hypothesis.places.is_empty() && hypothesis.places.iter().all(|place| !known.contains(place));
         if !is_new || set.contains(&index) || is_any_same(problem, library, set, index) {
             return f64::NEG_INFINITY;
         }
-        let mut larger = set.to_vec();
-        larger.push(index);
-        estimate_of(library, scores, &larger) - base + hypothesis.log_prior
+        let all: Vec<usize> = known.iter().chain(&hypothesis.places).copied().collect();
+        let mut larger = library.screen(&all, scores);
+        larger.prior_sigmas[..known.len()].copy_from_slice(&base.prior_sigmas);
+        let of_other_sizes = larger.settle(once(known.len()..all.len()));
+        let after = larger.log_evidence().unwrap_or(f64::NEG_INFINITY);
+        after + of_other_sizes - before + hypothesis.log_prior
     };
     library.hypotheses.iter().enumerate().map(gain).collect()
 }

@@ -6,12 +6,21 @@
 //! Laplace approximation otherwise (MacKay 1992). The determinant is the Occam term that prefers one value of gravity to
 //! twelve scale factors.
 //!
+//! How large an effect of a kind is, is known to an order of magnitude at best: its prior is a mixture of [`SIZES`], one for all
+//! of its parameters together, so that twelve small scale factors are not paid for as twelve large ones, and a lag that is five
+//! times the usual is unlikely and not out of the question (a scale mixture of normals, Andrews and Mallows 1974).
+//!
 //! Probabilities are `P(e) ~ prior_e Z_e^(1/tau)`. `tau` is above 1 because the truth may lie outside the list, where a
 //! posterior would otherwise be certain of the least wrong (Yao, Vehtari, Simpson and Gelman 2018).
+
+use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::gram::log_determinant;
+
+/// How many times its usual size an effect may have, and the probability of each.
+const SIZES: [(f64, f64); 3] = [(0.2, 0.25), (1.0, 0.5), (5.0, 0.25)];
 
 /// Normal equations over every column of every hypothesis.
 #[derive(Clone, Debug)]
@@ -87,6 +96,42 @@ impl Screen {
         log_evidence.is_finite().then_some(log_evidence)
     }
 
+    /// [nats] over the model without them, of all columns, each part, the columns of one effect, being of any size.
+    pub fn of_any_size(&self, parts: impl IntoIterator<Item = Range<usize>>) -> Option<f64> {
+        let mut settled = self.clone();
+        let of_other_sizes = settled.settle(parts);
+        Some(settled.log_evidence()? + of_other_sizes)
+    }
+
+    /// Gives each part, the columns of one effect, the size that suits it best; returns the nats that its other sizes add to the
+    /// evidence with this one, their probabilities included.
+    pub fn settle(&mut self, parts: impl IntoIterator<Item = Range<usize>>) -> f64 {
+        let parts = parts.into_iter().filter(|part| !part.is_empty());
+        parts.map(|part| self.settle_one(&part)).sum()
+    }
+
+    fn settle_one(&mut self, part: &Range<usize>) -> f64 {
+        let usual = self.prior_sigmas[part.clone()].to_vec();
+        let resize = |screen: &mut Self, size: f64| {
+            let resized = screen.prior_sigmas[part.clone()].iter_mut().zip(&usual);
+            resized.for_each(|(sigma, usual)| *sigma = size * usual);
+        };
+        let evidence = SIZES.map(|(size, probability)| {
+            resize(self, size);
+            self.log_evidence()
+                .map_or(f64::NEG_INFINITY, |evidence| evidence + probability.ln())
+        });
+        let (best, most) = (evidence.iter().copied().enumerate())
+            .max_by(|one, other| one.1.total_cmp(&other.1))
+            .unwrap_or((1, f64::NEG_INFINITY));
+        let (size, probability) = SIZES[best];
+        resize(self, size);
+        if !most.is_finite() {
+            return 0.0;
+        }
+        evidence.iter().map(|one| (one - most).exp()).sum::<f64>().ln() + probability.ln()
+    }
+
     /// Information, factored, and score in units of the prior: I plus something positive, as well conditioned as it gets.
     fn factored(&self, columns: &[usize]) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
         let width = columns.len();
@@ -132,6 +177,8 @@ pub fn probabilities(log_evidences: &[f64], log_priors: &[f64], temperature: f64
 
 #[cfg(test)]
 mod tests {
+    use std::iter::once;
+
     use super::*;
 
     /// Double precision over a handful of operations on numbers near one.
@@ -163,6 +210,32 @@ mod tests {
         let both = screen([[50.0, 50.0], [50.0, 50.0]], [20.0, 20.0], [1.0, 1.0]);
         let alone = both.estimate(&[0]).expect("finite").log_evidence;
         assert!(alone > both.estimate(&[0, 1]).expect("finite").log_evidence);
+    }
+
+    #[test]
+    fn an_effect_of_another_size_costs_what_its_rarity_does_and_no_more() {
+        // Twenty prior sigmas: 200 nats by one normal, some five by the mixture.
+        let mut large = screen([[1e4, 0.0], [0.0, 1.0]], [2e5, 0.0], [1.0, 1.0]);
+        let (usual, whole) = (large.log_evidence().expect("finite"), 0.5 * 2e5 * 20.0);
+        let sized = large.of_any_size(once(0..1)).expect("finite");
+        assert!(whole - usual > 200.0 && whole - sized < 20.0, "{usual} {sized}");
+        large.settle(once(0..1));
+        assert_eq!(large.prior_sigmas, [5.0, 1.0]);
+    }
+
+    #[test]
+    fn the_mixture_is_the_sum_over_its_sizes() {
+        let fresh = || screen([[100.0, 10.0], [10.0, 80.0]], [30.0, 20.0], [0.5, 0.3]);
+        let by_hand: f64 = SIZES
+            .iter()
+            .map(|(size, probability)| {
+                let mut sized = fresh();
+                sized.prior_sigmas.iter_mut().for_each(|sigma| *sigma *= size);
+                probability * sized.log_evidence().expect("finite").exp()
+            })
+            .sum();
+        let found = fresh().of_any_size(once(0..2)).expect("finite");
+        assert!((found - by_hand.ln()).abs() < ROUNDING);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! In: the [`Problem`], the [`Library`] and a set of its hypotheses. Out: [`Refined`], whose evidence can be compared with that
 //! of any other set on the same problem: `-1/2 (r'Pr + theta' D^-2 theta) - 1/2 ln det(I + D I D)` at the best parameters,
-//! the residual exact there, the curvature that of its linearisation (Laplace).
+//! the residual exact there, the curvature that of its linearisation (Laplace), and effects of any of their sizes counted in.
+//! Parameters and covariance are those of the usual size, which data that say anything outweigh.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -143,7 +144,9 @@ impl Point {
         let model = model_of(library, set, thetas);
         let mut values = vec![0.0; library.reference];
         let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
+        let mut parts = Vec::new();
         for (hypothesis, theta) in set.iter().zip(thetas) {
+            parts.push(values.len()..values.len() + theta.len());
             values.extend(theta.iter());
             sigmas.extend(
                 library.hypotheses[*hypothesis]
@@ -152,7 +155,7 @@ impl Point {
                     .map(|parameter| parameter.prior_sigma),
             );
         }
-        let mut screen = Screen::zeros(sigmas.clone());
+        let mut screen = Screen::zeros(sigmas);
         let mut energy = 0.0;
         for (channel, frame) in problem.frames.iter().enumerate() {
             let entries = slopes.iter().enumerate().filter_map(|(place, entries)| {
@@ -181,7 +184,8 @@ impl Point {
             screen.add(&places, &normal);
         }
         let all: Vec<usize> = (0..values.len()).collect();
-        let Some(estimate) = screen.estimate(&all) else {
+        let of_any_size = screen.of_any_size(parts);
+        let Some((estimate, log_evidence)) = screen.estimate(&all).zip(of_any_size) else {
             return Point {
                 estimate: nothing(values.len()),
                 log_evidence: f64::NEG_INFINITY,
@@ -197,12 +201,12 @@ impl Point {
         });
         let prior: f64 = away
             .iter()
-            .zip(&sigmas)
+            .zip(&screen.prior_sigmas)
             .map(|(away, sigma)| (away / sigma).powi(2))
             .sum();
         let to_gain = 0.5 * (away.dot(&(&screen.information * &away)) + prior);
         Point {
-            log_evidence: estimate.log_evidence - 0.5 * energy - to_gain,
+            log_evidence: log_evidence - 0.5 * energy - to_gain,
             to_gain,
             estimate,
         }

@@ -2,7 +2,7 @@
 //!
 //! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
 
-use super::{CANDIDATES, Chosen, estimate_of, fitted, gains, is_any_same, is_physical, leading, stretches};
+use super::{CANDIDATES, Chosen, fitted, gains, is_any_same, is_physical, leading, stretches};
 use crate::{
     library::Library,
     on::On,
@@ -38,14 +38,13 @@ pub(super) fn compare(
     let own = others.remove(at);
     thetas.remove(at);
     let without = refine(problem, library, &others, &thetas);
-    let base = estimate_of(library, scores, &others);
     let own_gain = best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior;
     let mut rivals = vec![Rival {
         hypothesis: own,
         gain: own_gain,
         span: library.hypotheses[own].span,
     }];
-    let mut linear = gains(problem, library, scores, &others, base);
+    let mut linear = gains(problem, library, scores, &others);
     linear[own] = f64::NEG_INFINITY;
     let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
     let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
