@@ -55,14 +55,19 @@ pub(super) fn compare(
             gain,
             span: stretches[rival],
         };
-        if linear[rival] < own_gain - FAR {
+        // Of values with others between them one that is as good as it gets is enough.
+        let is_moved = is_contested && !is_any_same(problem, library, &candidates[..number], rival);
+        // A step some seconds off its instant explains less than half of what it would.
+        let is_settled = !is_moved
+            || library.hypotheses[rival]
+                .values_between(problem.twin.starts_s())
+                .is_none();
+        if is_settled && linear[rival] < own_gain - FAR {
             rivals.push(with_gain(linear[rival]));
             continue;
         }
         let mut tried = others.clone();
         tried.push(rival);
-        // Of values with others between them one that is as good as it gets is enough.
-        let is_moved = is_contested && !is_any_same(problem, library, &candidates[..number], rival);
         let refined = fitted(problem, library, &tried, &thetas, stretches[rival], is_moved);
         if is_physical(library, &tried, &refined) {
             let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
