@@ -6,10 +6,11 @@
 
 use crate::{
     attribute::attribute,
-    belief::{Belief, Promised, UNKNOWN_PRIOR, promises, second_keys},
+    belief::{Promised, UNKNOWN_PRIOR},
+    believed::Believed,
     case::Subject,
-    cause::{Cause, alone, alternatives, cause_of_scatter, causes_of, share_out},
-    confusion, contribution,
+    cause::{Cause, alone, share_out},
+    confusion,
     correction::Correction,
     crossval::Key,
     events::Events,
@@ -101,21 +102,9 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
     let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
-    let mut left = if explanation.is_empty() {
-        gate.clone()
-    } else {
-        let model = &explanation.model;
-        let disturb = explanation.disturb(&problem);
-        leftover::judge(
-            &sight::views(&problem, &explanation.beneath),
-            &model.joint,
-            &model.fitted,
-            &suspects(&problem, model),
-            (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| leftover::Disturb {
-                channels: &scatter.channels,
-                of,
-            }),
-        )
+    let mut left = match explanation.is_empty() {
+        true => gate.clone(),
+        false => left_by(&problem, &explanation),
     };
 
     let before: Vec<Vec<f64>> = (0..problem.frames.len())
@@ -159,45 +148,30 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
 
     progress("confusion", 0.0);
     let (found, model) = (&explanation.found, &explanation.model);
-    let mut causes = causes_of(&problem, &library, found);
-    contribution::settle(&problem, &library, found, &mut causes);
-    let keys = second_keys(&problem, &library, model, &mut causes);
-    let promises = promises(
-        &subject.held,
+    let believed = Believed::of(
+        subject,
         &problem,
         &library,
         &explanation,
+        &quiet,
         events.as_ref(),
-        &mut causes,
+        &left,
     );
-    let belief = Belief::of(&left, explanation.energy(&quiet), &promises);
-    let scatter = explanation.scatter.as_ref();
-    causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
-    belief.weigh(&mut causes);
-    // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier than
-    // not.
-    let (mut causes, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|cause| cause.any() >= SAID);
-    let mut none_of_these = belief.unknown;
-    if causes.is_empty() && !unnamed.is_empty() {
+    let alternatives = believed.alternatives(&library, &explanation);
+    let mut none_of_these = believed.unknown;
+    if believed.causes.is_empty() && !believed.unnamed.is_empty() {
         // What is not likely enough to be said may be there, or something else.
         (left, shrink) = all_there_was();
-        let is_not = unnamed.iter().map(|cause| 1.0 - cause.any().min(1.0)).product::<f64>();
-        none_of_these = none_of_these.max(left.unknown(UNKNOWN_PRIOR) * is_not);
+        none_of_these = none_of_these.max(left.unknown(UNKNOWN_PRIOR) * believed.none_is_there());
     }
+    let Believed {
+        mut causes,
+        keys,
+        promises,
+        ..
+    } = believed;
     let is_decided = causes.iter().all(|cause| cause.probability >= SAID);
     share_out(&mut causes);
-    let mut alternatives = alternatives(&library, found, &explanation.refused);
-    let trust_in_others = if found.chosen.is_empty() {
-        1.0 - belief.unknown
-    } else {
-        belief.trust
-    };
-    alternatives
-        .iter_mut()
-        .for_each(|(_, probability)| *probability *= trust_in_others);
-    alternatives.extend(unnamed.iter().map(|cause| (cause.effect, cause.probability)));
-    alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
-    alternatives.dedup_by_key(|(name, _)| *name);
 
     let is_named = !causes.is_empty();
     let mut once = model.components.iter().filter_map(|component| component.span);
@@ -256,6 +230,22 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         causes,
         withdrawn,
     }
+}
+
+/// What an explanation leaves.
+fn left_by(problem: &Problem, explanation: &Explanation) -> Leftover {
+    let model = &explanation.model;
+    let disturb = explanation.disturb(problem);
+    leftover::judge(
+        &sight::views(problem, &explanation.beneath),
+        &model.joint,
+        &model.fitted,
+        &suspects(problem, model),
+        (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| leftover::Disturb {
+            channels: &scatter.channels,
+            of,
+        }),
+    )
 }
 
 /// What each of a model's effects adds to the fitted samples.

@@ -94,15 +94,7 @@ impl Explanation {
             |scatter| louder(problem, first, scatter),
         );
         let described = problem.frames.clone();
-        // What the effect on the scatter says of samples takes the place of how much louder their channel is.
-        let tells = |channel: usize| scatter.as_ref().is_some_and(|scatter| scatter.tells_of(channel));
-        let both: Vec<f64> = (temper::factors(&first.fitted.rest).into_iter().zip(&louder).enumerate())
-            .map(|(channel, (misfit, louder))| match *louder == 1.0 {
-                true => misfit,
-                false if tells(channel) => 1.0,
-                false => *louder,
-            })
-            .collect();
+        let both = factors(&first.fitted.rest, &louder, scatter.as_ref());
         let beneath = scatter.as_ref().map(|scatter| scatter.uncovered(problem));
         if scatter.is_some() || both.iter().any(|factor| *factor != 1.0) {
             let frames = beneath.unwrap_or_else(|| described.clone());
@@ -244,6 +236,20 @@ fn reframe(problem: &mut Problem, library: &mut Library, frames: Vec<Frame>) {
     let before: Vec<DVector<f64>> = problem.frames.iter().map(|frame| frame.weights.clone()).collect();
     problem.reframe(frames);
     library.products.reweigh(problem, &before);
+}
+
+/// Factors of the noise for a search: of a misfit, or of the effect on the scatter. What that says of samples takes the place of
+/// how much louder their channel is.
+fn factors(rest: &[DVector<f64>], louder: &[f64], scatter: Option<&Scatter>) -> Vec<f64> {
+    let tells = |channel: usize| scatter.is_some_and(|scatter| scatter.tells_of(channel));
+    let channels = temper::factors(rest).into_iter().zip(louder).enumerate();
+    channels
+        .map(|(channel, (misfit, louder))| match *louder == 1.0 {
+            true => misfit,
+            false if tells(channel) => 1.0,
+            false => *louder,
+        })
+        .collect()
 }
 
 fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {

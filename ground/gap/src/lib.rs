@@ -6,7 +6,7 @@
 //! ```text
 //! case -> windows (what is fitted | what only judges) -> problem (residual in units of noise)
 //!      -> library (every effect at every place) -> attribute (which, by evidence) -> explain (and how it scatters)
-//!      -> leftover (is it enough) -> held (how far it shrinks) -> belief (how likely a name is) -> verdict
+//!      -> leftover (is it enough) -> held (how far it shrinks) -> belief, believed (how likely a name is) -> verdict
 //! ```
 //!
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
@@ -17,6 +17,7 @@ pub mod attitude;
 pub mod attribute;
 pub mod baseline;
 pub mod belief;
+pub mod believed;
 pub mod case;
 pub mod cause;
 pub mod command;

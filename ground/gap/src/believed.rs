@@ -1,0 +1,88 @@
+//! What is believed of an explanation: which of its effects are said to be causes, and what else may be there.
+//!
+//! In: an [`Explanation`] and what it leaves. Out: [`Believed`]: every effect weighed by evidence, cross-validation, the held-out
+//! windows and what is left over, in this order ([`crate::belief`]).
+
+use crate::{
+    belief::{Belief, Promised, promises, second_keys},
+    case::Subject,
+    cause::{Cause, alternatives, cause_of_scatter, causes_of},
+    contribution,
+    crossval::Key,
+    events::Events,
+    explain::{Explanation, SAID},
+    leftover::Leftover,
+    library::Library,
+    model::Model,
+    problem::Problem,
+};
+
+/// An explanation with its probabilities.
+pub struct Believed {
+    /// Effects that are there, themselves or another of a set that cannot be told apart, likelier than not.
+    pub causes: Vec<Cause>,
+    /// Those that are less likely.
+    pub unnamed: Vec<Cause>,
+    /// What cross-validation says of the effects on readings.
+    pub keys: Vec<(&'static str, Key)>,
+    /// How strong they are on the held-out windows.
+    pub promises: Vec<Promised>,
+    /// Probability that something outside the library is needed.
+    pub unknown: f64,
+    /// Probability that a name that was not said is not a stand-in for it.
+    trust: f64,
+}
+
+impl Believed {
+    /// Weighs an explanation that leaves `left`; `quiet` is the model without effects.
+    pub fn of(
+        subject: &Subject,
+        problem: &Problem,
+        library: &Library,
+        explanation: &Explanation,
+        quiet: &Model,
+        events: Option<&Events>,
+        left: &Leftover,
+    ) -> Self {
+        let mut causes = causes_of(problem, library, &explanation.found);
+        contribution::settle(problem, library, &explanation.found, &mut causes);
+        let keys = second_keys(problem, library, &explanation.model, &mut causes);
+        let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
+        let belief = Belief::of(left, explanation.energy(quiet), &promises);
+        let scatter = explanation.scatter.as_ref();
+        causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
+        belief.weigh(&mut causes);
+        // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
+        // than not.
+        let (causes, unnamed) = causes.into_iter().partition(|cause| cause.any() >= SAID);
+        Believed {
+            causes,
+            unnamed,
+            keys,
+            promises,
+            unknown: belief.unknown,
+            trust: match explanation.found.chosen.is_empty() {
+                true => 1.0 - belief.unknown,
+                false => belief.trust,
+            },
+        }
+    }
+
+    /// Probability that none of those that are not likely enough to be said is there.
+    pub fn none_is_there(&self) -> f64 {
+        let is_not = |cause: &Cause| 1.0 - cause.any().min(1.0);
+        self.unnamed.iter().map(is_not).product()
+    }
+
+    /// Effects that are not said, with their probabilities, most first.
+    pub fn alternatives(&self, library: &Library, explanation: &Explanation) -> Vec<(&'static str, f64)> {
+        let rivals = alternatives(library, &explanation.found, &explanation.refused).into_iter();
+        let mut all: Vec<_> = rivals
+            .map(|(name, probability)| (name, probability * self.trust))
+            .chain(self.unnamed.iter().map(|cause| (cause.effect, cause.probability)))
+            .collect();
+        all.sort_by(|one, other| other.1.total_cmp(&one.1));
+        all.dedup_by_key(|(name, _)| *name);
+        all
+    }
+}
