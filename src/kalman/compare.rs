@@ -12,7 +12,7 @@ use super::{
     innovation::{Correction, Noise, Scalar},
     pending::Pending,
     square,
-    state::{GYRO_MATRIX, Row, State, VELOCITY, dot},
+    state::{DRIVEN, GYRO_MATRIX, Row, State, VELOCITY, dot},
 };
 use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
 
@@ -28,22 +28,24 @@ impl Filter {
             .means_seen(&self.covariance, &mut self.measured.seen);
     }
 
-    /// Fourth: the state has the correction, or is found afresh.
+    /// Fourth: the state has the correction. An attitude that is found afresh does without: it was found in the axes that the
+    /// window was gathered in, before any correction of them.
     pub(super) fn correct(&mut self, outcome: &mut Outcome) {
-        let error = self.correction.error;
-        let [north, east, down, to_north, to_east] = error.driven;
+        outcome.aligned = self.recover();
+        let error = &self.correction.error;
+        let driven = if outcome.aligned { [0.0; DRIVEN] } else { error.driven };
+        let [north, east, down, to_north, to_east] = driven;
         let mut rotation_n = Vector3::new(north, east, down);
         if self.window.duration_s > 0.0 {
             rotation_n += Vector3::from(self.window.drive.each_ref().map(|drive| dot(drive, &error.drivers)));
         }
-        self.turn(&from_rotation_vector(rotation_n));
         let (bias, matrix) = error.drivers.split_at(GYRO_MATRIX);
         self.bias_b += Vector3::from_row_slice(bias);
         self.gyro_matrix += Matrix3::from_row_slice(matrix);
         self.velocity_n += Vector2::new(to_north, to_east);
         // There is room for all.
         let _ = outcome.innovations.extend_from_slice(&self.correction.innovations);
-        outcome.aligned = self.recover();
+        self.turn(&from_rotation_vector(rotation_n));
         if !self.is_finite() {
             self.begin_anew();
         }

@@ -113,6 +113,7 @@ mod correction;
 mod force;
 mod hostile;
 mod iron;
+mod recovery;
 
 #[test]
 fn at_rest_it_aligns_within_a_window_and_stays() {
