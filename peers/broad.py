@@ -1,12 +1,14 @@
 """Attitude filters of others on the recordings of BROAD, each from its own package with its defaults.
 
-In: a folder of recordings. Out, on standard output: CSV `filter,recording,mode,total,heading,inclination` in degrees,
-scored as ground/attitude/src/score.rs scores ours. Modes: full (285.7 Hz), five (5 Hz, each period's rotation composed
-of the samples' and given as a rate, single samples of the rest: what ours is given) and motion (begun 10 s into the
-motion).
+In: a folder of recordings, and the step [rad/s] of their rates' codes, which were cut towards zero: half of it is put
+back, as for ours (ground/attitude/src/replay.rs). Out, on standard output: CSV
+`filter,recording,mode,total,heading,inclination` in degrees, scored as ground/attitude/src/score.rs scores ours. Modes:
+full (285.7 Hz), five (5 Hz, each period's rotation composed of the samples' and given as a rate, single samples of the
+rest: what ours is given) and motion (begun 10 s into the motion).
 Packages: `python3 -m venv peers/.venv && peers/.venv/bin/pip install -r peers/requirements.txt`.
 """
 
+import functools
 import gzip
 import multiprocessing
 import pathlib
@@ -116,6 +118,11 @@ def composed(rates, dt):
     return q[:, 1:] * angle / np.maximum(norm, 1e-12) / (dt * rates.shape[1])
 
 
+def uncut(rates, step):
+    """The middle of what a code stands for that was cut towards zero; zero itself is that already."""
+    return rates + np.where(np.abs(rates) > step / 2, np.copysign(step / 2, rates), 0)
+
+
 def modes(rows):
     dt = np.median(np.diff(rows[:, 0]))
     yield "full", dt, rows
@@ -140,9 +147,10 @@ def rmse(found, rows):
     return [np.degrees(np.sqrt(np.mean(angle**2))) for angle in angles]
 
 
-def lines_of(path):
+def lines_of(cut_step, path):
     with gzip.open(path, "rt") as text:
         rows = np.genfromtxt(text, delimiter=",", skip_header=1)
+    rows[:, 1:4] = uncut(rows[:, 1:4], cut_step)
     lines = []
     for mode, dt, part in modes(rows):
         for name, run in FILTERS.items():
@@ -156,7 +164,7 @@ def main():
     print("filter,recording,mode,total,heading,inclination")
     paths = sorted(pathlib.Path(sys.argv[1]).glob("[0-9][0-9]*.csv.gz"))
     with multiprocessing.Pool() as pool:
-        for done, found in enumerate(pool.imap(lines_of, paths), start=1):
+        for done, found in enumerate(pool.imap(functools.partial(lines_of, float(sys.argv[2])), paths), start=1):
             print("\n".join(found), flush=True)
             print(f"peers: {done} of {len(paths)} recordings", file=sys.stderr)
 

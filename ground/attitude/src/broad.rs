@@ -51,7 +51,8 @@ impl Mode {
 
 /// [deg/s] step of the rates' codes, +-2000 deg/s in 16 bits. They were cut towards zero: on the recordings of [`TUNE`]
 /// zero is twice as frequent as its neighbours, and every bias is half a step greater in motion than at rest.
-const CUT_STEP_DEG: f64 = 2000.0 / 32768.0;
+/// Half a step is put back for ours and for its peers.
+pub const CUT_STEP_DEG: f64 = 2000.0 / 32768.0;
 
 /// Rows of the recordings in a period of 0.2 s.
 const FIVE_HZ: usize = 57;

@@ -1,7 +1,7 @@
 //! The filters of others beside ours, each from its own package, run by `peers/broad.py`.
 //!
-//! In: the CSV that the script prints. Out: mean total errors over the recordings, a filter a line. Where Python or a
-//! package is absent the table is ours alone, and says so.
+//! In: the CSV that the script prints; it is told what ours does to the rates' codes and does the same. Out: mean total
+//! errors over the recordings, a filter a line. Where Python or a package is absent the table is ours alone, and says so.
 
 use std::{
     collections::BTreeMap,
@@ -9,7 +9,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::broad::{Line, REPORT, TUNE, mean_of};
+use crate::broad::{CUT_STEP_DEG, Line, REPORT, TUNE, mean_of};
 
 /// The script, from the project's root.
 const SCRIPT: &str = "peers/broad.py";
@@ -29,6 +29,7 @@ pub fn run(mut python: Command, folder: &Path) -> Result<Totals, String> {
     let output = python
         .arg(SCRIPT)
         .arg(folder)
+        .arg(CUT_STEP_DEG.to_radians().to_string())
         .stderr(Stdio::inherit())
         .output()
         .map_err(|error| format!("{SCRIPT}: {error}"))?;
