@@ -109,8 +109,17 @@ fn tilted() -> UnitQuaternion<f32> {
 
 fn nothing(_: f32, _: &mut Step) {}
 
+/// [rad/s] what biased gyros say of no rate at all.
+const GYRO_BIAS_B: Vector3<f32> = Vector3::new(0.1 * DEG, -0.05 * DEG, 0.08 * DEG);
+
+fn biased(step: &mut Step) {
+    step.rate_b += GYRO_BIAS_B;
+    step.angle_b += GYRO_BIAS_B * STEP_S;
+}
+
 mod correction;
 mod force;
+mod gyros;
 mod hostile;
 mod iron;
 mod recovery;
@@ -152,138 +161,6 @@ fn every_scalar_compared_leaves_a_record() {
 }
 
 #[test]
-fn a_bias_is_learnt_at_rest_and_the_matrix_in_motion() {
-    let bias_b = Vector3::new(0.01, -0.02, 0.005);
-    let mut world = World::new(tilted(), params());
-    world.fly(30.0, Vector3::zeros(), |_, step| step.angle_b += bias_b * STEP_S);
-    assert!((world.filter.bias_b - bias_b).norm() < 1e-4);
-    // The gyros read one per cent high about z; half turns to either side show it.
-    for turn in 0..40 {
-        let rate_b = Vector3::new(0.3, 0.2, if turn % 4 < 2 { 1.5 } else { -1.5 });
-        world.fly(4.0, rate_b, |_, step| {
-            step.angle_b.z *= 1.01;
-            step.angle_b += bias_b * STEP_S;
-        });
-    }
-    world.off_by_less_than(1.0);
-    let scale = world.filter.gyro_matrix[(2, 2)];
-    assert!((scale - 0.01 / 1.01).abs() < 0.002, "{scale}");
-}
-
-#[test]
-fn without_the_matrix_the_same_motion_costs_more() {
-    let run = |params: Params| {
-        let mut world = World::new(tilted(), params);
-        world.fly(5.0, Vector3::zeros(), nothing);
-        // To and fro, with pauses of another axis between: no bias does the same.
-        for turn in 0..15 {
-            let rate_b = Vector3::new(0.3, 0.2, [1.5, 0.0, -1.0][turn % 3]);
-            world.fly(4.0, rate_b, |_, step| step.angle_b *= 1.01);
-        }
-        world.off()
-    };
-    let with = run(params());
-    let without = run(Params {
-        gyro_matrix_sd: 0.0,
-        gyro_matrix_walk: 0.0,
-        ..params()
-    });
-    assert!(with < 0.5 * without, "{with} {without}");
-}
-
-#[test]
-fn shaking_is_not_taken_for_tilt() {
-    // 5 m/s2 to and fro along north, at 0.8 Hz: single samples are tilted by 27 deg.
-    let shaken = |t_s: f32, step: &mut Step, q_nb: &UnitQuaternion<f32>| {
-        let acc_n = Vector3::new(5.0 * ComplexField::sin(5.0 * t_s), 0.0, 0.0);
-        if let Some(acc) = &mut step.acc {
-            acc.value_b += q_nb.inverse_transform_vector(&acc_n);
-        }
-    };
-    let mut world = World::new(tilted(), params());
-    world.fly(5.0, Vector3::zeros(), nothing);
-    let q_nb = world.q_nb;
-    world.fly(60.0, Vector3::zeros(), |t_s, step| shaken(t_s, step, &q_nb));
-    world.off_by_less_than(1.0);
-}
-
-#[test]
-fn boost_and_free_fall_after_lift_off_do_not_move_it() {
-    let mut world = World::new(tilted(), params());
-    world.fly(10.0, Vector3::zeros(), nothing);
-    world.jump = 0.0;
-    // 12 g along the forward axis for 3.3 s, begun in the middle of a window, then free fall.
-    world.fly(3.3, Vector3::new(0.3, 0.0, 0.0), |t_s, step| {
-        step.lift_off = true;
-        if t_s > 0.5 {
-            step.acc.as_mut().unwrap().value_b.x += 12.0 * GRAVITY;
-        }
-    });
-    world.fly(60.0, Vector3::new(0.3, 0.1, 0.0), |_, step| {
-        step.lift_off = true;
-        step.acc.as_mut().unwrap().value_b = Vector3::repeat(0.001);
-    });
-    assert!(world.jump < 1.0 * DEG, "{}", world.jump / DEG);
-    world.off_by_less_than(1.0);
-}
-
-#[test]
-fn after_lift_off_a_steady_push_is_not_taken_for_the_vertical() {
-    let mut world = World::new(tilted(), params());
-    world.fly(10.0, Vector3::zeros(), nothing);
-    let q_nb = world.q_nb;
-    // 1.15 g, tilted by 29 deg: near enough to one g for a shaken unit's mean, not for a sample in flight.
-    world.fly(20.0, Vector3::zeros(), |_, step| {
-        step.lift_off = true;
-        step.acc.as_mut().unwrap().value_b += q_nb.inverse_transform_vector(&Vector3::new(5.5, 0.0, 0.0));
-    });
-    world.off_by_less_than(1.0);
-}
-
-#[test]
-fn in_micro_gravity_the_field_bounds_what_it_can() {
-    let mut world = World::new(tilted(), params());
-    world.fly(10.0, Vector3::zeros(), nothing);
-    let drift = Vector3::new(0.0, 0.003, 0.0);
-    world.fly(120.0, Vector3::new(0.0, 0.2, 0.4), |_, step| {
-        step.lift_off = true;
-        step.acc = None;
-        step.angle_b += drift * STEP_S;
-    });
-    // 0.003 rad/s for two minutes is 20 deg.
-    world.off_by_less_than(5.0);
-}
-
-#[test]
-fn a_magnetic_step_turns_the_heading_by_less_than_two_degrees() {
-    let mut world = World::new(tilted(), params());
-    world.fly(20.0, Vector3::zeros(), nothing);
-    let q_nb = world.q_nb;
-    for direction_n in [Vector3::y(), Vector3::x(), -Vector3::z()] {
-        world.fly(30.0, Vector3::zeros(), |_, step| {
-            step.mag.as_mut().unwrap().value_b += q_nb.inverse_transform_vector(&(direction_n * 20.0));
-        });
-        world.off_by_less_than(2.0);
-        world.fly(10.0, Vector3::zeros(), nothing);
-    }
-}
-
-#[test]
-fn a_saturated_spin_is_recovered_from_within_a_minute() {
-    let mut world = World::new(tilted(), params());
-    world.fly(10.0, Vector3::zeros(), nothing);
-    // 720 deg/s about forward, gyros that stop at 320.
-    world.fly(20.0, Vector3::new(12.6, 0.0, 0.0), |_, step| {
-        step.angle_b.x = 5.6 * STEP_S;
-        step.rate_b.x = 5.6;
-        step.saturated = true;
-    });
-    assert!(world.worst_sd_deg() > 30.0, "it must know that it does not know");
-    world.fly(60.0, Vector3::new(0.1, 0.0, 0.0), nothing);
-    world.off_by_less_than(5.0);
-}
-
-#[test]
 fn slot_times_and_delays_are_taken_off() {
     // The field is sampled 8 ms after the gyros and is 15 ms old; at 3 rad/s its age is 2.6 deg.
     let rate_b = Vector3::new(0.0, 0.0, 3.0);
@@ -307,59 +184,4 @@ fn slot_times_and_delays_are_taken_off() {
     };
     assert!(run(0.015) < 0.1, "{}", run(0.015));
     assert!(run(0.0) > 1.0, "{}", run(0.0));
-}
-
-/// [rad/s] what the gyros of the next tests say of no rate at all.
-const GYRO_BIAS_B: Vector3<f32> = Vector3::new(0.1 * DEG, -0.05 * DEG, 0.08 * DEG);
-
-fn biased(step: &mut Step) {
-    step.rate_b += GYRO_BIAS_B;
-    step.angle_b += GYRO_BIAS_B * STEP_S;
-}
-
-#[test]
-fn a_rest_that_begins_with_the_end_of_a_motion_teaches_no_wrong_bias() {
-    let mut world = World::new(tilted(), params());
-    world.fly(5.0, Vector3::new(0.3, -0.2, 0.1), |_, step| biased(step));
-    // Easing to a stop, a window long and within the bounds of rest.
-    for index in 0..50 {
-        let rate_b = Vector3::new(0.0, 0.0, 0.9 * DEG * (1.0 - index as f32 * STEP_S));
-        world.fly(STEP_S, rate_b, |_, step| biased(step));
-    }
-    world.fly(6.0, Vector3::zeros(), |_, step| biased(step));
-    let off_b = world.filter.bias_b - GYRO_BIAS_B;
-    assert!(off_b.norm() < 0.02 * DEG, "{:?} deg/s", off_b / DEG);
-}
-
-#[test]
-fn a_bias_that_every_rest_contradicts_is_given_up() {
-    let mut world = World::new(tilted(), params());
-    world.fly(5.0, Vector3::zeros(), |_, step| biased(step));
-    // As an upset in memory leaves it.
-    world.filter.bias_b += Vector3::new(1.0 * DEG, 0.0, 0.0);
-    world.fly(world.filter.params.recovery_s + 2.0, Vector3::zeros(), |_, step| {
-        biased(step)
-    });
-    let off_b = world.filter.bias_b - GYRO_BIAS_B;
-    assert!(off_b.norm() < 0.02 * DEG, "{:?} deg/s", off_b / DEG);
-}
-
-#[test]
-fn a_few_noisy_samples_are_no_exact_bias() {
-    let sd_after = |noise: f32| {
-        let mut world = World::new(tilted(), params());
-        world.fly(4.0, Vector3::zeros(), |_, step| {
-            step.angle_variance = square(noise * STEP_S);
-        });
-        ComplexField::sqrt(world.filter.bias_covariance_b().trace() / 3.0)
-    };
-    // Fifty samples a window, three windows after the first.
-    let noise = 1.0 * DEG;
-    let expected = noise / ComplexField::sqrt(150.0_f32);
-    assert!(
-        (sd_after(noise) / expected - 1.0).abs() < 0.1,
-        "{} {expected}",
-        sd_after(noise)
-    );
-    assert!(sd_after(0.0) < 0.01 * DEG);
 }

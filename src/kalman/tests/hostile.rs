@@ -1,15 +1,6 @@
-//! Bad input, bad starts, long runs.
+//! Bad input, gaps, long runs.
 
 use super::*;
-
-#[test]
-fn half_a_turn_of_initial_error_is_recovered_from_within_half_a_minute() {
-    let wrong = tilted() * from_rotation_vector(Vector3::new(0.0, PI, 0.0));
-    let mut world = World::new(tilted(), params());
-    world.filter = Filter::resumed(params(), wrong, Matrix3::from_diagonal_element(1e-4));
-    world.fly(30.0, Vector3::zeros(), nothing);
-    world.off_by_less_than(1.0);
-}
 
 #[test]
 fn a_short_gap_is_bridged_and_a_long_one_starts_afresh() {

@@ -95,3 +95,17 @@ fn north_that_was_found_stays_and_that_of_a_site_comes_true() {
     let [at_first, of_site] = headings_with_little_iron(Reference::at_site(0.0));
     assert!(at_first > 5.0 && of_site < found - 1.0, "{at_first} {of_site}");
 }
+
+#[test]
+fn a_magnetic_step_turns_the_heading_by_less_than_two_degrees() {
+    let mut world = World::new(tilted(), params());
+    world.fly(20.0, Vector3::zeros(), nothing);
+    let q_nb = world.q_nb;
+    for direction_n in [Vector3::y(), Vector3::x(), -Vector3::z()] {
+        world.fly(30.0, Vector3::zeros(), |_, step| {
+            step.mag.as_mut().unwrap().value_b += q_nb.inverse_transform_vector(&(direction_n * 20.0));
+        });
+        world.off_by_less_than(2.0);
+        world.fly(10.0, Vector3::zeros(), nothing);
+    }
+}
