@@ -33,11 +33,13 @@ pub enum Mode {
     FiveHz,
     /// At every row, begun 10 s into the motion.
     FromMotion,
+    /// At 5 Hz, the mean over [`FIRST_ROWS`]: at which instants force and field are sampled is chance.
+    FiveHzFromAnyRow,
 }
 
 impl Mode {
     /// All of them.
-    pub const ALL: [Mode; 3] = [Mode::Full, Mode::FiveHz, Mode::FromMotion];
+    pub const ALL: [Mode; MODES] = [Mode::Full, Mode::FiveHz, Mode::FromMotion, Mode::FiveHzFromAnyRow];
 
     /// As a table's heading has it.
     pub fn name(self) -> &'static str {
@@ -45,6 +47,7 @@ impl Mode {
             Mode::Full => "285 Hz",
             Mode::FiveHz => "5 Hz",
             Mode::FromMotion => "start in motion",
+            Mode::FiveHzFromAnyRow => "5 Hz, 12 first rows",
         }
     }
 }
@@ -56,6 +59,12 @@ pub const CUT_STEP_DEG: f64 = 2000.0 / 32768.0;
 
 /// Rows of the recordings in a period of 0.2 s.
 const FIVE_HZ: usize = 57;
+
+/// Rows that the first period begins at, through one period.
+const FIRST_ROWS: [usize; 12] = [0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55];
+
+/// How many modes there are.
+pub const MODES: usize = 4;
 
 /// Parameters and noise for these recordings, one set for all.
 pub fn replay(mode: Mode) -> Replay {
@@ -78,7 +87,10 @@ pub fn replay(mode: Mode) -> Replay {
             mag: 0.1,
         },
         cut_step: CUT_STEP_DEG.to_radians(),
-        rows_per_step: if mode == Mode::FiveHz { FIVE_HZ } else { 1 },
+        rows_per_step: match mode {
+            Mode::FiveHz | Mode::FiveHzFromAnyRow => FIVE_HZ,
+            Mode::Full | Mode::FromMotion => 1,
+        },
     }
 }
 
@@ -120,7 +132,7 @@ pub fn files(folder: &Path) -> Result<Vec<(String, PathBuf)>, RecordingError> {
 }
 
 /// A recording's number, and its errors in each mode of [`Mode::ALL`].
-pub type Line = (String, [Option<Rmse>; 3]);
+pub type Line = (String, [Option<Rmse>; MODES]);
 
 /// A line a recording.
 pub type Table = Vec<Line>;
@@ -130,7 +142,17 @@ pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Table, Recording
     let mut table = Vec::new();
     for (number, path) in files(folder)? {
         let rows = recording::read(&path)?;
-        let of = |mode| replay(mode).score(scored(&rows, mode));
+        let of = |mode| {
+            let (replay, rows) = (replay(mode), scored(&rows, mode));
+            let begun_at = |first: usize| rows.get(first..).and_then(|rows| replay.score(rows));
+            match mode {
+                Mode::FiveHzFromAnyRow => {
+                    let all: Option<Vec<Rmse>> = FIRST_ROWS.into_iter().map(begun_at).collect();
+                    all.map(|all| mean(&all))
+                }
+                _ => begun_at(0),
+            }
+        };
         table.push((number.clone(), Mode::ALL.map(of)));
         done(&number);
     }
@@ -158,7 +180,7 @@ pub fn format(table: &[Line]) -> String {
         ),
         None => format!("{:>24}", "no attitude"),
     };
-    let mut line = |name: &str, modes: [Option<Rmse>; 3]| {
+    let mut line = |name: &str, modes: [Option<Rmse>; MODES]| {
         text += &format!("{name:<14}");
         for rmse in modes {
             text += &format!("{:>24}", cell(rmse));
@@ -169,7 +191,7 @@ pub fn format(table: &[Line]) -> String {
         line(number, *modes);
     }
     for (name, numbers) in [("mean of tune", &TUNE[..]), ("mean of report", &REPORT[..])] {
-        line(name, [0, 1, 2].map(|mode| mean_of(table, numbers, mode)));
+        line(name, std::array::from_fn(|mode| mean_of(table, numbers, mode)));
     }
     text + "total (heading, inclination)\n"
 }
