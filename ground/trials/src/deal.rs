@@ -52,6 +52,9 @@ const LARGE_SNR: f64 = 400.0;
 /// Largest strength of what has a name, in typical sizes: no part of its kind is worse, and the priors of a diagnosis say so.
 const LARGEST: f64 = 5.0;
 
+/// The same of what has none: beyond it is a motion that hardly brings it out, and what was counted is rounding.
+const LARGEST_NOVEL: f64 = 20.0;
+
 /// What is wrong with a case, by how much is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Ring {
@@ -130,12 +133,8 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
                 // Near the size of a count, rounding adds to the difference of two flights: measured where it does not
                 // matter and scaled down.
                 let gross = (LARGE_SNR / at(1.0).max(0.1)).powf(power).clamp(0.1, 100.0);
-                let strength = gross * (wanted / at(gross).max(0.1)).powf(power);
-                let largest = if ring == Ring::R3 { f64::INFINITY } else { LARGEST };
-                match strength <= largest {
-                    true => (strength, wanted),
-                    false => (largest, wanted * (largest / strength).powf(1.0 / power)),
-                }
+                let largest = if ring == Ring::R3 { LARGEST_NOVEL } else { LARGEST };
+                sized(wanted, gross, at(gross), power, largest)
             }
         };
         energy += reached * reached;
@@ -158,6 +157,16 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         effects,
         snr_marginal: energy.sqrt(),
     })
+}
+
+/// The strength that has the ratio that is wanted, where a strength `gross` has `of_gross`, and the ratio that it has: less than
+/// what is wanted if that takes more than the largest.
+fn sized(wanted: f64, gross: f64, of_gross: f64, power: f64, largest: f64) -> (f64, f64) {
+    let strength = gross * (wanted / of_gross.max(0.1)).powf(power);
+    match strength <= largest {
+        true => (strength, wanted),
+        false => (largest, wanted * (largest / strength).powf(1.0 / power)),
+    }
 }
 
 /// A flight of a scene.
@@ -263,6 +272,18 @@ fn case_toml(name: &str, style: Style, claimed: &Environment) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_motion_does_not_bring_out_has_a_small_ratio() {
+        assert_eq!(sized(12.0, 10.0, 400.0, 1.0, LARGEST), (0.3, 12.0));
+        // A leak of a rate about an axis that never turns.
+        let (strength, reached) = sized(10.0, 100.0, 0.0, 1.0, LARGEST_NOVEL);
+        assert_eq!(strength, LARGEST_NOVEL);
+        assert!(reached < 0.1, "{reached}");
+        // A variance goes with the square.
+        let (strength, reached) = sized(40.0, 10.0, 10.0, 0.5, LARGEST);
+        assert_eq!((strength, reached), (5.0, 2.5));
+    }
 
     #[test]
     fn a_seed_is_a_case() {

@@ -117,7 +117,7 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
         share(
             "none of these, novel",
             ">= 0.85",
-            ring("R3"),
+            ring("R3").filter(|judged| judged.answer.snr_marginal >= MARGINAL_SNR),
             |_, verdict| verdict.is_unknown(),
             false,
         ),
