@@ -29,6 +29,9 @@ const TRIES: usize = 20;
 /// Squares to which one of a sample is cut, in units of what is expected.
 const FARTHEST: f64 = 16.0;
 
+/// Variance of two ages that are a whole period apart, over that of ages evenly between them.
+const AT_ONCE: f64 = 3.0;
+
 /// [units of noise] to which the zero of a channel is known.
 const ZERO: f64 = 0.2;
 
@@ -108,8 +111,8 @@ pub fn simulate(
 }
 
 impl Clock {
-    /// A clock that scatters a channel as much as what is `left` of it shows, from not at all to evenly over a period: one that
-    /// keeps step with the cycle scatters nothing. By least squares of the squares, each with the weight that its own scatter
+    /// A clock that scatters a channel as much as what is `left` of it shows: one that keeps step with the cycle scatters nothing,
+    /// or, where it converts just when it is read, by a whole period, and any other evenly over a period. By least squares of the squares, each with the weight that its own scatter
     /// leaves it.
     pub fn as_shown(mut self, left: impl Iterator<Item = f64>) -> Self {
         let (mut along, mut energy) = (0.0, 0.0);
@@ -122,7 +125,7 @@ impl Clock {
             energy += weight * even * even;
         }
         let part = if energy > 0.0 {
-            (along / energy).clamp(0.0, 1.0)
+            (along / energy).clamp(0.0, AT_ONCE)
         } else {
             1.0
         };
@@ -180,7 +183,7 @@ mod tests {
     #[test]
     fn a_clock_scatters_as_much_as_its_channel_shows() {
         // The squares of 1500 samples tell the part to a tenth.
-        for part in [0.0, 0.5, 1.0] {
+        for part in [0.0, 0.5, 1.0, AT_ONCE] {
             let shown = shown(part);
             assert!((shown - part).abs() < 0.3, "{part} {shown}");
         }
