@@ -13,6 +13,21 @@ pub struct Cause {
     pub channels: Vec<String>,
     /// Strength it was dealt with.
     pub strength: f64,
+    /// Its sizes, where its law has parameters that verdicts state too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sizes: Vec<Size>,
+}
+
+/// One size of a cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Size {
+    /// Its name in verdicts.
+    pub parameter: String,
+    /// The channel that has it; all those touched where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channel: Option<String>,
+    /// In SI, field in uT.
+    pub value: f64,
 }
 
 /// What was wrong with a case.

@@ -266,6 +266,9 @@ pub fn tools(folder: &Path, judged: &[Judged]) -> Result<Vec<(String, Vec<Line>)
             let path = folder.join(&other.answer.case).join(format!("verdict-{name}.json"));
             other.verdict = if path.exists() { Some(parse(&path)?) } else { None };
         }
+        if name == "oracle" {
+            tools[0].1.push(score::efficiency(judged, &others));
+        }
         tools.push((name, score::table(&others)));
     }
     Ok(tools)

@@ -22,7 +22,7 @@ use twin::{
 };
 
 use crate::{
-    answer::{Answer, Cause},
+    answer::{Answer, Cause, Size},
     deck::Card,
     disturbance::{self, Disturbance, novel},
     draw::Draw,
@@ -102,10 +102,11 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     let wander = Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1));
     let fly = |struck: &[(usize, f64)]| {
         let mut scene = Scene::new(wander.clone(), site, &mut draw.stream(2));
-        let touched: Vec<Vec<usize>> = struck
-            .iter()
-            .map(|(index, strength)| (chosen[*index].apply)(&mut scene, &mut draw.stream(3 + *index as u64), *strength))
-            .collect();
+        let struck = struck.iter().map(|(index, strength)| {
+            let touched = (chosen[*index].apply)(&mut scene, &mut draw.stream(3 + *index as u64), *strength);
+            (touched, std::mem::take(&mut scene.sizes))
+        });
+        let touched: Vec<(Vec<usize>, Vec<Size>)> = struck.collect();
         let plant = Plant::seeing(&scene.views, scene.source.clone(), seed, Quality::NOMINAL);
         let mut readings = flight::fly(plant, DURATION_S + 1.0);
         for transit in &scene.transit {
@@ -143,11 +144,12 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     let flown = fly(&strengths);
     write(&folder.join(name), name, style, &flown, &instants)?;
     let effects = (chosen.iter().zip(&flown.touched).zip(&strengths))
-        .map(|((disturbance, touched), (_, strength))| Cause {
+        .map(|((disturbance, (touched, sizes)), (_, strength))| Cause {
             effect: disturbance.name.into(),
             in_library: ring != Ring::R3,
             channels: touched.iter().map(|index| CHANNELS[*index].name.into()).collect(),
             strength: *strength,
+            sizes: sizes.clone(),
         })
         .collect();
     Ok(Answer {
@@ -173,7 +175,7 @@ fn sized(wanted: f64, gross: f64, of_gross: f64, power: f64, largest: f64) -> (f
 struct Flown {
     readings: Vec<Reading>,
     scene: Scene,
-    touched: Vec<Vec<usize>>,
+    touched: Vec<(Vec<usize>, Vec<Size>)>,
 }
 
 impl Flown {
@@ -309,7 +311,10 @@ mod tests {
         let fly = |struck: Option<Disturbance>| {
             let wander = Wander::draw(Style::Hand, true, LONG_S + 2.0, &mut Draw::new(11));
             let mut scene = Scene::new(wander, site, &mut Draw::new(12));
-            let touched = struck.map(|disturbance| (disturbance.apply)(&mut scene, &mut Draw::new(13), 10.0));
+            let touched = struck.map(|disturbance| {
+                let touched = (disturbance.apply)(&mut scene, &mut Draw::new(13), 10.0);
+                (touched, Vec::new())
+            });
             let plant = Plant::seeing(&scene.views, scene.source.clone(), 3, Quality::NOMINAL);
             let mut readings = flight::fly(plant, LONG_S + 1.0);
             scene.transit.iter().for_each(|transit| transit(&mut readings));
@@ -329,7 +334,7 @@ mod tests {
             // A fiftieth of a gyro's noise is lost in four minutes: what is counted of it is mostly the rounding of codes.
             let is_plain = disturbance.name != "earth-rate";
             assert!(snr > if is_plain { 5.0 } else { 0.1 }, "{}: {snr}", disturbance.name);
-            let touched = &flown.touched[0];
+            let touched = &flown.touched[0].0;
             for (index, channel) in CHANNELS
                 .iter()
                 .enumerate()

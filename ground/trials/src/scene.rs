@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use emems::sample::Reading;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use packets::channel::Quantity;
+use packets::channel::{CHANNELS, Quantity};
 use twin::{
     environment::{Environment, World},
     geometry,
@@ -17,7 +17,7 @@ use twin::{
     truth::TruthSource,
 };
 
-use crate::{draw::Draw, motion::Wander, unit::kind};
+use crate::{answer::Size, draw::Draw, motion::Wander, unit::kind};
 
 /// [s] step of the tables of slow filters.
 const STEP_S: f64 = 2e-3;
@@ -44,6 +44,8 @@ pub struct Scene {
     pub record: Record,
     /// The environment as the case states it.
     pub claimed: Environment,
+    /// Sizes of what is wrong that verdicts state too.
+    pub sizes: Vec<Size>,
 }
 
 impl Scene {
@@ -78,7 +80,29 @@ impl Scene {
             transit: Vec::new(),
             record,
             claimed: site,
+            sizes: Vec::new(),
         }
+    }
+
+    /// Notes a size that all channels touched have.
+    pub fn size(&mut self, parameter: &str, value: f64) {
+        self.sizes.push(Size {
+            parameter: parameter.to_owned(),
+            channel: None,
+            value,
+        });
+    }
+
+    /// Notes one of each axis of a plate's sensor.
+    pub fn sizes_of(&mut self, parameter: &str, quantity: Quantity, plate: usize, values: &[f64]) {
+        let own = CHANNELS
+            .iter()
+            .filter(|channel| channel.quantity == quantity && channel.plate == plate);
+        self.sizes.extend(own.zip(values).map(|(channel, value)| Size {
+            parameter: parameter.to_owned(),
+            channel: Some(channel.name.to_owned()),
+            value: *value,
+        }));
     }
 }
 

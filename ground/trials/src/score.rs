@@ -6,10 +6,12 @@
 
 use std::{collections::BTreeSet, fmt::Write as _};
 
+mod sizes;
 mod verdict;
 
+pub(crate) use sizes::efficiency;
 use verdict::LARGEST_SET;
-pub use verdict::{Named, Shrink, Verdict};
+pub use verdict::{Named, Shrink, Stated, Verdict};
 
 use crate::{answer::Answer, interval::clopper_pearson};
 
@@ -188,6 +190,7 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
         value: shrinks.get(shrinks.len() / 2).copied().unwrap_or(0.0),
         ..mean("median held-out shrink [%], SNR >= 15", ">= 95", Vec::new())
     });
+    lines.extend(sizes::lines(judged));
     lines.extend(two_effects(ring("R4").collect()));
     lines
 }

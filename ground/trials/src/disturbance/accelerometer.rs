@@ -34,6 +34,7 @@ fn bias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let b = strength * 10.0 * MG * draw.vector();
+        scene.sizes_of("b", SpecificForce, plate, b.as_slice());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + b);
     }
     channels(SpecificForce, &plates)
@@ -43,6 +44,7 @@ fn bias_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<us
     let plates = plates(draw);
     for &plate in &plates {
         let (k, bend) = (strength * 0.4 * MG * draw.vector(), draw.uniform(-0.015, 0.015));
+        scene.sizes_of("k", SpecificForce, plate, k.as_slice());
         let source = scene.source.clone();
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
             let warmth = source.at(t).temperature_c - 25.0;
@@ -56,6 +58,7 @@ fn scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let s = strength * 0.008 * draw.vector();
+        scene.sizes_of("s", SpecificForce, plate, s.as_slice());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
             force + s.component_mul(&force)
         });
@@ -67,6 +70,7 @@ fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<u
     let plates = plates(draw);
     for &plate in &plates {
         let (k, bend) = (strength * 2e-4 * draw.vector(), draw.uniform(-0.015, 0.015));
+        scene.sizes_of("k", SpecificForce, plate, k.as_slice());
         let source = scene.source.clone();
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
             let warmth = source.at(t).temperature_c - 25.0;
@@ -97,6 +101,7 @@ fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
     let plates = plates(draw);
     for &plate in &plates {
         let a = strength * 6e-4 * draw.vector();
+        scene.sizes_of("a", SpecificForce, plate, a.as_slice());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| {
             force + a.component_mul(&force.component_mul(&force))
         });
@@ -134,6 +139,9 @@ fn vibration_rectification(scene: &mut Scene, draw: &mut Draw, strength: f64) ->
 /// The unit turns about another point than its drawing says: all plates are off by one vector.
 fn lever_arm(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let offset_b = strength * 0.01 * draw.direction();
+    for (name, value) in ["dx", "dy", "dz"].into_iter().zip(offset_b.iter()) {
+        scene.size(name, *value);
+    }
     for plate in ALL_PLATES {
         let (source, dcm_pb) = (scene.source.clone(), geometry::dcm_bp(plate).transpose());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
@@ -147,6 +155,7 @@ fn lever_arm(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    scene.size("tau", delay_s);
     for view in &mut scene.views.force_p {
         *view = shifted(view, move |t| t - delay_s);
     }

@@ -39,6 +39,7 @@ fn bias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let b = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.3 * DEG;
+        scene.sizes_of("b", Rate, plate, &[b]);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| rate + b);
     }
     channels(Rate, &plates)
@@ -49,6 +50,7 @@ fn bias_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<us
     let plates = plates(draw);
     for &plate in &plates {
         let k = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.01 * DEG;
+        scene.sizes_of("k", Rate, plate, &[k]);
         let bend = draw.uniform(-0.015, 0.015);
         let source = scene.source.clone();
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
@@ -65,6 +67,7 @@ fn temperature_hysteresis(scene: &mut Scene, draw: &mut Draw, strength: f64) -> 
     for &plate in &plates {
         // [rad/s/degC], so that a ramp of 1 degC/s shifts by 0.1 deg/s once the die follows.
         let k = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.1 * DEG / tau_s;
+        scene.sizes_of("k", Rate, plate, &[k * tau_s]);
         let told = scene.views.gyro_temperature_c[plate].clone();
         let die = lagged(&told, tau_s);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| rate + k * (told(t) - die(t)));
@@ -76,6 +79,7 @@ fn warm_up(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (plates, tau_s) = (plates(draw), draw.log_uniform(30.0, 150.0));
     for &plate in &plates {
         let a = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.2 * DEG;
+        scene.sizes_of("A", Rate, plate, &[a]);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
             rate + a * (-t.max(0.0) / tau_s).exp()
         });
@@ -87,6 +91,7 @@ fn scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let s = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.005;
+        scene.sizes_of("s", Rate, plate, &[s]);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| rate * (1.0 + s));
     }
     channels(Rate, &plates)
@@ -96,6 +101,7 @@ fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<u
     let plates = plates(draw);
     for &plate in &plates {
         let k = strength * draw.sign() * draw.uniform(0.5, 1.5) * 2e-4;
+        scene.sizes_of("k", Rate, plate, &[k]);
         let bend = draw.uniform(-0.015, 0.015);
         let source = scene.source.clone();
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
@@ -182,6 +188,7 @@ fn supply(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 fn lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (plates, tau_s) = (plates(draw), strength * draw.uniform(0.5, 1.5) * 0.02);
+    scene.size("tau", tau_s);
     for &plate in &plates {
         scene.views.rate[plate] = lagged(&scene.views.rate[plate], tau_s);
     }
@@ -190,6 +197,7 @@ fn lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    scene.size("tau", delay_s);
     for view in &mut scene.views.rate {
         *view = shifted(view, move |t| t - delay_s);
     }

@@ -56,6 +56,7 @@ fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<u
     let plates = plates(draw);
     for &plate in &plates {
         let (k, bend) = (-0.003 * strength * draw.uniform(0.8, 1.2), draw.uniform(-0.01, 0.01));
+        scene.sizes_of("k", Field, plate, &[k; 3]);
         let source = scene.source.clone();
         scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
             let warmth = source.at(t).temperature_c - 25.0;
@@ -69,6 +70,7 @@ fn offset_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<
     let plates = plates(draw);
     for &plate in &plates {
         let (k, bend) = (strength * 0.05 * draw.vector(), draw.uniform(-0.015, 0.015));
+        scene.sizes_of("k", Field, plate, k.as_slice());
         let source = scene.source.clone();
         scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
             let warmth = source.at(t).temperature_c - 25.0;
@@ -124,6 +126,7 @@ fn current_field(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 /// Currents in a conducting case: inside it the field follows that of the case's frame with a lag.
 fn eddy_current(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let tau_s = strength * draw.uniform(0.5, 1.5) * 0.006;
+    scene.size("tau", tau_s);
     for view in &mut scene.views.field_p_ut {
         *view = lagged(view, tau_s);
     }
@@ -151,6 +154,7 @@ fn mains_alias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> 
 
 fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    scene.size("tau", delay_s);
     for view in &mut scene.views.field_p_ut {
         *view = shifted(view, move |t| t - delay_s);
     }

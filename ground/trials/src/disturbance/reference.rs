@@ -98,7 +98,10 @@ fn sensors(plates: &[usize]) -> Vec<usize> {
 }
 
 fn gravity_value(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    scene.claimed.gravity += strength * draw.sign() * 0.02;
+    let more = strength * draw.sign() * 0.02;
+    scene.claimed.gravity += more;
+    // What is claimed is too much by this: the truth is less.
+    scene.size("dg", -more);
     channels(SpecificForce, &ALL_PLATES)
 }
 
@@ -128,6 +131,7 @@ fn mounting(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 /// The record is late.
 fn reference_lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    scene.size("tau", delay_s);
     let record = scene.record.clone();
     scene.record = Arc::new(move |t| record(t - delay_s));
     moving()
@@ -137,6 +141,7 @@ fn reference_lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 /// that has been gone.
 fn reference_rate_scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let gear = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.005;
+    scene.size("s", gear);
     let (record, motion) = (scene.record.clone(), scene.motion.clone());
     scene.record = Arc::new(move |t| {
         let (q_nb, place_n) = record(t);
@@ -147,13 +152,18 @@ fn reference_rate_scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Ve
 }
 
 fn field_model(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    scene.claimed.field_n_ut += strength * 0.4 * draw.vector();
+    let more_n = strength * 0.4 * draw.vector();
+    scene.claimed.field_n_ut += more_n;
+    for (name, value) in ["dn", "de", "dd"].into_iter().zip(more_n.iter()) {
+        scene.size(name, -value);
+    }
     channels(Field, &ALL_PLATES)
 }
 
 /// Everything the unit says is late, with a little jitter.
 fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let delay_s = strength * draw.uniform(0.5, 1.5) * 0.01;
+    scene.size("tau", delay_s);
     every_view_at(scene, move |t| t - delay_s);
     moving()
 }
@@ -161,6 +171,7 @@ fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 /// Sensors are read one after the other, later than the description says, each by the same step more.
 fn read_skew(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let step_s = strength * draw.uniform(0.5, 1.5) * 0.002;
+    scene.size("delta", step_s);
     for plate in ALL_PLATES {
         let late = |slot: usize| move |t: f64| t + step_s * slot as f64;
         scene.views.force_p[plate] = shifted(&scene.views.force_p[plate], late(plate));
@@ -172,6 +183,7 @@ fn read_skew(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 fn clock_rate(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let rate = 1.0 + strength * draw.sign() * draw.uniform(0.5, 1.5) * 1e-4;
+    scene.size("e", rate - 1.0);
     every_view_at(scene, move |t| t * rate);
     moving()
 }

@@ -7,6 +7,7 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
         in_library: true,
         channels: vec!["g1".into()],
         strength: 1.0,
+        sizes: Vec::new(),
     };
     Judged {
         answer: Answer {
@@ -42,6 +43,36 @@ fn right_and_wrong_names_are_told_apart() {
     assert_eq!(value(&lines, "gap detected (one effect)"), 1.0);
     assert_eq!(value(&lines, "mean probability on the truth"), 0.45);
     assert!((value(&lines, "localisation F1 (channels)") - (1.0 + 2.0 / 3.0) / 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn sizes_are_held_against_what_they_were() {
+    let stated = r#"{"causes":[{"effect":"gyro-bias","channels":["g1","g2"],"probability":0.9,"parameters":{
+        "b_g1":{"value":0.0103,"sigma":0.0001},"b_g2":{"value":0.0196,"sigma":0.0001}}}],
+        "shrink":{"hold_before":2.0,"percent":97.0}}"#;
+    let mut case = judged("R1", &["gyro-bias"], Some(stated));
+    case.answer.snr_marginal = 40.0;
+    let size = |channel: &str, value: f64| crate::answer::Size {
+        parameter: "b".into(),
+        channel: Some(channel.into()),
+        value,
+    };
+    case.answer.effects[0].sizes = vec![size("g1", 0.01), size("g2", 0.02)];
+    let lines = table(std::slice::from_ref(&case));
+    // (0.3, 0.4) of (10, 20) mrad/s.
+    let error = value(&lines, "median error of the parameters [%], SNR >= 30");
+    assert!((error - 100.0 * 0.5 / 500f64.sqrt()).abs() < 1e-9, "{error}");
+    // Two parameters of some 220 sigmas together leave nothing to be seen: all shrinks, and three points did not.
+    let off = value(&lines, "median of predicted less achieved shrink [points], SNR >= 15");
+    assert!((off - 3.0).abs() < 0.02, "{off}");
+    let mut oracle = case.clone();
+    oracle
+        .verdict
+        .as_mut()
+        .and_then(|verdict| verdict.shrink.as_mut())
+        .expect("given")
+        .percent = Some(100.0);
+    assert_eq!(efficiency(&[case], &[oracle]).value, 0.97);
 }
 
 #[test]

@@ -3,6 +3,8 @@
 //! In: the file. Out: the names it says, the set it declares, the probability it gives a name. Unknown fields are passed
 //! over, so any tool that writes the keys below can be scored.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 /// What of verdict.json is scored; unknown fields are passed over.
@@ -31,12 +33,26 @@ pub struct Named {
     pub channels: Vec<String>,
     /// How sure.
     pub probability: f64,
+    /// How large, by name.
+    pub parameters: BTreeMap<String, Stated>,
+}
+
+/// A size as stated.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Stated {
+    /// In its unit.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
 }
 
 /// Shrinkage on the hold window.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Shrink {
+    /// Before, in sigma.
+    pub hold_before: Option<f64>,
     /// Of the gap above its floor.
     pub percent: Option<f64>,
 }
