@@ -177,8 +177,7 @@ fn oversize(page: &Page, theta: &nalgebra::DVector<f64>, parameters: &[Parameter
 }
 
 /// Probability of a chosen effect at any place, against all others and nothing. Beyond its largest size it is a
-/// proxy for something else at odds that rise with the square of its size: evidence cannot tell, for the effect that is
-/// meant is in no list.
+/// proxy for something else: evidence cannot tell, for the effect that is meant is in no list.
 pub fn probability(library: &Library, chosen: &Chosen) -> f64 {
     let hypothesis = &library.hypotheses[chosen.hypothesis];
     let own: f64 = by_effect(library, &chosen.rivals)
@@ -204,9 +203,11 @@ pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
     ))
 }
 
-/// Probability that an effect of so many times its largest size is itself and no proxy: the tail of a Cauchy law.
+/// Probability that an effect of so many times its largest size is itself and no proxy: at odds that fall with the fourth power,
+/// for evidence has a price for sizes well below the largest. Of 14 names of a quarter to two thirds of it on trials looked at
+/// 13 were right (TRIALS.md), and this is 0.95 of them.
 fn itself(excess: f64) -> f64 {
-    1.0 / (1.0 + excess * excess)
+    1.0 / (1.0 + excess.powi(4))
 }
 
 /// Energies to shares, most first.

@@ -21,7 +21,8 @@ const PAGE: Page = Page {
     equation: "y = (n + phi x n).v, phi = c |w|^2, c |f| or c f.n_plate",
     source: "Thin boards on stand-offs: 0.1 to 0.5 deg",
     excited_by: "high rate or acceleration",
-    siblings: &["lever-arm", "accel-nonlinearity", "plate-rotation"],
+    // Where there is no force but weight, its size is one at all times: the plate is turned, or all are with the unit.
+    siblings: &["lever-arm", "accel-nonlinearity", "plate-rotation", "mounting"],
     confirm_by: "Spin at two rates with the board stiffened and not.",
     scope: Scope::Plate,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
