@@ -6,7 +6,7 @@ use gap::{
     again::again, attribute::attribute, case::Subject, fit_error::FitError, library::Library, model::Model, on::On,
     problem::Problem, terminal,
 };
-use gyros::{diagnosed_in, erring, rate};
+use gyros::{diagnosed_in, erring, erring_in, rate};
 
 #[test]
 fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
@@ -21,12 +21,14 @@ fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
 }
 
 /// [s] time constants of a warm-up, none of which is tried as it is.
-const TAUS_S: [f64; 6] = [55.0, 66.0, 95.0, 110.0, 128.0, 140.0];
+const TAUS_S: [f64; 12] = [
+    53.7, 57.9, 64.2, 66.3, 71.8, 97.1, 101.4, 108.9, 113.6, 122.3, 128.7, 141.2,
+];
 
 /// How far the time constant that is found for a warm-up of `tau_s` is off, in standard deviations of what it is said to be
-/// off by.
+/// off by; each in noise of its own.
 fn off(tau_s: f64) -> f64 {
-    let folder = erring(|t_s| 0.02 * (-t_s / tau_s).exp(), "");
+    let folder = erring_in(tau_s as u64, |t_s| 0.02 * (-t_s / tau_s).exp(), "");
     let subject = Subject::open(folder.path()).expect("opens");
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let mut library = Library::new(&problem, &[], &|_| {});
@@ -45,8 +47,8 @@ fn off(tau_s: f64) -> f64 {
 fn a_time_constant_is_off_by_as_much_as_is_said() {
     let off = TAUS_S.map(off);
     let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
-    // Moved as long as that is worth a tenth of a nat, which is half a standard deviation; one log of noise.
-    assert!((0.2..1.5).contains(&rms), "{off:?}");
+    // Of twelve draws, 99 in 100 within half as much again; moved as long as that is worth a tenth of a nat, which is half a standard deviation.
+    assert!((0.4..1.5).contains(&rms), "{off:?}");
 }
 
 #[test]

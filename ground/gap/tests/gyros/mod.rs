@@ -44,6 +44,11 @@ pub fn rate(t_s: f64) -> f64 {
 /// Three gyros along the axes of b, turning about z; gz reads `error` [rad/s] of the time [s] too much, and its description has
 /// these keys too.
 pub fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
+    erring_in(11, error, keys_of_gz)
+}
+
+/// The same with noise drawn from a seed.
+pub fn erring_in(seed: u64, error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros\"\n".to_owned();
     for (name, axis) in [
@@ -60,7 +65,7 @@ pub fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
     unit += keys_of_gz;
     let mut motion = "t_s,qw,qx,qy,qz\n".to_owned();
     let mut measured = "t_s,gx,gy,gz\n".to_owned();
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     for k in 0..=50 * SECONDS {
         let t = k as f64 / 50.0;
         let half = (1.0 - (W * t).cos()) / 4.0;
