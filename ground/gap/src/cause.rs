@@ -219,13 +219,13 @@ pub fn share_out(causes: &mut [Cause]) {
     causes.sort_by(|one, other| other.share.total_cmp(&one.share));
 }
 
-/// Probabilities of the effects among rivals, places added up; what is missing from one is "nothing".
+/// Probabilities of the effects among rivals, places added up; what is missing from one is "nothing", or has no name.
 pub fn by_effect(library: &Library, rivals: &[Rival]) -> Vec<(&'static str, f64)> {
     let mut gains: Vec<f64> = rivals.iter().map(|rival| rival.gain).collect();
     gains.push(0.0);
     let shares = probabilities(&gains, &vec![0.0; gains.len()], TEMPERATURE);
     let mut sums: Vec<(&'static str, f64)> = Vec::new();
-    for (rival, share) in rivals.iter().zip(shares) {
+    for (rival, share) in rivals.iter().zip(shares).filter(|(rival, _)| rival.is_named) {
         let name = library.hypotheses[rival.hypothesis].effect();
         match sums.iter_mut().find(|(known, _)| *known == name) {
             Some((_, sum)) => *sum += share,

@@ -1,7 +1,8 @@
 //! Mains alias: the field of the mains, sampled a few times a second, comes out as a slow drift.
 //!
 //! 60 Hz is twelve times 5 Hz: it lands at zero but for the errors of both clocks. The line itself is modelled, at its frequency
-//! and at each channel's own instant, so the plates' phases come out right.
+//! and at each channel's own instant, so the plates' phases come out right. Something slow that is no alias has one phase in all
+//! of them (a frequency below zero here).
 
 use core::f64::consts::TAU;
 
@@ -49,8 +50,9 @@ impl Effect for MainsAlias {
             Vector3::from_column_slice(&theta[3..]),
         );
         let axis_b = site.channel.axis_b;
+        let later_s = if variant < 0.0 { site.channel.slot_s } else { 0.0 };
         chain.add(move |feel, _| {
-            let (sin, cos) = (TAU * variant * feel.t_s).sin_cos();
+            let (sin, cos) = (TAU * variant.abs() * (feel.t_s - later_s)).sin_cos();
             axis_b.dot(&feel.to_b(sine_n * sin + cosine_n * cos))
         });
     }
@@ -66,6 +68,10 @@ impl Effect for MainsAlias {
         let steps = (SPREAD_HZ / step_hz) as i32;
         let around = |hz: f64| (-steps..=steps).map(move |k| hz + f64::from(k) * step_hz);
         around(60.0).chain(around(50.0)).collect()
+    }
+
+    fn without_its_physics(&self, variant: f64) -> Option<f64> {
+        Some(-variant)
     }
 
     /// Half a step off, a line has turned over at the end of the log.

@@ -251,6 +251,12 @@ pub trait Effect: Sync {
         None
     }
 
+    /// The variant with the same course that lacks what this effect's physics makes of it: where it explains a log better, this
+    /// effect stands in for something without a name.
+    fn without_its_physics(&self, _variant: f64) -> Option<f64> {
+        None
+    }
+
     /// Whether this variant comes again and again, with a period that is to be found: it is on in such stretches only.
     fn repeats(&self, _variant: f64) -> bool {
         false

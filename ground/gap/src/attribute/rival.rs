@@ -2,7 +2,9 @@
 //!
 //! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
 
-use super::{CANDIDATES, Chosen, fitted, gains, is_any_same, is_physical, leading, stretches};
+use super::{
+    CANDIDATES, Chosen, fitted, gains, is_any_same, is_physical, leading, stretches, variant::without_its_physics,
+};
 use crate::{
     library::Library,
     on::On,
@@ -22,6 +24,8 @@ pub struct Rival {
     pub gain: f64,
     /// When it would be on; `None` for always.
     pub span: Option<On>,
+    /// Whether it is the hypothesis, and not the same course without what its physics makes of it, which has no name.
+    pub is_named: bool,
 }
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
@@ -43,7 +47,18 @@ pub(super) fn compare(
         hypothesis: own,
         gain: own_gain,
         span: library.hypotheses[own].span,
+        is_named: true,
     }];
+    let last = [others.as_slice(), &[own]].concat();
+    let about = [thetas.as_slice(), &best.thetas[at..=at]].concat();
+    if let Some(refined) = without_its_physics(problem, library, &last, &about) {
+        let gain = refined.log_evidence - without.log_evidence + library.hypotheses[own].log_prior;
+        rivals.push(Rival {
+            gain,
+            is_named: false,
+            ..rivals[0]
+        });
+    }
     let mut linear = gains(problem, library, scores, &others);
     linear[own] = f64::NEG_INFINITY;
     let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
@@ -54,6 +69,7 @@ pub(super) fn compare(
             hypothesis: rival,
             gain,
             span: stretches[rival],
+            is_named: true,
         };
         // Of values with others between them one that is as good as it gets is enough.
         let is_moved = is_contested && !is_any_same(problem, library, &candidates[..number], rival);

@@ -3,6 +3,8 @@
 //! In: a set of hypotheses, refined. Out: the same set refined with another value, whose columns the library then has, or as
 //! it was.
 
+use nalgebra::DVector;
+
 use super::passing::renew;
 use crate::{
     library::{Hypothesis, Library},
@@ -85,6 +87,24 @@ pub(super) fn is_any_same(problem: &Problem, library: &Library, members: &[usize
     members
         .iter()
         .any(|member| is_same(problem, library, *member, candidate))
+}
+
+/// A set refitted with the same course of its last member and without its physics, if the effect has such a one.
+pub(super) fn without_its_physics(
+    problem: &Problem,
+    library: &mut Library,
+    set: &[usize],
+    thetas: &[DVector<f64>],
+) -> Option<Refined> {
+    let last = *set.last()?;
+    let cause = &mut library.hypotheses[last].cause;
+    let variant = cause.variant;
+    cause.variant = cause.effect.without_its_physics(variant)?;
+    renew(problem, library, set, thetas);
+    let refined = refine(problem, library, set, thetas);
+    library.hypotheses[last].cause.variant = variant;
+    renew(problem, library, set, thetas);
+    Some(refined)
 }
 
 /// A set refitted with another variant of its last member, whose columns are made anew.
