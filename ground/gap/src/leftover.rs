@@ -4,7 +4,8 @@
 //! and the aspects of the residual that say otherwise, largest first. What is looked at is in [`aspects`].
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
-//! spread over logs [`simulated`] from the model. The p-value counts how many of those have as large a largest aspect, so it
+//! spread over logs [`simulated`] from the model. Of an energy that an effect claims it is the logarithm: a law of values
+//! "anywhere in the range" claims any of many orders of magnitude. The p-value counts how many of those have as large a largest aspect, so it
 //! is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -239,10 +240,14 @@ impl Sizes {
                 .for_each(|(sums, own)| sums.push(own));
             observed.push(rarity);
         }
-        let roots = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value.max(0.0).cbrt()).collect() };
+        let labels = sights.labels();
+        let root = |(value, label): (&f64, &Label)| match label.is_energy_claimed() {
+            true => value.max(f64::MIN_POSITIVE).ln(),
+            false => value.max(0.0).cbrt(),
+        };
+        let roots = |values: &[f64]| -> Vec<f64> { values.iter().zip(&labels).map(root).collect() };
         let simulated: Vec<Vec<f64>> = simulated.iter().map(|values| roots(values)).collect();
         let observed = roots(&observed);
-        let labels = sights.labels();
         let spread = |(at, label): (usize, &Label)| {
             let values = simulated.iter().map(|run| run[at]);
             let is_there = |value: &f64| !label.may_be_none || *value > 0.0;

@@ -76,6 +76,11 @@ pub struct Label {
 }
 
 impl Label {
+    /// Whether it is an energy that a named effect claims.
+    pub fn is_energy_claimed(&self) -> bool {
+        self.is_claimed && !self.may_be_none
+    }
+
     /// Whether it is how far the fitted calibration is off.
     pub fn is_of_calibration(&self) -> bool {
         self.what.ends_with(OF_CALIBRATION)
