@@ -77,7 +77,9 @@ impl Explanation {
     ) -> Self {
         let first = Model::around(problem, found.model(library));
         let mut scatter = best_scatter(problem, &first, withheld);
-        let explained = gains(&found.chosen) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
+        // Of effects that hold each other up each is worth more than its share: together no more than they take off.
+        let together = 0.5 * (contribution::left(quiet) - contribution::left(&first)).max(0.0);
+        let explained = gains(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
         let is_alone = alone.is_some();
