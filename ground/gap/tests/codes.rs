@@ -95,3 +95,16 @@ fn digits_that_are_garbled_do_not_drag_the_calibration() {
     let (names, none, _) = said(&garbled, &[]);
     assert_eq!(names, ["packet-corruption"], "{none}");
 }
+
+/// What is left of a gyro that says nothing any more goes with all that it should have felt, and many effects together take up
+/// most of that.
+#[test]
+fn a_gyro_that_sticks_is_not_patched_up() {
+    let stuck = coded(|code, row| match row < 150 {
+        true => code,
+        false => 36,
+    });
+    let (names, none, left) = said(&stuck, &[]);
+    assert_eq!(names, ["stuck-channel"], "{none}");
+    assert!(left < LEFT, "{left}");
+}
