@@ -1,6 +1,8 @@
 //! Two magnetometers, one read four milliseconds after the other: a fifth of a cycle of the mains.
 
-use std::{f64::consts::TAU, fmt::Write, fs};
+mod written;
+
+use std::{f64::consts::TAU, fmt::Write};
 
 use gap::{
     case::Subject,
@@ -9,6 +11,7 @@ use gap::{
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use written::written;
 
 /// [s] of the log, at [`RATE_HZ`].
 const SECONDS: usize = 400;
@@ -24,13 +27,7 @@ const FIELD_N_UT: [f64; 3] = [17.0, 0.3, 41.0];
 /// [s] after the row's time.
 const SLOTS_S: [f64; 2] = [0.0, 0.004];
 
-const CASE: &str = r#"format = "gap-case/1"
-name = "alias"
-kind = "csv"
-unit = "unit.toml"
-measured = "measured.csv"
-motion = "motion.csv"
-[environment]
+const CASE: &str = r#"[environment]
 latitude_deg = 0.0
 field_n_ut = [17.0, 0.3, 41.0]
 [windows]
@@ -44,7 +41,6 @@ fn attitude(t_s: f64) -> UnitQuaternion<f64> {
 
 /// What is said of a unit in a field that alternates in n, by so much of 0.5 uT at each instant.
 fn diagnosed(course: impl Fn(f64) -> f64) -> Diagnosis {
-    let folder = tempfile::tempdir().expect("a folder");
     let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
     let (mut unit, mut header) = ("name = \"two magnetometers\"\n".to_owned(), "t_s".to_owned());
     for (plate, slot_s) in SLOTS_S.iter().enumerate() {
@@ -77,14 +73,7 @@ fn diagnosed(course: impl Fn(f64) -> f64) -> Diagnosis {
         }
         measured.push('\n');
     }
-    for (name, text) in [
-        ("case.toml", CASE),
-        ("unit.toml", &unit),
-        ("motion.csv", &motion),
-        ("measured.csv", &measured),
-    ] {
-        fs::write(folder.path().join(name), text).expect("written");
-    }
+    let folder = written("alias", CASE, &unit, &motion, &measured);
     diagnose(&Subject::open(folder.path()).expect("opens"), &[], &|_, _| {})
 }
 

@@ -1,7 +1,9 @@
 //! A unit that is moved by hand before an optical system: a reference that errs more than the unit, and a magnet that is brought
 //! and taken away.
 
-use std::{fmt::Write, fs};
+mod written;
+
+use std::fmt::Write;
 
 use gap::{
     case::Subject,
@@ -13,6 +15,7 @@ use gap::{
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use written::written;
 
 /// [s] of the log.
 const SECONDS: usize = 120;
@@ -29,13 +32,7 @@ const OPTICS_RAD: f64 = 2e-4;
 /// [uT] field in n.
 const FIELD: [f64; 3] = [17.0, 0.3, 41.0];
 
-const CASE: &str = r#"format = "gap-case/1"
-name = "seen"
-kind = "csv"
-unit = "unit.toml"
-measured = "measured.csv"
-motion = "motion.csv"
-[environment]
+const CASE: &str = r#"[environment]
 latitude_deg = 0.0
 field_n_ut = [17.0, 0.3, 41.0]
 field_sigma_ut = 0.1
@@ -84,7 +81,6 @@ fn diagnosed(seen: &Seen) -> Diagnosis {
 }
 
 fn opened(seen: &Seen) -> Subject {
-    let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros and three magnetometers\"\n".to_owned();
     let axes = ["1.0, 0.0, 0.0", "0.0, 1.0, 0.0", "0.0, 0.0, 1.0"];
     for (sensor, letter, noise) in [("gyro", 'g', NOISE[0]), ("magnetometer", 'm', NOISE[1])] {
@@ -125,14 +121,7 @@ fn opened(seen: &Seen) -> Subject {
         }
         measured.push('\n');
     }
-    for (name, text) in [
-        ("case.toml", seen.case.as_str()),
-        ("unit.toml", &unit),
-        ("motion.csv", &motion),
-        ("measured.csv", &measured),
-    ] {
-        fs::write(folder.path().join(name), text).expect("a file");
-    }
+    let folder = written("seen", &seen.case, &unit, &motion, &measured);
     Subject::open(folder.path()).expect("opens")
 }
 

@@ -2,6 +2,9 @@
 
 #![allow(dead_code, reason = "each of the tests uses a part of it")]
 
+#[path = "../written/mod.rs"]
+mod written;
+
 use std::{fmt::Write, fs};
 
 use gap::{
@@ -11,6 +14,7 @@ use gap::{
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
+use written::written;
 
 /// [s] of the log, at [`RATE_HZ`].
 pub const SECONDS: usize = 240;
@@ -23,13 +27,7 @@ pub const NOISE: f64 = 0.003;
 /// [rad/s] pace of the motion.
 const W: f64 = 0.9;
 
-const CASE: &str = r#"format = "gap-case/1"
-name = "injected"
-kind = "csv"
-unit = "unit.toml"
-measured = "measured.csv"
-motion = "motion.csv"
-[environment]
+const CASE: &str = r#"[environment]
 latitude_deg = 0.0
 [windows]
 fit = [[0.0, 120.0]]
@@ -49,7 +47,6 @@ pub fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
 
 /// The same with noise drawn from a seed.
 pub fn erring_in(seed: u64, error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
     let mut unit = "name = \"three gyros\"\n".to_owned();
     for (name, axis) in [
         ("gx", "1.0, 0.0, 0.0"),
@@ -85,15 +82,7 @@ pub fn erring_in(seed: u64, error: impl Fn(f64) -> f64, keys_of_gz: &str) -> Tem
             rate(t) + error(t) + noise()
         );
     }
-    for (name, text) in [
-        ("case.toml", CASE),
-        ("unit.toml", &unit),
-        ("motion.csv", &motion),
-        ("measured.csv", &measured),
-    ] {
-        fs::write(folder.path().join(name), text).expect("a file");
-    }
-    folder
+    written("injected", CASE, &unit, &motion, &measured)
 }
 
 pub fn diagnosed_in(folder: &TempDir, withheld: &[&str]) -> (Subject, Diagnosis) {
