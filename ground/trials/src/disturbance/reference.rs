@@ -141,7 +141,8 @@ fn reference_lag(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 /// that has been gone.
 fn reference_rate_scale(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let gear = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.005;
-    scene.size("s", gear);
+    // What was told is too much by this: the truth is less.
+    scene.size("s", -gear);
     let (record, motion) = (scene.record.clone(), scene.motion.clone());
     scene.record = Arc::new(move |t| {
         let (q_nb, place_n) = record(t);

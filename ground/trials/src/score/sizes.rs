@@ -71,8 +71,9 @@ fn error(judged: &Judged, named: &Named) -> Option<f64> {
     let stated = |parameter: &str, channel: &Option<String>| {
         let own = channel.as_ref().map(|channel| format!("{parameter}_{channel}"));
         let found = own.and_then(|own| named.parameters.get(&own));
+        let is_common = channel.as_ref().is_none_or(|channel| named.channels.contains(channel));
         found
-            .or_else(|| named.parameters.get(parameter))
+            .or_else(|| named.parameters.get(parameter).filter(|_| is_common))
             .map_or(0.0, |stated| stated.value)
     };
     let (off, whole) = sizes.iter().fold((0.0, 0.0), |(off, whole), size| {
