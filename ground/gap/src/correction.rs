@@ -4,8 +4,8 @@
 //! ([`Response`]), and the set as text, in the format of `ground calibration` ([`bench::set`]), every channel in it.
 //!
 //! Bias, axis, scale and place are read off the effect's own action on the channel's chain; a temperature coefficient is
-//! the effect's parameter with its bend, which a scale has none of in the set; a delay or a lag is a delay. What is not always on, what changes the scatter, and what is the
-//! reference's fault is not the unit's to correct and is left out.
+//! the effect's parameter with its bend, which a scale has none of in the set; a delay or a lag is a delay. What is not
+//! always on, what changes the scatter, and what is the reference's fault is not the unit's to correct and is left out.
 //!
 //! The set's format has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
 //! passes over: the first belongs into the estimator's `Delays`, the second into the unit's `place_b`.
@@ -163,11 +163,20 @@ fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Resp
         }
         Way::BiasPerK => {
             response.bias_per_k += theta;
-            response.bias_per_k2 += theta * active.cause.variant;
+            response.bias_per_k2 += theta * bend(active, starts_s);
         }
-        Way::ScalePerK => response.scale_per_k += theta * (1.0 + active.cause.variant * skew_k(twin)),
+        Way::ScalePerK => response.scale_per_k += theta * (1.0 + bend(active, starts_s) * skew_k(twin)),
         Way::Delay => response.delay_s += theta,
         Way::Skew => response.delay_s -= theta * site.read_position() as f64,
+    }
+}
+
+/// [1/K] of a temperature coefficient: beyond the values that are possible it is the last of them.
+fn bend(active: &Active, starts_s: &[f64]) -> f64 {
+    let (bend, possible) = (active.cause.variant, active.cause.effect.between(starts_s));
+    match possible.as_slice() {
+        [least, .., most] => bend.max(*least).min(*most),
+        _ => bend,
     }
 }
 
@@ -185,7 +194,7 @@ fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64,
     let is_warm = (response.bias_per_k != 0.0 || response.scale_per_k != 0.0) && range_c.0 < range_c.1;
     let mut bias_counts = vec![response.bias * counts];
     let mut scale_per_k = Vec::new();
-    if response.bias_per_k != 0.0 {
+    if response.bias_per_k != 0.0 || response.bias_per_k2 != 0.0 {
         bias_counts.push(response.bias_per_k * counts);
     }
     if response.bias_per_k2 != 0.0 {

@@ -16,5 +16,5 @@ pub(super) fn bent(away_c: f64, bend: f64) -> f64 {
 
 /// In words; nothing of a straight line.
 pub(super) fn told(bend: f64) -> Option<String> {
-    (bend != 0.0).then(|| format!("bending by {:+.1} % a degree", 100.0 * bend))
+    (100.0 * bend.abs() >= 0.05).then(|| format!("bending by {:+.1} % a degree", 100.0 * bend))
 }
