@@ -5,8 +5,8 @@
 //!
 //! Each aspect is a sum of squares; its cube root is near Gaussian (Wilson and Hilferty 1931) and is put in units of its
 //! spread over logs [`simulated`] from the model. Of an energy that an effect claims it is the logarithm: a law of values
-//! "anywhere in the range" claims any of many orders of magnitude. The p-value counts how many of those have as large a largest aspect, so it
-//! is paid for having looked everywhere.
+//! "anywhere in the range" claims any of many orders of magnitude. The p-value counts how many of the simulated logs have as
+//! large a largest aspect, so it is paid for having looked everywhere.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
