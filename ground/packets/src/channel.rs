@@ -15,8 +15,9 @@ pub const CHANNEL_COUNT: usize = 36;
 /// [m/s2 per count] LIS331HH at +-6 g, 12 bit: 3 mg a digit (datasheet, table 3), 1 g = 9.80665 m/s2.
 pub const ACC_LSB: f64 = 3e-3 * 9.80665;
 
-/// [uT per count] HMC5883L at gain 1 (+-1.3 Ga): 0.92 mG a digit (datasheet, table 9), 1 mG = 0.1 uT.
-pub const MAG_LSB_UT: f64 = 0.092;
+/// [uT per count] HMC5883L at gain 1 (+-1.3 Ga): 1090 counts a gauss of 100 uT (datasheet, table 9, whose 0.92 mG a digit is
+/// that rounded: 0.3 % too much, as much as a magnetometer's scale is known).
+pub const MAG_LSB_UT: f64 = 100.0 / 1090.0;
 
 /// [rad/s per count] ADIS16265 at +-320 deg/s: 0.07326 deg/s a digit (datasheet, table 1).
 pub const GYRO_LSB: f64 = 0.07326 * std::f64::consts::PI / 180.0;
@@ -226,7 +227,7 @@ mod tests {
             assert!((value - si).abs() < ROUNDING, "{name}: {value} is not {si}");
         };
         check("a1x", -315.0 * 0.029_419_95);
-        check("m2x", -16.56);
+        check("m2x", -180.0 * 100.0 / 1090.0);
         check("g2", 2203.0 * 0.001_278_628_210);
         check("tg1", 25.0 + 1.7436);
         check("tg3", 25.0);

@@ -223,7 +223,7 @@ mod tests {
                 "acc 2   -331    -4  -127   -9.74   -0.12   -3.74 m/s²",
             ]
         );
-        assert_eq!(screen[9], "mag 2   -180    60   -95  -16.56    5.52   -8.74 FAILED");
+        assert_eq!(screen[9], "mag 2   -180    60   -95  -16.51    5.50   -8.72 FAILED");
         assert_eq!(screen[13], "gyro 2  2203          -4  161.39           24.42 °/s °C");
         assert_eq!(screen[19], "temp 4   402               25.12                 FAILED");
         assert_eq!(
