@@ -12,6 +12,7 @@
 //! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
 //! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
 
+mod blocks;
 mod odd;
 mod search;
 

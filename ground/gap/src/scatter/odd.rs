@@ -4,21 +4,42 @@ use twin::{effect::View, predict::Kind};
 
 use crate::open::instant_sigma_s;
 
-/// [standard deviations] by which energy or tails of a residual must differ from the nominal for a second look.
+/// [standard deviations] by which energy, tails or neighbours of a residual must differ from the nominal for a second look.
 const ODD: f64 = 2.0;
 
-/// Whether a residual does not scatter as described. Only such a channel is looked at closely, which costs a thousand
-/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
-pub fn is_odd(view: &View) -> bool {
+/// The same for those of several channels together, whose price is higher than four of them bring.
+const ODD_TOGETHER: f64 = 3.0;
+
+/// [standard deviations] how far energy, tails and neighbours of a residual are from the nominal.
+pub type Oddness = [f64; 3];
+
+/// Whether some channels do not scatter as described: one of them, or all of them the same way. Only such are looked at closely,
+/// which costs a thousand likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+pub fn is_odd(channels: &[Oddness]) -> bool {
+    let one = channels.iter().flatten().any(|own| own.abs() > ODD);
+    one || are_odd(channels)
+}
+
+/// Whether all of them do not scatter as described the same way.
+pub fn are_odd(channels: &[Oddness]) -> bool {
+    let root = (channels.len().max(1) as f64).sqrt();
+    let together = |aspect: usize| channels.iter().map(|own| own[aspect]).sum::<f64>() / root;
+    (0..3).any(|aspect| together(aspect).abs() > ODD_TOGETHER)
+}
+
+/// How a channel's residual differs from the nominal.
+pub fn oddness(view: &View) -> Oddness {
     let sigma = view.channel.sigma();
     let standard: Vec<f64> = view.residuals().map(|(_, residual)| residual / sigma).collect();
     let samples = standard.len().max(1) as f64;
     let moment = |power: i32| standard.iter().map(|value| value.powi(power)).sum::<f64>() / samples;
     let alike = standard.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / samples;
     let root = samples.sqrt();
-    (moment(2) - 1.0).abs() * root > ODD * 2f64.sqrt()
-        || (moment(4) - 3.0).abs() * root > ODD * 96f64.sqrt()
-        || alike.abs() * root > ODD
+    [
+        (moment(2) - 1.0) * root / 2f64.sqrt(),
+        (moment(4) - 3.0) * root / 96f64.sqrt(),
+        alike * root,
+    ]
 }
 
 /// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise

@@ -4,12 +4,13 @@
 //! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
 //! and maximisation ([`crate::uncovered`]), also in channels where only the wrong one hid them.
 
-use twin::effect::{Beneath, Effect, LIBRARY, Nature, Scope, View, logged_step, most_likely};
+use twin::effect::{Beneath, Effect, LIBRARY, Nature, View, logged_step, most_likely};
 
 use super::{
-    Scatter,
-    odd::{is_coloured, is_odd, own_clock},
+    Scatter, blocks,
+    odd::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
 };
+
 use crate::{
     model::Model,
     problem::Problem,
@@ -18,9 +19,6 @@ use crate::{
 
 /// Effects that stand for white noise, for its outliers, or for errors of each sample's own.
 const WHITE: [&str; 4] = ["noise-level", "packet-corruption", "shock", "sampling-jitter"];
-
-/// Of those, effects that only make a sample scatter more: a reference that errs does so too.
-const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];
 
 /// [nats a sample] that the tails of a reference's errors gain over normal scatter: those of a Student law of five degrees of
 /// freedom, whose excess kurtosis of six is the largest that BROAD's recordings show, between blows. Its entropy is 1.3721 and
@@ -103,7 +101,7 @@ struct Search<'a> {
     /// The same with the calibration as described, where that was dragged far.
     described: Vec<Option<Vec<f64>>>,
     steps: Vec<f64>,
-    odd: Vec<bool>,
+    odd: Vec<Oddness>,
     own_clock: Vec<f64>,
 }
 
@@ -138,7 +136,7 @@ impl<'a> Search<'a> {
             is_dragged.then(|| search.near(channel, &as_described(problem, model, channel)))
         };
         search.described = channels.clone().map(described).collect();
-        search.odd = channels.clone().map(|channel| is_odd(&search.view(channel))).collect();
+        search.odd = channels.clone().map(|channel| oddness(&search.view(channel))).collect();
         search.own_clock = channels.map(|channel| own_clock(&search.view(channel))).collect();
         search
     }
@@ -183,26 +181,6 @@ impl<'a> Search<'a> {
         block.iter().map(view).collect()
     }
 
-    /// Channels that an effect may be in, by what shares its parameters.
-    fn blocks(&self, effect: &dyn Effect) -> Vec<Vec<usize>> {
-        let (unit, page) = (self.problem.twin.unit(), effect.page());
-        let concerned: Vec<usize> = (0..unit.channels.len())
-            .filter(|index| page.sensors.contains(&unit.channels[*index].sensor))
-            .filter(|index| !(self.problem.is_limited(*index) && SHAPELESS.contains(&page.name)))
-            .collect();
-        match page.scope {
-            Scope::Channel => concerned.iter().map(|index| vec![*index]).collect(),
-            Scope::Plate => {
-                let of_group = |group: &&str| {
-                    let is_in = |index: &usize| unit.channels[*index].group == *group;
-                    concerned.iter().copied().filter(is_in).collect()
-                };
-                unit.groups().iter().map(of_group).collect()
-            }
-            Scope::Unit => vec![concerned],
-        }
-    }
-
     /// An effect in every block that gains by it, about the model's calibration; if strictly, where it may be.
     fn seek(&self, effect: &'static dyn Effect, variant: f64, price: f64, is_strict: bool) -> Option<Scatter> {
         let judged = |block: &[usize]| {
@@ -243,11 +221,12 @@ impl<'a> Search<'a> {
         }
         let effect = found.effect;
         let judged = |block: &[usize]| {
-            let at = found.channels.iter().position(|channel| *channel == block[0]);
-            let mut theta = found.thetas[at.unwrap_or(0)].clone();
+            let place = |channel: &usize| found.channels.iter().position(|own| own == channel);
+            let mut theta = found.thetas[block.first().and_then(place).unwrap_or(0)].clone();
             let before = self.views(block, |channel| &self.near[channel]);
-            let mut beneath = match at.filter(|_| variant == found.variant) {
-                Some(at) => found.beneath[at..at + block.len()].to_vec(),
+            let places: Option<Vec<usize>> = block.iter().map(place).collect();
+            let mut beneath = match places.filter(|_| variant == found.variant) {
+                Some(places) => places.iter().map(|place| found.beneath[*place].clone()).collect(),
                 None => effect.beneath(&theta, variant, &before),
             };
             let mut best: Option<Block> = None;
@@ -294,9 +273,35 @@ impl<'a> Search<'a> {
         !(WHITE.contains(&effect.page().name) && views.iter().any(is_coloured))
     }
 
-    /// An effect in every block in which it gains more than it costs there.
+    /// An effect in every block in which it gains more than it costs there, or alike in all sensors of a kind.
     fn gathered(
         &self,
+        effect: &'static dyn Effect,
+        variant: f64,
+        price: f64,
+        judged: impl Fn(&[usize]) -> Option<Block>,
+    ) -> Option<Scatter> {
+        let mut blocks = blocks::own(self.problem, effect);
+        let of = blocks.len();
+        let odd_in = |block: &[usize]| -> Vec<Oddness> { block.iter().map(|index| self.odd[*index]).collect() };
+        blocks.retain(|block| is_odd(&odd_in(block)));
+        let each = self.gathered_in(&blocks, of, effect, variant, price, &judged);
+        let mut kinds = blocks::kinds(self.problem, effect);
+        let of = kinds.len();
+        let is_found = |index: &usize| each.as_ref().is_some_and(|each| each.channels.contains(index));
+        kinds.retain(|block| are_odd(&odd_in(block)) && !block.iter().all(is_found));
+        let alike = self.gathered_in(&kinds, of, effect, variant, price, &judged);
+        match (each, alike) {
+            (Some(each), Some(alike)) if alike.gain <= each.gain => Some(each),
+            (each, alike) => alike.or(each),
+        }
+    }
+
+    /// An effect in every one of these blocks, of so many, in which it gains more than it costs there.
+    fn gathered_in(
+        &self,
+        blocks: &[Vec<usize>],
+        of: usize,
         effect: &'static dyn Effect,
         variant: f64,
         price: f64,
@@ -310,8 +315,7 @@ impl<'a> Search<'a> {
             gain: price,
             beneath: Vec::new(),
         };
-        let blocks = self.blocks(effect);
-        for block in blocks.iter().filter(|block| block.iter().any(|index| self.odd[*index])) {
+        for block in blocks {
             let Some(found) = judged(block) else {
                 continue;
             };
@@ -321,8 +325,7 @@ impl<'a> Search<'a> {
             let gain = found.gain
                 - block.iter().map(|index| self.own_clock[*index]).sum::<f64>()
                 - TAILS * of_reference.map(samples_of).sum::<usize>() as f64;
-            let price =
-                0.5 * (samples.max(1) as f64).ln() * found.theta.len() as f64 + 1.0 + (blocks.len() as f64).ln();
+            let price = 0.5 * (samples.max(1) as f64).ln() * found.theta.len() as f64 + 1.0 + (of as f64).ln();
             if gain > price {
                 scatter.gain += gain - price;
                 scatter.channels.extend(block);
