@@ -1,10 +1,14 @@
 //! Diagnoses the cases given, a few lines each, with the seconds each took, and leaves a verdict.json in the folder that
-//! `VERDICTS` names, one folder a case: for looking at many at once.
+//! `VERDICTS` names, one folder a case: for looking at many at once. What `WITHHOLD` names is left out of the library, with
+//! its siblings.
 use std::{error::Error, fs, path::Path, time::Instant};
 
 use gap::{case::Subject, diagnose::diagnose, verdict::Verdict};
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let withheld = std::env::var("WITHHOLD").unwrap_or_default();
+    let withheld = twin::effect::kin(&withheld).into_iter().map(str::to_owned);
+    let withheld: Vec<String> = withheld.collect();
     for case in std::env::args().skip(1) {
         let t = Instant::now();
         let subject = match Subject::open(Path::new(&case)) {
@@ -14,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
         };
-        let d = diagnose(&subject, &[], &|_, _| {});
+        let d = diagnose(&subject, &withheld, &|_, _| {});
         if let Ok(folder) = std::env::var("VERDICTS") {
             let name = Path::new(&case).file_name().unwrap_or_default();
             let folder = Path::new(&folder).join(name);
