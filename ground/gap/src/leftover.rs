@@ -18,6 +18,7 @@ mod codes;
 mod common;
 mod instrument;
 mod shapes;
+mod shared;
 mod simulated;
 mod spectrum;
 mod strength;
@@ -73,6 +74,8 @@ pub struct View {
     pub codes: Option<Codes>,
     /// The clock of its part, where that is its own.
     pub clock: Option<Clock>,
+    /// Names of what is open of it, in the order of the fit's columns.
+    pub open: Vec<String>,
     /// What its reference errs by, where that is not exact.
     pub instrument: Option<Instrument>,
     /// Whether that is more than it scatters by itself.

@@ -91,6 +91,11 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
             predicted: DVector::from_fn(frame.series.rows.len(), |row, _| {
                 own[frame.series.rows[row] as usize] / frame.weights[row]
             }),
+            open: frame
+                .nuisance_names
+                .iter()
+                .map(|(open, _)| kind_of(open, &channel.name))
+                .collect(),
             codes: codes(problem, index, &read[index]),
             clock: clock(problem, index, &read[index]),
             instrument: instrument(problem, index),
@@ -121,6 +126,12 @@ fn reference_sigma(problem: &Problem, kind: Kind) -> f64 {
     };
     let sum: f64 = (0..rows).map(square).sum();
     (sum / (rows * of_kind.len()).max(1) as f64).sqrt()
+}
+
+/// What is open by its name in all channels.
+fn kind_of(open: &str, channel: &str) -> String {
+    let own = open.strip_suffix(channel).and_then(|open| open.strip_suffix('_'));
+    own.unwrap_or(open).to_owned()
 }
 
 /// The codes of a channel at the fitted samples, if it sends such.

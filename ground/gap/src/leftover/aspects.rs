@@ -9,7 +9,8 @@
 //! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of
 //! a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that comes and
 //! goes in all of a kind; the same vector in all sensors of a kind; the same factor, as of a supply they share; the same small
-//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows. Of a named
+//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows; what is open of each sensor and was found
+//! alike in all of a kind ([`super::shared`]). Of a named
 //! effect: whether it is as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether
 //! waves of each length have the energy that it claims, and outliers the size and the distance from the sample before, no more
 //! and no less: a law of outliers "anywhere in the range" would else stand for any, values that are sent again among them; and
@@ -21,6 +22,7 @@ use super::{
     Fitted, LEVELLED, STRETCHES, Suspect, View,
     common::Common,
     shapes::{BINS, Shapes},
+    shared::Shared,
     spectrum::{Spectrum, strongest},
     strength::Strength,
     sums::{Bursts, alike, between_levels, mean_logarithm, outliers, squares, tails},
@@ -97,6 +99,7 @@ pub struct Sights<'a> {
     vectors: Vec<Vec<Common<3>>>,
     factors: Vec<Vec<Common<1>>>,
     turns: Vec<Common<3>>,
+    shared: Vec<Shared>,
     strengths: Vec<Strength>,
 }
 
@@ -130,6 +133,7 @@ impl<'a> Sights<'a> {
             turns: COMMON
                 .map(|stretches| Common::new(views, stretches, turned, |_| true))
                 .into(),
+            shared: Shared::all(views, kinds(views)),
             strengths: suspects
                 .iter()
                 .flat_map(|suspect| Strength::all(views, suspect))
@@ -171,6 +175,10 @@ impl<'a> Sights<'a> {
             format!("{}: one frequency", names.join(" "))
         }));
         of_all.extend(COMMON.map(|stretches| format!("all sensors: a common rotation in stretches of 1/{stretches}")));
+        of_all.extend(self.shared.iter().map(|shared| {
+            let kind = KIND_NAMES.get(shared.kind).copied().unwrap_or("sensors");
+            format!("{kind}, {} of all alike: {OF_CALIBRATION}", shared.name)
+        }));
         of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
         labels.extend(of_all.into_iter().map(|what| Label {
             what,
@@ -292,6 +300,7 @@ impl<'a> Sights<'a> {
                 .map(|part| strongest(self.of_part(part).map(|channel| &powers[channel]))),
         );
         sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
+        sums.extend(self.shared.iter().map(|shared| shared.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
         let (mut sizes, mut distances) = (Vec::new(), Vec::new());
         for channel in self.scattered {

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
-use super::{View, codes::Counts, instrument::Played};
+use super::{View, codes::Counts, instrument::Played, shared::OF_PART};
 use crate::joint::Joint;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
@@ -96,13 +96,16 @@ pub fn simulate(
     let coded = views.iter().zip(&residuals);
     let counts = coded.filter_map(|(view, residual)| view.codes.as_ref().map(|codes| codes.counts_with(residual)));
     let counts = counts.collect();
+    let mut drawn: Vec<DVector<f64>> = Vec::new();
     for ((residual, columns), view) in residuals.iter_mut().zip(joint.columns()).zip(views) {
-        let open = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
+        let own = DVector::from_fn(columns.nuisance.ncols(), |_, _| StandardNormal.sample(&mut *random));
+        let open = of_part(view, own, views, &drawn);
         if let Some((instrument, played)) = view.instrument.as_ref().zip(played.as_ref()) {
             (residual.iter_mut().enumerate()).for_each(|(sample, own)| *own = instrument.err(sample, *own, played));
         }
         residual.gemv(1.0, &columns.nuisance, &open, 1.0);
         residual.gemv(1.0, &columns.effects, parameters, 1.0);
+        drawn.push(open);
         if let Some(clock) = &view.clock {
             clock.age(residual, random);
         }
@@ -110,10 +113,27 @@ pub fn simulate(
     Simulated { residuals, counts }
 }
 
+/// What is open of a channel, with what its part has once for all of its channels as the first of them has it.
+fn of_part(view: &View, mut own: DVector<f64>, views: &[View], drawn: &[DVector<f64>]) -> DVector<f64> {
+    let Some((first, of_first)) = views.get(view.part).zip(drawn.get(view.part)) else {
+        return own;
+    };
+    for (value, name) in own
+        .iter_mut()
+        .zip(&view.open)
+        .filter(|(_, name)| OF_PART.contains(&name.as_str()))
+    {
+        if let Some(place) = first.open.iter().position(|open| open == name) {
+            *value = of_first[place];
+        }
+    }
+    own
+}
+
 impl Clock {
-    /// A clock that scatters a channel as much as what is `left` of it shows: one that keeps step with the cycle scatters nothing,
-    /// or, where it converts just when it is read, by a whole period, and any other evenly over a period. By least squares of the squares, each with the weight that its own scatter
-    /// leaves it.
+    /// A clock that scatters a channel as much as what is `left` of it shows: one that keeps step with the cycle scatters
+    /// nothing, or, where it converts just when it is read, by a whole period, and any other evenly over a period. By least
+    /// squares of the squares, each with the weight that its own scatter leaves it.
     pub fn as_shown(mut self, left: impl Iterator<Item = f64>) -> Self {
         let (mut along, mut energy) = (0.0, 0.0);
         for (slope, left) in self.slopes.iter().zip(left).filter(|(_, left)| left.is_finite()) {

@@ -3,6 +3,7 @@
 mod clock;
 mod recurrence;
 mod scatter;
+mod shared;
 
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -30,6 +31,7 @@ fn scene() -> (Vec<View>, Joint) {
         }),
         felt: DVector::from_fn(SAMPLES, |row, _| (row as f64 * 0.07 + channel as f64).sin()),
         predicted: DVector::from_fn(SAMPLES, |row, _| 40.0 * (row as f64 * 0.5 + channel as f64).sin()),
+        open: vec!["bias".into()],
         codes: None,
         clock: None,
         instrument: None,
