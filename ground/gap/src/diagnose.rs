@@ -17,11 +17,11 @@ use crate::{
     explain::{Explanation, SAID},
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
-    leftover::{self, Leftover, Suspect},
+    leftover::{self, Leftover},
     library::Library,
     model::Model,
     place::{self, Place, passage::Passage},
-    problem::Problem,
+    problem::{Component, Problem},
     sight,
     trace::{Trace, cells, traces},
 };
@@ -133,17 +133,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     } else {
         Vec::new()
     };
+    let again = |left: &Leftover, components: &[Component]| {
+        let found = left.aspects.first().filter(|_| left.p < DOUBTFUL)?;
+        progress("again", 0.0);
+        (subject.held).recurrence(&subject.twin, &subject.reference, components, &found.what)
+    };
     // Without effects what is left is all there was.
     let all_there_was = || {
-        let found = gate.aspects.first().filter(|_| gate.p < DOUBTFUL);
-        let again = found.and_then(|aspect| {
-            progress("again", 0.0);
-            subject.held.recurrence(&subject.twin, &subject.reference, &aspect.what)
-        });
+        let again = again(&gate, &[]);
         (Leftover { again, ..gate.clone() }, subject.held.judge(without))
     };
     if explanation.is_empty() {
         (left, shrink) = all_there_was();
+    } else if explanation.scatter.is_none() && events.is_none() {
+        // What happens at random does so elsewhere there.
+        left.again = again(&left, &explanation.model.components);
     }
 
     progress("confusion", 0.0);
@@ -240,21 +244,12 @@ fn left_by(problem: &Problem, explanation: &Explanation) -> Leftover {
         &sight::views(problem, &explanation.beneath),
         &model.joint,
         &model.fitted,
-        &suspects(problem, model),
+        &sight::suspects(problem, model),
         (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| leftover::Disturb {
             channels: &scatter.channels,
             of,
         }),
     )
-}
-
-/// What each of a model's effects adds to the fitted samples.
-fn suspects(problem: &Problem, model: &Model) -> Vec<Suspect> {
-    let suspect = |index: usize| Suspect {
-        name: model.components[index].active.cause.effect.page().name.to_owned(),
-        entries: problem.contribution(&model.components, index),
-    };
-    (0..model.components.len()).map(suspect).collect()
 }
 
 fn root_mean_square(problem: &Problem) -> f64 {

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
-    leftover::{Clock, Codes, Instrument, LEVELS, View},
+    leftover::{Clock, Codes, Instrument, LEVELS, Suspect, View},
+    model::Model,
     open::conversion_period_s,
     problem::{Frame, Problem},
 };
@@ -109,6 +110,15 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
         }
     };
     problem.frames.iter().enumerate().map(view).collect()
+}
+
+/// What each of a model's effects adds to the fitted samples.
+pub fn suspects(problem: &Problem, model: &Model) -> Vec<Suspect> {
+    let suspect = |index: usize| Suspect {
+        name: model.components[index].active.cause.effect.page().name.to_owned(),
+        entries: problem.contribution(&model.components, index),
+    };
+    (0..model.components.len()).map(suspect).collect()
 }
 
 /// [physical unit] root mean square of what the reference errs by from sample to sample, in the sensors of a kind.

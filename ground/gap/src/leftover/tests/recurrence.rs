@@ -8,7 +8,7 @@ fn what_was_found_elsewhere_is_asked_for_alone() {
         let (views, joint) = scene();
         let mut residuals = noise(7);
         (residuals[1].iter_mut().enumerate()).for_each(|(row, value)| *value += hum * (row as f64 * 0.9).sin());
-        recurrence(&views, &joint, &joint.fit(&residuals), what)
+        recurrence(&views, &joint, &joint.fit(&residuals), &[], what)
     };
     let (there, not_there) = (again(0.6, "g1: a tone"), again(0.0, "g1: a tone"));
     assert!(
