@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         println!(
-            "== {case} {:.1?} gap {:.3} gate p {:.3} ({:.1}) none {:.3} left p {:.3} ({:.1}) shrink {:.4}/{:.4}/{:.4} {:.1} % {:.0?} withdrawn {:?}",
+            "== {case} {:.1?} gap {:.3} gate p {:.3} ({:.1}) none {:.3} left p {:.3} ({:.1}) shrink {:.4}/{:.4}/{:.4} floor {:.4} {:.1} % {:.0?} withdrawn {:?}",
             t.elapsed(),
             d.gap,
             d.gate.p,
@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             d.shrink.before,
             d.shrink.recalibrated,
             d.shrink.after,
+            d.shrink.floor,
             d.shrink.percent,
             d.shrink.interval_percent,
             d.withdrawn

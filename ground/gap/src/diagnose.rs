@@ -15,6 +15,7 @@ use crate::{
     crossval::Key,
     events::Events,
     explain::{Explanation, SAID},
+    floor::floor,
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
     leftover::{self, Leftover},
@@ -111,6 +112,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         .map(|channel| problem.predict(channel, &[]))
         .collect();
     let as_described = vec![1.0; problem.frames.len()];
+    let floor = floor(&problem, &explanation.model);
     let without = Finished {
         start_s: subject.twin.starts_s(),
         sigmas: &problem.sigmas,
@@ -119,6 +121,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         recalibrated: &quiet.predicted,
         after: &quiet.predicted,
         louder: &as_described,
+        floor: &floor,
         events: None,
     };
     let events = Events::of(&problem, &explanation.model);
@@ -201,7 +204,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let stages = subject.held.stages(&subject.twin, finished, responses);
     let ceiling = is_named.then(|| {
         let parameters = causes.iter().map(|cause| cause.parameters.len()).sum();
-        ceiling_percent(shrink.before, parameters, explanation.signal_to_noise(&quiet))
+        ceiling_percent(
+            [shrink.before, shrink.floor],
+            parameters,
+            explanation.signal_to_noise(&quiet),
+        )
     });
     Diagnosis {
         place,

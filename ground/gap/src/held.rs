@@ -4,10 +4,10 @@
 //! recalibration alone, and after effect and recalibration, in total and per channel, in sigma and in physical units,
 //! with an interval. [`Held`] gives scores and nothing else: its samples are private to this file, so no fit reaches them.
 //!
-//! The gap is the root mean square of the residual over the twin's own sigma, 1 for a perfect twin; the shrink is
-//! `100 (before - after) / (before - 1)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
-//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is 1; its
-//! ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
+//! The gap is the root mean square of the residual over the twin's own sigma; the shrink is
+//! `100 (before - after) / (before - floor)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
+//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is what a
+//! perfect twin would leave ([`crate::floor`]), little more than 1; its ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
 //!
 //! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
 //! [`strength`]; in [`recurrence`], whether what nothing explains is there too. What happens at random happens here at instants
@@ -25,6 +25,7 @@ use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use self::course::Said;
+use self::shrink::SMALLEST;
 pub use self::shrink::{ChannelShrink, Shrink, ceiling_percent};
 use crate::{events::Events, log::Series};
 
@@ -69,6 +70,8 @@ pub struct Finished<'a> {
     pub after: &'a [Vec<f64>],
     /// How much more a sample scatters with a noise-type effect in, one a channel.
     pub louder: &'a [f64],
+    /// Mean square of a residual over its variance if the model is right.
+    pub floor: &'a [Vec<f64>],
     /// What of the effect happens again at random.
     pub events: Option<&'a Events>,
 }
@@ -90,6 +93,7 @@ struct Sums {
     before: f64,
     recalibrated: f64,
     after: f64,
+    floor: f64,
 }
 
 impl Sums {
@@ -98,6 +102,7 @@ impl Sums {
         self.before += other.before;
         self.recalibrated += other.recalibrated;
         self.after += other.after;
+        self.floor += other.floor;
     }
 
     fn gap(self, energy: f64) -> f64 {
@@ -108,10 +113,10 @@ impl Sums {
         }
     }
 
-    /// `None` where there is no gap to shrink: below a hundredth of a sigma of excess the quotient is noise over noise.
+    /// `None` where there is no gap to shrink.
     fn percent(self) -> Option<f64> {
-        let (before, after) = (self.gap(self.before), self.gap(self.after));
-        (before - 1.0 > 0.01).then(|| 100.0 * (before - after) / (before - 1.0))
+        let [before, after, floor] = [self.before, self.after, self.floor].map(|energy| self.gap(energy));
+        (before - floor > SMALLEST).then(|| 100.0 * (before - after) / (before - floor))
     }
 }
 
@@ -150,6 +155,7 @@ impl Held {
                     before: (errors[0] / sigma).powi(2),
                     recalibrated: (errors[1] / sigma).powi(2),
                     after: course.mean(index, row, |after| ((value - after) / sigma / louder).powi(2)),
+                    floor: finished.floor[index][row],
                 };
                 sums.add(one);
                 blocks[block_of(row)].add(one);
@@ -176,6 +182,7 @@ impl Held {
             before: total.gap(total.before),
             recalibrated: total.gap(total.recalibrated),
             after: total.gap(total.after),
+            floor: total.gap(total.floor),
             percent: total.percent().unwrap_or(0.0),
             interval_percent,
             beyond_recalibration,
@@ -240,6 +247,7 @@ mod tests {
             recalibrated: &level(recalibrated),
             after: &level(after),
             louder: &[1.0],
+            floor: &level(1.0),
             events: None,
         })
     }
@@ -253,11 +261,13 @@ mod tests {
 
     #[test]
     fn the_ceiling_is_all_but_what_the_fit_loses() {
-        assert!(ceiling_percent(2.0, 1, 1e6) > 99.99);
+        assert!(ceiling_percent([2.0, 1.0], 1, 1e6) > 99.99);
         // Half of an excess energy of 3 is lost: sqrt(1 + 1.5) is left of 2.
-        let half = ceiling_percent(2.0, 2, 2.0);
+        let half = ceiling_percent([2.0, 1.0], 2, 2.0);
         assert!((half - 100.0 * (2.0 - 2.5f64.sqrt())).abs() < ROUNDING, "{half}");
-        assert_eq!(ceiling_percent(1.0, 1, 10.0), 0.0);
+        assert_eq!(ceiling_percent([1.0, 1.0], 1, 10.0), 0.0);
+        let above = ceiling_percent([2.0, 1.2], 1, 1e6);
+        assert!((above - 100.0).abs() < 1e-3, "{above}");
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub mod events;
 pub mod evidence;
 pub mod explain;
 pub mod fit_error;
+pub mod floor;
 pub mod gram;
 pub mod gross;
 pub mod held;

@@ -98,7 +98,8 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
                 .map(|(open, _)| kind_of(open, &channel.name))
                 .collect(),
             codes: codes(problem, index, &read[index]),
-            clock: clock(problem, index, &read[index]),
+            clock: clock(problem, index, &read[index], &frame.weights)
+                .map(|(clock, left)| clock.as_shown(left.into_iter())),
             instrument: instrument(problem, index),
             is_limited: problem.is_limited(index),
             levels: vec![
@@ -176,8 +177,9 @@ fn part(problem: &Problem, index: usize) -> usize {
     channels.iter().position(is_its).unwrap_or(index)
 }
 
-/// The clock of a channel's part at the fitted samples, as far as it scatters them about what the channel is to `read`.
-fn clock(problem: &Problem, index: usize, read: &[f64]) -> Option<Clock> {
+/// The clock of a channel's part at the fitted samples, and what is left of them about what the channel is to `read`, in units of
+/// each one's `noise`.
+pub fn clock(problem: &Problem, index: usize, read: &[f64], noise: &DVector<f64>) -> Option<(Clock, Vec<f64>)> {
     let (twin, frame) = (problem.twin, &problem.frames[index]);
     let period_s = conversion_period_s(&twin.unit().channels[index]);
     let at_rows = |values: &[f64]| -> Vec<f64> {
@@ -186,8 +188,8 @@ fn clock(problem: &Problem, index: usize, read: &[f64]) -> Option<Clock> {
     };
     let slopes = at_rows(&problem.true_twin().by_instant(index))
         .into_iter()
-        .zip(frame.weights.iter());
-    let expected = at_rows(read).into_iter().zip(frame.weights.iter());
+        .zip(noise.iter());
+    let expected = at_rows(read).into_iter().zip(noise.iter());
     let left = expected.zip(&frame.series.values);
     (period_s > 0.0).then(|| {
         let clock = Clock {
@@ -195,7 +197,8 @@ fn clock(problem: &Problem, index: usize, read: &[f64]) -> Option<Clock> {
             instants_s: at_rows(&twin.instants_s(index)),
             slopes: slopes.map(|(slope, weight)| slope / weight).collect(),
         };
-        clock.as_shown(left.map(|((expected, weight), value)| (value - expected) / weight))
+        let left = left.map(|((expected, weight), value)| (value - expected) / weight);
+        (clock, left.collect())
     })
 }
 

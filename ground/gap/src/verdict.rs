@@ -95,7 +95,7 @@ impl Verdict {
             format: "gap-verdict/1",
             gap: Gap {
                 before: rounded(diagnosis.gap, 4),
-                floor: 1.0,
+                floor: rounded(diagnosis.shrink.floor, 4),
                 units: "sigma",
             },
             places,

@@ -180,6 +180,7 @@ mod tests {
             recalibrated: &level(-3.0),
             after: &level(0.0),
             louder: &[1.0],
+            floor: &level(1.0),
             events,
         })
     }

@@ -3,6 +3,9 @@
 /// Part of the gap by which recalibration and an effect may differ and shrink it as much.
 const SAME: f64 = 0.01;
 
+/// Excess of a gap over its floor, in sigma, below which their quotient is noise over noise.
+pub(super) const SMALLEST: f64 = 0.01;
+
 /// One channel's gap.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelShrink {
@@ -36,7 +39,9 @@ pub struct Shrink {
     pub recalibrated: f64,
     /// Gap with effect and calibration fitted.
     pub after: f64,
-    /// 100 (before - after) / (before - 1), or 0 where there is no gap to shrink.
+    /// What a perfect twin would leave.
+    pub floor: f64,
+    /// 100 (before - after) / (before - floor), or 0 where there is no gap to shrink.
     pub percent: f64,
     /// Its 95 % interval.
     pub interval_percent: [f64; 2],
@@ -51,16 +56,17 @@ impl Shrink {
     /// shrink it more; where both shrink it as much, it is the size of that calibration which speaks. An attribution that fails
     /// this is withdrawn, whatever its evidence.
     pub fn supports_the_effect(&self) -> bool {
-        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= -SAME * (self.before - 1.0).max(0.0)
+        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= -SAME * (self.before - self.floor).max(0.0)
     }
 }
 
 /// The largest shrink to be had, in percent: fitting `parameters` leaves a part `parameters / snr^2` of the excess energy
-/// (gap method, section 4.6), which a gap of `before` sigma counts as a root mean square.
-pub fn ceiling_percent(before: f64, parameters: usize, snr: f64) -> f64 {
+/// (gap method, section 4.6), which a gap of `before` sigma over its `floor` counts as a root mean square.
+pub fn ceiling_percent([before, floor]: [f64; 2], parameters: usize, snr: f64) -> f64 {
     let lost = (parameters as f64 / (snr * snr)).min(1.0);
-    if before - 1.0 > 0.01 && snr > 0.0 {
-        100.0 * (before - (1.0 + (before * before - 1.0) * lost).sqrt()) / (before - 1.0)
+    let [excess, least] = [before * before - floor * floor, floor * floor];
+    if before - floor > SMALLEST && snr > 0.0 {
+        100.0 * (before - (least + excess * lost).sqrt()) / (before - floor)
     } else {
         0.0
     }

@@ -131,10 +131,17 @@ fn of_part(view: &View, mut own: DVector<f64>, views: &[View], drawn: &[DVector<
 }
 
 impl Clock {
-    /// A clock that scatters a channel as much as what is `left` of it shows: one that keeps step with the cycle scatters
-    /// nothing, or, where it converts just when it is read, by a whole period, and any other evenly over a period. By least
-    /// squares of the squares, each with the weight that its own scatter leaves it.
+    /// A clock that scatters a channel as much as what is `left` of it shows.
     pub fn as_shown(mut self, left: impl Iterator<Item = f64>) -> Self {
+        let part = self.part_shown(left);
+        self.slopes.iter_mut().for_each(|slope| *slope *= part.sqrt());
+        self
+    }
+
+    /// Variance of a reading's age over that of one spread evenly over a period, by what is `left` of a channel: a clock that
+    /// keeps step with the cycle scatters nothing, or, where it converts just when it is read, by a whole period. By least
+    /// squares of the squares, each with the weight that its own scatter leaves it.
+    pub fn part_shown(&self, left: impl Iterator<Item = f64>) -> f64 {
         let (mut along, mut energy) = (0.0, 0.0);
         for (slope, left) in self.slopes.iter().zip(left).filter(|(_, left)| left.is_finite()) {
             let even = (slope * self.period_s).powi(2) / 12.0;
@@ -144,13 +151,11 @@ impl Clock {
             along += weight * even * (square - 1.0);
             energy += weight * even * even;
         }
-        let part = if energy > 0.0 {
+        if energy > 0.0 {
             (along / energy).clamp(0.0, AT_ONCE)
         } else {
             1.0
-        };
-        self.slopes.iter_mut().for_each(|slope| *slope *= part.sqrt());
-        self
+        }
     }
 
     /// Adds what a clock of unknown phase and rate makes of a channel. The mean age is the calibration's.

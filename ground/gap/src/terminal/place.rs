@@ -112,7 +112,11 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result 
             cell.channel, cell.from_s, cell.to_s, cell.regime, cell.size
         )?;
     }
-    writeln!(text, "stage     raw: {:.3} sigma, floor 1", diagnosis.shrink.before)?;
+    writeln!(
+        text,
+        "stage     raw: {:.3} sigma, floor {:.3}",
+        diagnosis.shrink.before, diagnosis.shrink.floor
+    )?;
     for stage in &diagnosis.stages {
         let kind = if stage.unit == "deg" { "" } else { "calibrated " };
         writeln!(

@@ -16,8 +16,8 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result 
     let shrink = &diagnosis.shrink;
     writeln!(
         text,
-        "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}, floor 1",
-        shrink.before, shrink.recalibrated, shrink.after
+        "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}, floor {:.4}",
+        shrink.before, shrink.recalibrated, shrink.after, shrink.floor
     )?;
     let ceiling = diagnosis.ceiling_percent.map_or(String::new(), |percent| {
         format!("; the true effect could shrink it by {percent:.2} %")

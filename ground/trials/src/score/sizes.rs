@@ -86,10 +86,16 @@ fn error(judged: &Judged, named: &Named) -> Option<f64> {
 /// [%] by which what a verdict states of its causes lets the held-out gap shrink: `p` parameters known to `SNR^2`, the sum of
 /// their squares over their variances, leave `p / SNR^2` of the excess energy (gap.md, section 4.6).
 fn predicted_percent(verdict: &Verdict) -> Option<f64> {
-    let before = verdict.shrink.as_ref()?.hold_before.filter(|before| *before > 1.01)?;
+    let floor = verdict.gap.floor;
+    let before = verdict
+        .shrink
+        .as_ref()?
+        .hold_before
+        .filter(|before| *before > floor + 0.01)?;
     let parameters = || verdict.causes.iter().flat_map(|cause| cause.parameters.values());
     let known = parameters().filter(|stated| stated.sigma > 0.0);
     let energy: f64 = known.clone().map(|stated| (stated.value / stated.sigma).powi(2)).sum();
     let left = known.count() as f64 / energy;
-    (left < 1.0).then(|| 100.0 * (before - (1.0 + (before * before - 1.0) * left).sqrt()) / (before - 1.0))
+    let (least, excess) = (floor * floor, before * before - floor * floor);
+    (left < 1.0).then(|| 100.0 * (before - (least + excess * left).sqrt()) / (before - floor))
 }

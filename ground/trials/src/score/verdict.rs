@@ -11,6 +11,8 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Verdict {
+    /// How large it is.
+    pub gap: Gap,
     /// Causes, the likeliest first; none when the twin needs nothing or nothing is named.
     pub causes: Vec<Named>,
     /// Other names with their probability.
@@ -21,6 +23,20 @@ pub struct Verdict {
     pub none_of_these: f64,
     /// What became of the gap on the hold window.
     pub shrink: Option<Shrink>,
+}
+
+/// The gap in sigma.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(default)]
+pub struct Gap {
+    /// What a perfect twin would leave.
+    pub floor: f64,
+}
+
+impl Default for Gap {
+    fn default() -> Self {
+        Gap { floor: 1.0 }
+    }
 }
 
 /// A name with its probability.
