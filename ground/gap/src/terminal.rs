@@ -204,10 +204,11 @@ fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std:
         .map_or(String::new(), |percent| format!(" of at most {percent:.1} %"));
     writeln!(
         text,
-        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibration alone {:.3}, floor 1); {:.1} % [{:.1}, {:.1}]{ceiling}",
+        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibrated {:.3}, floor {:.3}); {:.1} % [{:.1}, {:.1}]{ceiling}",
         shrink.before,
         shrink.after,
         shrink.recalibrated,
+        shrink.floor,
         shrink.percent,
         shrink.interval_percent[0],
         shrink.interval_percent[1]
