@@ -2,15 +2,18 @@
 //!
 //! In: two flights of the same parts with the same noise, one of them disturbed, each with its record and stated
 //! environment. Out: the marginal signal to noise ratio, sqrt(d' (I + N L N')^-1 d) over standardised differences d of
-//! "measured minus what the record says", where N holds for each channel a bias, a scale, two axis errors and the instant of
-//! sampling with the sigmas of the unit's description: the measure in which the diagnosis' targets are stated.
+//! "measured minus what the record says", where N holds for each channel a bias, a scale and two axis errors, and for each part,
+//! which converts all of its channels at once, the instant of sampling, with the sigmas of the unit's description: the measure in
+//! which the diagnosis' targets are stated.
 //!
 //! What is random from sample to sample has no shape that could be matched, only a variance: of it the ratio is that of the
 //! best test of a variance, sqrt(sum of E^2 / 2n) over stretches of n samples whose energy is E.
 
+use std::collections::BTreeMap;
+
 use emems::sample::Reading;
-use nalgebra::{DMatrix, DVector, Vector3, Vector5};
-use packets::channel::{self, CHANNEL_COUNT, CHANNELS, Quantity};
+use nalgebra::{DMatrix, DVector, Vector3, Vector4};
+use packets::channel::{self, CHANNELS, Quantity};
 use twin::{environment::Environment, geometry};
 
 use crate::{
@@ -32,38 +35,56 @@ pub struct Told<'a> {
     pub claimed: &'a Environment,
 }
 
+/// Errors that a channel has for itself.
+const OWN: usize = 4;
+
 /// Samples of a stretch in which a variance is taken as one: four seconds.
 const STRETCH: usize = 20;
 
 /// Over packets whose time is below `until_s`; `random` if it is so from sample to sample.
 pub fn marginal_snr(disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64, random: bool) -> f64 {
-    let energy: f64 = (0..CHANNEL_COUNT)
-        .filter_map(|index| Differences::of(index, disturbed, undisturbed, instants, until_s))
-        .map(|differences| {
-            if random {
-                differences.in_variance()
-            } else {
-                differences.in_shape()
-            }
-        })
-        .sum();
+    let mut parts: BTreeMap<(&str, usize), Vec<Differences>> = BTreeMap::new();
+    for (index, channel) in CHANNELS.iter().enumerate() {
+        let own = Differences::of(index, disturbed, undisturbed, instants, until_s);
+        let part = (kind(channel.quantity).sensor, channel.plate);
+        parts.entry(part).or_default().extend(own);
+    }
+    let energy: f64 = match random {
+        true => parts.values().flatten().map(Differences::in_variance).sum(),
+        false => parts.values().map(|part| in_shape(part)).sum(),
+    };
     energy.max(0.0).sqrt()
+}
+
+/// Of the channels of a part. With `M = I + N N'` of a channel's own errors and `t` what its instant does, a common instant of
+/// sigma 1 takes off `(sum t'M^-1 d)^2 / (1 + sum t'M^-1 t)`.
+fn in_shape(part: &[Differences]) -> f64 {
+    let sums: Vector3<f64> = part.iter().map(Differences::products).sum();
+    sums.x - sums.y * sums.y / (1.0 + sums.z)
 }
 
 /// What a disturbance changes in a channel, in units of noise.
 struct Differences {
     difference: DVector<f64>,
-    /// What calibration errors may do, times their sigmas.
+    /// What its own calibration errors may do, times their sigmas.
     nuisance: DMatrix<f64>,
+    /// What the instant of its part may do.
+    aged: DVector<f64>,
 }
 
 impl Differences {
-    fn in_shape(&self) -> f64 {
+    /// `d'M^-1 d`, `t'M^-1 d` and `t'M^-1 t`.
+    fn products(&self) -> Vector3<f64> {
         // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
-        let seen = self.nuisance.tr_mul(&self.difference);
-        let inner = self.nuisance.tr_mul(&self.nuisance) + DMatrix::identity(5, 5);
-        let imitated = inner.cholesky().map_or(0.0, |inner| seen.dot(&inner.solve(&seen)));
-        self.difference.norm_squared() - imitated
+        let inner = self.nuisance.tr_mul(&self.nuisance) + DMatrix::identity(OWN, OWN);
+        let inner = inner.cholesky();
+        let product = |one: &DVector<f64>, other: &DVector<f64>| {
+            let [left, right] = [one, other].map(|column| self.nuisance.tr_mul(column));
+            let imitated = inner.as_ref().map_or(0.0, |inner| left.dot(&inner.solve(&right)));
+            one.dot(other) - imitated
+        };
+        let (d, t) = (&self.difference, &self.aged);
+        Vector3::new(product(d, d), product(t, d), product(t, t))
     }
 
     fn in_variance(&self) -> f64 {
@@ -99,7 +120,7 @@ impl Differences {
                 .readings
                 .get(usize::from(reading.counter.checked_sub(first)?))
         };
-        let (mut rows, mut differences) = (Vec::new(), Vec::new());
+        let (mut rows, mut differences, mut aged) = (Vec::new(), Vec::new(), Vec::new());
         for reading in disturbed.readings {
             let time_s = CYCLE_S * f64::from(reading.counter);
             if time_s >= until_s {
@@ -112,19 +133,20 @@ impl Differences {
             let [felt, told] = [undisturbed, disturbed].map(|told| felt(told, channel, at_s));
             differences.push(((code - quiet) * lsb - axis_b.dot(&(told - felt))) / sigma);
             let [earlier, later] = [-STEP_S, STEP_S].map(|step_s| self::felt(undisturbed, channel, at_s + step_s));
+            aged.push(facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S) / sigma);
             rows.push(
-                Vector5::new(
+                Vector4::new(
                     facts.bias,
                     facts.scale * axis_b.dot(&felt),
                     facts.axis_rad * across.dot(&felt),
                     facts.axis_rad * axis_b.cross(&across).dot(&felt),
-                    facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S),
                 ) / sigma,
             );
         }
         Some(Differences {
-            nuisance: DMatrix::from_fn(rows.len(), 5, |row, column| rows[row][column]),
+            nuisance: DMatrix::from_fn(rows.len(), OWN, |row, column| rows[row][column]),
             difference: DVector::from_vec(differences),
+            aged: DVector::from_vec(aged),
         })
     }
 }
@@ -199,6 +221,26 @@ mod tests {
     }
 
     #[test]
+    fn a_part_is_late_as_a_whole() {
+        let mut random = Draw::new(3);
+        let mut column = |size: f64| DVector::from_fn(500, |_, _| size * random.normal());
+        let aged: Vec<DVector<f64>> = (0..3).map(|_| column(0.5)).collect();
+        let late = |signs: [f64; 3]| {
+            let channel = |(aged, sign): (&DVector<f64>, f64)| Differences {
+                difference: aged * (sign * 2.0),
+                nuisance: DMatrix::zeros(aged.len(), OWN),
+                aged: aged.clone(),
+            };
+            let part: Vec<Differences> = aged.iter().zip(signs).map(channel).collect();
+            in_shape(&part)
+        };
+        // Two sigmas late are a surprise of four; axes that are late by different times are no lateness of the part: of an energy
+        // of 1500 in all a ninth is along a common one.
+        assert!((late([1.0; 3]) - 4.0).abs() < 0.1, "{}", late([1.0; 3]));
+        assert!(late([1.0, -1.0, 1.0]) > 1200.0, "{}", late([1.0, -1.0, 1.0]));
+    }
+
+    #[test]
     fn a_record_that_is_wrong_counts_like_a_unit_that_is() {
         let instants = instants(1).expect("derived frames");
         let site = Environment::laboratory();
@@ -234,8 +276,14 @@ mod tests {
         let mut random = Draw::new(5);
         let difference = DVector::from_fn(15_000, |_, _| 0.3f64.sqrt() * random.normal());
         let snr = |difference: DVector<f64>| {
-            let nuisance = DMatrix::zeros(difference.len(), 5);
-            Differences { difference, nuisance }.in_variance().sqrt()
+            let nuisance = DMatrix::zeros(difference.len(), OWN);
+            let aged = DVector::zeros(difference.len());
+            let differences = Differences {
+                difference,
+                nuisance,
+                aged,
+            };
+            differences.in_variance().sqrt()
         };
         assert!((snr(difference.clone()) - 4500.0 / 30_000f64.sqrt()).abs() < 1.0);
         // All of it in a tenth of the time is plainer by the root of ten.
