@@ -57,8 +57,10 @@ fn attitude(t_s: f64) -> UnitQuaternion<f64> {
 /// What is seen.
 struct Seen {
     case: String,
-    /// [uT] of a magnet at the magnetometers from 45 s to 90 s.
+    /// [uT] of a magnet at the magnetometers.
     iron_b: Vector3<f64>,
+    /// [s] when it is there.
+    iron_s: [f64; 2],
     /// How much more each magnetometer scatters than described.
     louder: [f64; 3],
     /// Whether the record has y the other way round.
@@ -70,6 +72,7 @@ impl Default for Seen {
         Seen {
             case: CASE.to_owned(),
             iron_b: Vector3::zeros(),
+            iron_s: [45.0, 90.0],
             louder: [1.0; 3],
             is_reversed: false,
         }
@@ -108,7 +111,7 @@ fn opened(seen: &Seen) -> Subject {
         let t_s = k as f64 / RATE_HZ[0] as f64;
         let q = attitude(t_s);
         let rate_b = (attitude(t_s - 5e-5).inverse() * attitude(t_s + 5e-5)).scaled_axis() / 1e-4;
-        let iron_b = if (45.0..90.0).contains(&t_s) {
+        let iron_b = if (seen.iron_s[0]..seen.iron_s[1]).contains(&t_s) {
             seen.iron_b
         } else {
             Vector3::zeros()
@@ -196,6 +199,22 @@ fn a_magnet_that_is_brought_and_taken_away_is_named_with_its_time() {
         .expect("an onset");
     assert!(onset.interval_s[0] <= 45.04 && 45.0 <= onset.interval_s[1], "{onset:?}");
     assert!(diagnosis.shrink.interval_percent[0] > 90.0, "{:?}", diagnosis.shrink);
+}
+
+/// The columns of a current that switches are those of a magnet while it is on.
+#[test]
+fn a_magnet_that_stays_is_no_current_that_switches() {
+    let diagnosis = diagnosed(&Seen {
+        iron_b: Vector3::new(1.5, -1.0, 2.0),
+        iron_s: [0.0, SECONDS as f64],
+        ..Seen::default()
+    });
+    let said = diagnosis.causes.iter().map(|cause| (cause.effect, cause.probability));
+    let all: Vec<_> = said.chain(diagnosis.alternatives.iter().copied()).collect();
+    let current: f64 = (all.iter().filter(|(name, _)| *name == "current-field"))
+        .map(|(_, probability)| probability)
+        .sum();
+    assert!(all[0].0 == "hard-iron" && current < 0.1, "{all:?}");
 }
 
 #[test]
