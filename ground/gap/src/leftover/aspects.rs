@@ -8,19 +8,20 @@
 //! ([`super::spectrum`]); heavy tails; the size of the fitted calibration, without which an unknown effect hides in the
 //! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of
 //! a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that comes and
-//! goes in all of a kind; the same vector in all sensors of a kind; the same factor, as of a supply they share; the same small
-//! rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows; what is open of each sensor and was found
-//! alike in all of a kind ([`super::shared`]). Of a named
-//! effect: whether it is as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether
-//! waves of each length have the energy that it claims, and outliers the size and the distance from the sample before, no more
-//! and no less: a law of outliers "anywhere in the range" would else stand for any, values that are sent again among them; and
-//! whether channels that scatter each by itself go one way ([`super::together`]).
+//! goes in all of a kind; the same vector in all sensors of a kind, along any axes or one; the same factor, as of a supply they
+//! share; the same small rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel
+//! shows; what is open of each sensor and was found alike in all of a kind ([`super::shared`]). Of a named effect: whether it
+//! is as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length
+//! have the energy that it claims, and outliers the size and the distance from the sample before, no more and no less: a law of
+//! outliers "anywhere in the range" would else stand for any, values that are sent again among them; and whether channels that
+//! scatter each by itself go one way ([`super::together`]).
 
 use nalgebra::{DMatrix, Vector1};
 
 use super::{
     Fitted, LEVELLED, STRETCHES, Suspect, View,
     common::Common,
+    label::{Label, OF_CALIBRATION, name_of},
     shapes::{BINS, Shapes},
     shared::Shared,
     spectrum::{Spectrum, strongest},
@@ -39,10 +40,6 @@ const COMMON: [usize; 2] = [60, 12];
 
 /// Stretches in which the noise of a kind of sensor comes and goes: of seconds.
 const BURSTS: [usize; 2] = [150, 60];
-
-const KIND_NAMES: [&str; 4] = ["accelerometers", "gyros", "magnetometers", "thermometers"];
-
-const OF_CALIBRATION: &str = "a calibration beyond its sigmas";
 
 /// What is looked at in each channel, before the levels.
 const OF_CHANNEL: [&str; 9] = [
@@ -63,31 +60,6 @@ const OF_SCATTER: [usize; 4] = [0, 4, 5, 7];
 
 /// Of them all, levels included.
 const EACH: usize = OF_CHANNEL.len() + LEVELLED.len();
-
-/// What a sum is of.
-#[derive(Clone, Debug)]
-pub struct Label {
-    /// In words.
-    pub what: String,
-    /// The channel it belongs to, where there is one.
-    pub channel: Option<usize>,
-    /// Whether a named effect claims as much: then less speaks against it too.
-    pub is_claimed: bool,
-    /// Whether it is a mean over what may not be there at all, and then is zero.
-    pub may_be_none: bool,
-}
-
-impl Label {
-    /// Whether it is an energy that a named effect claims.
-    pub fn is_energy_claimed(&self) -> bool {
-        self.is_claimed && !self.may_be_none
-    }
-
-    /// Whether it is how far the fitted calibration is off.
-    pub fn is_of_calibration(&self) -> bool {
-        self.what.ends_with(OF_CALIBRATION)
-    }
-}
 
 /// The views made ready for sums.
 pub struct Sights<'a> {
@@ -159,10 +131,12 @@ impl<'a> Sights<'a> {
         }
         let mut of_all = Vec::new();
         for kind in 0..kinds(self.views) {
-            let name = KIND_NAMES.get(kind).copied().unwrap_or("sensors");
+            let name = name_of(kind);
             of_all.extend(each(&format!("{name} together")));
             of_all.extend(["x", "y", "z"].map(|axis| format!("{name}: a common vector along {axis}")));
-            of_all.extend(COMMON.map(|stretches| format!("{name}: a common vector in stretches of 1/{stretches}")));
+            of_all.extend(COMMON.iter().flat_map(|stretches| {
+                ["", " along one axis"].map(|way| format!("{name}: a common vector{way} in stretches of 1/{stretches}"))
+            }));
             of_all.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
             of_all.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
             of_all.extend(BURSTS.map(|stretches| format!("{name}: noise that comes and goes in 1/{stretches}")));
@@ -174,9 +148,12 @@ impl<'a> Sights<'a> {
                 .collect();
             format!("{}: one frequency", names.join(" "))
         }));
-        of_all.extend(COMMON.map(|stretches| format!("all sensors: a common rotation in stretches of 1/{stretches}")));
+        of_all.extend(COMMON.iter().flat_map(|stretches| {
+            ["", " about one axis"]
+                .map(|way| format!("all sensors: a common rotation{way} in stretches of 1/{stretches}"))
+        }));
         of_all.extend(self.shared.iter().map(|shared| {
-            let kind = KIND_NAMES.get(shared.kind).copied().unwrap_or("sensors");
+            let kind = name_of(shared.kind);
             format!("{kind}, {} of all alike: {OF_CALIBRATION}", shared.name)
         }));
         of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
@@ -205,10 +182,7 @@ impl<'a> Sights<'a> {
             }));
         }
         labels.extend(self.scattered_kinds().map(|kind| Label {
-            what: format!(
-                "{} go one way together",
-                KIND_NAMES.get(kind).copied().unwrap_or("sensors")
-            ),
+            what: format!("{} go one way together", name_of(kind)),
             channel: None,
             is_claimed: false,
             may_be_none: false,
@@ -290,7 +264,7 @@ impl<'a> Sights<'a> {
         for kind in 0..kinds {
             sums.extend(together[kind]);
             sums.extend(common[kind].column_iter().map(|column| column.norm_squared()));
-            sums.extend(self.vectors[kind].iter().map(|vector| vector.sum(fitted)));
+            sums.extend(self.vectors[kind].iter().flat_map(|vector| vector.sums(fitted)));
             sums.extend(self.factors[kind].iter().map(|factor| factor.sum(fitted)));
             sums.extend(stretches[kind]);
             sums.extend(bursts[kind].iter().map(Bursts::sum));
@@ -299,7 +273,7 @@ impl<'a> Sights<'a> {
             self.parts()
                 .map(|part| strongest(self.of_part(part).map(|channel| &powers[channel]))),
         );
-        sums.extend(self.turns.iter().map(|turn| turn.sum(fitted)));
+        sums.extend(self.turns.iter().flat_map(|turn| turn.sums(fitted)));
         sums.extend(self.shared.iter().map(|shared| shared.sum(fitted)));
         sums.extend(self.strengths.iter().map(|strength| strength.sum(fitted)));
         let (mut sizes, mut distances) = (Vec::new(), Vec::new());

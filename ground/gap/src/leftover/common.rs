@@ -1,8 +1,10 @@
 //! What some channels would see together: a vector, a small rotation, a factor, free in each stretch of time.
 //!
-//! In: for each sample what each of its components adds to it. Out: the energy along them of what a fit leaves.
+//! In: for each sample what each of its components adds to it. Out: the energy along them of what a fit leaves, and of that the
+//! part along one axis, the same in all stretches: a mount slips about one, and one current has one field. Of sixty stretches
+//! that is a third of the numbers, and so as much sharper.
 
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::{Fitted, View, aspects::place};
 
@@ -10,7 +12,8 @@ use super::{Fitted, View, aspects::place};
 pub struct Common<const D: usize> {
     /// Per channel, for each sample its stretch and what each component adds to it; empty for a channel that is not looked at.
     rows: Vec<Vec<(usize, SVector<f64, D>)>>,
-    factors: Vec<Option<Cholesky<f64, Const<D>>>>,
+    /// Of each stretch the inverse root of the components' normal matrix, which is symmetric and so keeps an axis an axis.
+    roots: Vec<SMatrix<f64, D, D>>,
 }
 
 impl<const D: usize> Common<D> {
@@ -35,26 +38,49 @@ impl<const D: usize> Common<D> {
                 .for_each(|(stretch, add)| normal[*stretch] += add * add.transpose());
             rows.push(own);
         }
-        let factor = |normal: &SMatrix<f64, D, D>| {
-            Cholesky::new(normal + SMatrix::identity() * (RIDGE * normal.trace() / D as f64))
+        let root = |normal: &SMatrix<f64, D, D>| {
+            inverse_root(normal + SMatrix::identity() * (RIDGE * normal.trace() / D as f64))
         };
         Common {
             rows,
-            factors: normal.iter().map(factor).collect(),
+            roots: normal.iter().map(root).collect(),
         }
     }
 
     /// The energy along the components, over all stretches.
     pub fn sum(&self, fitted: &Fitted) -> f64 {
-        let mut scores = vec![SVector::zeros(); self.factors.len()];
+        self.standard(fitted).map(|own| own.norm_squared()).sum()
+    }
+
+    /// The same, and that of it which is along the one axis that has most.
+    pub fn sums(&self, fitted: &Fitted) -> [f64; 2] {
+        let all: SMatrix<f64, D, D> = self.standard(fitted).map(|own| own * own.transpose()).sum();
+        [all.trace(), dynamic(&all).symmetric_eigenvalues().max()]
+    }
+
+    /// The components of each stretch in units of their noise.
+    fn standard(&self, fitted: &Fitted) -> impl Iterator<Item = SVector<f64, D>> {
+        let mut scores = vec![SVector::zeros(); self.roots.len()];
         for (rows, rest) in self.rows.iter().zip(&fitted.rest) {
             for ((stretch, add), value) in rows.iter().zip(rest.iter()) {
                 scores[*stretch] += add * *value;
             }
         }
-        let energy = |(factor, score): (&Option<Cholesky<f64, Const<D>>>, &SVector<f64, D>)| {
-            factor.as_ref().map_or(0.0, |factor| score.dot(&factor.solve(score)))
-        };
-        self.factors.iter().zip(&scores).map(energy).sum()
+        scores.into_iter().zip(&self.roots).map(|(score, root)| root * score)
     }
+}
+
+/// Zero of a matrix that is zero.
+fn inverse_root<const D: usize>(matrix: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let eigen = dynamic(&matrix).symmetric_eigen();
+    let inverse = eigen
+        .eigenvalues
+        .map(|value| if value > 0.0 { value.sqrt().recip() } else { 0.0 });
+    let root = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+    SMatrix::from_iterator(root.iter().copied())
+}
+
+/// The library decomposes matrices of a size that it is told, not of a generic one.
+fn dynamic<const D: usize>(matrix: &SMatrix<f64, D, D>) -> DMatrix<f64> {
+    DMatrix::from_iterator(D, D, matrix.iter().copied())
 }

@@ -322,6 +322,22 @@ fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
 }
 
 #[test]
+fn what_goes_along_one_axis_is_seen_sharper_than_along_any() {
+    let slips = |row: usize| if row / 10 * 7 % 5 < 2 { 0.9 } else { 0.0 };
+    let left = judged(|channel, residual| {
+        let turned = &scene().0[channel].turned;
+        (residual.iter_mut().enumerate()).for_each(|(row, value)| *value += slips(row) * turned[(row, 2)]);
+    });
+    let size = |what: &str| {
+        let mut own = left.aspects.iter().filter(|aspect| aspect.what == what);
+        own.next().map_or(0.0, |aspect| aspect.size)
+    };
+    let one = size("all sensors: a common rotation about one axis in stretches of 1/60");
+    let any = size("all sensors: a common rotation in stretches of 1/60");
+    assert!(one > 5.0 && one > any + 1.0, "{one} {any}");
+}
+
+#[test]
 fn a_wrong_law_is_found_by_the_steps_between_levels() {
     let left = judged(|channel, residual| {
         if channel == 0 {
