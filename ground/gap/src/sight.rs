@@ -169,11 +169,12 @@ fn instrument(problem: &Problem, index: usize) -> Option<Instrument> {
     })
 }
 
-/// The first channel of a channel's part: the sensors of one kind in a group are one.
+/// The first channel of a channel's part: the sensors of one kind in a group that count alike are one. A gyro's thermometer and
+/// that beside it are two.
 fn part(problem: &Problem, index: usize) -> usize {
     let channels = &problem.twin.unit().channels;
     let own = &channels[index];
-    let is_its = |other: &Channel| other.sensor == own.sensor && other.group == own.group;
+    let is_its = |other: &Channel| other.sensor == own.sensor && other.group == own.group && other.lsb == own.lsb;
     channels.iter().position(is_its).unwrap_or(index)
 }
 
