@@ -64,11 +64,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             d.indistinguishable
         );
         for held in &d.promises {
-            let promise = held.promise;
-            println!(
-                "   held out: {} {:.2} +- {:.2}",
-                held.effect, promise.factor, promise.sigma
-            );
+            let strength = held.promise.map_or("not there".into(), |promise| {
+                format!("{:.2} +- {:.2}", promise.factor, promise.sigma)
+            });
+            println!("   held out: {} {strength}", held.effect);
         }
         for a in d.leftover.aspects.iter().take(3) {
             println!("   left: {} {:.1}", a.what, a.size);

@@ -89,11 +89,10 @@ pub fn why(subject: &Subject, diagnosis: &Diagnosis) -> String {
         );
     }
     for promised in &diagnosis.promises {
-        let _ = writeln!(
-            text,
-            "        {} is {:.2} +- {:.2} times as strong on the held-out windows",
-            promised.effect, promised.promise.factor, promised.promise.sigma
-        );
+        let strength = promised.promise.map_or("in none of".into(), |promise| {
+            format!("{:.2} +- {:.2} times as strong on", promise.factor, promise.sigma)
+        });
+        let _ = writeln!(text, "        {} is {strength} the held-out windows", promised.effect);
     }
     text
 }

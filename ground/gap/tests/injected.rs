@@ -234,7 +234,7 @@ fn packets_that_are_lost_again_in_the_held_out_windows_are_lost_packets() {
         "{:?}",
         lost.shrink
     );
-    let promise = lost.promises[0].promise;
+    let promise = lost.promises[0].promise.expect("they are lost there");
     assert!((promise.factor - 1.0).abs() < 0.05, "{promise:?}");
     // What else delays it after them is none of these.
     let other = of_late(|t_s| 0.2 * since(t_s, 61.0) + 0.3 * since(t_s, 150.0));
