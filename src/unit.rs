@@ -59,7 +59,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The thesis' unit: 5 Hz, 3 mg, 0.92 mG and 0.07326 deg/s a count, in the laboratory.
+    /// The thesis' unit: 5 Hz, 3 mg, a 1090th of a gauss and 0.07326 deg/s a count, in the laboratory.
     pub const NOMINAL: Settings = Settings {
         period_ms: 200,
         gyro_hz: 100,

@@ -34,9 +34,8 @@ const DOUBT_STEP: f64 = 3.0;
 /// from its law leaves a few parts in a hundred; another effect's law, which happens to be like it, leaves more.
 const UNLIKE: f64 = 0.05;
 
-/// How far an effect is believed that is there in no held-out sample: it does not shrink their gap, and is as likely a patch for
-/// something else. With the truth withheld two stand-ins of a log that the held-out windows did not share were named (TRIALS.md),
-/// and of the right names none was such.
+/// How far an effect is believed that is on in no held-out sample: it does not shrink their gap, and is as likely a patch for
+/// something else. On dealt cases (TRIALS.md) two wrong names were such, and no right one.
 const UNTOLD: f64 = 0.5;
 
 /// What is left over, and how much that says against names.

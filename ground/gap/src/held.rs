@@ -7,10 +7,11 @@
 //! The gap is the root mean square of the residual over the twin's own sigma; the shrink is
 //! `100 (before - after) / (before - floor)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
 //! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is what a
-//! perfect twin would leave ([`crate::floor`]), little more than 1; its ceiling, what the true effect would shrink with its parameters fitted on as much data, is [`ceiling_percent`].
+//! perfect twin would leave ([`crate::floor`]), little more than 1; its ceiling, what the true effect would shrink with its
+//! parameters fitted on as much data, is [`ceiling_percent`].
 //!
 //! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
-//! [`strength`]; in [`recurrence`], whether what nothing explains is there too. What happens at random happens here at instants
+//! [`strength`]; in [`recurrence`], whether what is left is there too. What happens at random happens here at instants
 //! of its own ([`course`]).
 
 mod course;
@@ -24,9 +25,8 @@ use core::fmt;
 use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use self::course::Said;
-use self::shrink::SMALLEST;
 pub use self::shrink::{ChannelShrink, Shrink, ceiling_percent};
+use self::{course::Said, shrink::SMALLEST};
 use crate::{events::Events, log::Series};
 
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.

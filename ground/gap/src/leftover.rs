@@ -198,8 +198,8 @@ pub fn judge(
     }
 }
 
-/// Probability that one aspect of a residual is as large as it is if the model is enough: of one that
-/// was found on other windows, which share nothing with these but the calibration. `None` of what that makes.
+/// Probability that one aspect of a residual is as large as it is if the model is enough: of one that was found on other
+/// windows, which share nothing with these but the calibration. `None` of what that makes.
 pub fn recurrence(views: &[View], joint: &Joint, fitted: &Fitted, suspects: &[Suspect], what: &str) -> Option<f64> {
     let sizes = Sizes::of(views, joint, fitted, suspects, None);
     let at = sizes.labels.iter().position(|label| label.what == what)?;

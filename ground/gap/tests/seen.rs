@@ -140,37 +140,34 @@ fn a_reference_that_errs_more_than_the_unit_is_no_gap() {
     assert!(diagnosis.none_of_these < 0.5, "{:?}", diagnosis.leftover.aspects);
 }
 
+/// The likeliest effect on the scatter: its name, its channels, and what it was sized to in the first of them.
+fn scattered(seen: &Seen) -> (&'static str, Vec<usize>, f64) {
+    let subject = opened(seen);
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let found = scatters(&problem, &Model::around(&problem, Vec::new()), &[]);
+    let first = found.first().expect("an effect on the scatter");
+    (first.effect.page().name, first.channels.clone(), first.thetas[0][0])
+}
+
 #[test]
 fn what_the_reference_leaves_open_slowly_hides_no_noise() {
-    let subject = opened(&Seen {
+    let (name, channels, size) = scattered(&Seen {
         case: CASE.replace("field_sigma_ut = 0.1", "field_sigma_ut = 0.25"),
         louder: [1.25, 1.0, 1.0],
         ..Seen::default()
     });
-    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
-    let found = scatters(&problem, &Model::around(&problem, Vec::new()), &[]);
-    let loud = found.first().expect("an effect on the scatter");
-    assert_eq!(
-        (loud.effect.page().name, loud.channels.as_slice()),
-        ("noise-level", [3].as_slice())
-    );
-    assert!((loud.thetas[0][0] - 0.25).abs() < 0.05, "{:?}", loud.thetas);
+    assert_eq!((name, channels.as_slice()), ("noise-level", [3].as_slice()));
+    assert!((size - 0.25).abs() < 0.05, "{size}");
 }
 
 /// A supply that is not quiet: six in a hundred more noise are 5 nats in each, which is not worth the price of naming it.
 #[test]
 fn noise_that_is_a_little_louder_in_all_of_a_kind_is_seen_in_all_together() {
-    let subject = opened(&Seen {
+    let (name, channels, _) = scattered(&Seen {
         louder: [1.06; 3],
         ..Seen::default()
     });
-    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
-    let found = scatters(&problem, &Model::around(&problem, Vec::new()), &[]);
-    let loud = found.first().expect("an effect on the scatter");
-    assert_eq!(
-        (loud.effect.page().name, loud.channels.as_slice()),
-        ("noise-level", [3, 4, 5].as_slice())
-    );
+    assert_eq!((name, channels.as_slice()), ("noise-level", [3, 4, 5].as_slice()));
 }
 
 #[test]

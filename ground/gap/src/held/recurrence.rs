@@ -17,8 +17,8 @@ use crate::{
 };
 
 impl Held {
-    /// Calibration and the sizes of the effects are fitted to the held-out samples anew, and say nothing but this. `None` where the aspect is of the
-    /// calibration itself, which is the same in all windows, or where there are no samples.
+    /// Calibration and the sizes of the effects are fitted to the held-out samples anew, and say nothing but this. `None` where
+    /// the aspect is of the calibration itself, which is the same in all windows, or where there are no samples.
     pub fn recurrence(&self, twin: &Twin, instrument: &Reference, components: &[Component], what: &str) -> Option<f64> {
         if self.channels.iter().all(|series| series.rows.is_empty()) {
             return None;

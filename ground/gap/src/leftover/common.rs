@@ -12,7 +12,8 @@ use super::{Fitted, View, aspects::place};
 pub struct Common<const D: usize> {
     /// Per channel, for each sample its stretch and what each component adds to it; empty for a channel that is not looked at.
     rows: Vec<Vec<(usize, SVector<f64, D>)>>,
-    /// Of each stretch the inverse root of the components' normal matrix, which is symmetric and so keeps an axis an axis.
+    /// Of each stretch the inverse root of the components' normal matrix, which is symmetric: nearly alike in all, an
+    /// axis is one in all.
     roots: Vec<SMatrix<f64, D, D>>,
 }
 

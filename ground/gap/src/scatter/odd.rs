@@ -7,20 +7,19 @@ use crate::open::instant_sigma_s;
 /// [standard deviations] by which energy, tails or neighbours of a residual must differ from the nominal for a second look.
 const ODD: f64 = 2.0;
 
-/// The same for those of several channels together, whose price is higher than four of them bring.
+/// The same for those of several channels together: three are worth 4.5 nats, below any price.
 const ODD_TOGETHER: f64 = 3.0;
 
 /// [standard deviations] how far energy, tails and neighbours of a residual are from the nominal.
 pub type Oddness = [f64; 3];
 
-/// Whether some channels do not scatter as described: one of them, or all of them the same way. Only such are looked at closely,
-/// which costs a thousand likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
+/// Whether one of some channels does not scatter as described. Only such are looked at closely, which costs a thousand
+/// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
 pub fn is_odd(channels: &[Oddness]) -> bool {
-    let one = channels.iter().flatten().any(|own| own.abs() > ODD);
-    one || are_odd(channels)
+    channels.iter().flatten().any(|own| own.abs() > ODD)
 }
 
-/// Whether all of them do not scatter as described the same way.
+/// Whether all of them scatter otherwise the same way.
 pub fn are_odd(channels: &[Oddness]) -> bool {
     let root = (channels.len().max(1) as f64).sqrt();
     let together = |aspect: usize| channels.iter().map(|own| own[aspect]).sum::<f64>() / root;

@@ -10,7 +10,6 @@ use super::{
     Scatter, blocks,
     odd::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
 };
-
 use crate::{
     model::Model,
     problem::Problem,
