@@ -113,6 +113,7 @@ fn every_spread_effect_is_found_where_it_is_and_told_from_the_others() {
         Injected("noise-level", &[0.4], 0.0, 0.0, one("g1")),
         Injected("vibration", &[0.5], 1.37, 0.0, one("a4x")),
         Injected("shock", &[0.1], 20.0, 20.0, Locality::Unit),
+        Injected("shock", &[0.02], 3.0, 5.0, Locality::Unit),
     ];
     let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
     for Injected(name, theta, inject, look, locality) in injected {
