@@ -30,6 +30,7 @@ pub use codes::Codes;
 use codes::{Counts, rarities};
 pub use instrument::Instrument;
 use label::Label;
+pub use shared::Open;
 pub(crate) use simulated::simulate;
 pub use simulated::{Clock, Disturb};
 pub use strength::Suspect;
@@ -59,6 +60,8 @@ pub struct View {
     pub kind: usize,
     /// The part it is of, an index: channels of one have one.
     pub part: usize,
+    /// What it is mounted with, an index: channels on one plate have one.
+    pub group: usize,
     /// Its axis in b.
     pub axis_b: Vector3<f64>,
     /// Place of each sample in the fitted time, 0 to 1.
@@ -76,8 +79,8 @@ pub struct View {
     pub codes: Option<Codes>,
     /// The clock of its part, where that is its own.
     pub clock: Option<Clock>,
-    /// Names of what is open of it, in the order of the fit's columns.
-    pub open: Vec<String>,
+    /// What is open of it, in the order of the fit's columns.
+    pub open: Vec<Open>,
     /// What its reference errs by, where that is not exact.
     pub instrument: Option<Instrument>,
     /// Whether that is more than it scatters by itself.

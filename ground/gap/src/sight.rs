@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
-    leftover::{Clock, Codes, Instrument, LEVELS, Suspect, View},
+    leftover::{Clock, Codes, Instrument, LEVELS, Open, Suspect, View},
     model::Model,
     open::conversion_period_s,
     problem::{Frame, Problem},
@@ -73,6 +73,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
                 Kind::Thermometer => 3,
             },
             part: part(problem, index),
+            group: group(problem, index),
             axis_b: channel.axis_b,
             phase: frame
                 .series
@@ -95,7 +96,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
             open: frame
                 .nuisance_names
                 .iter()
-                .map(|(open, _)| kind_of(open, &channel.name))
+                .map(|(open, sigma)| Open::new(kind_of(open, &channel.name), *sigma, channel.axis_b, channel.across()))
                 .collect(),
             codes: codes(problem, index, &read[index]),
             clock: clock(problem, index, &read[index], &frame.weights)
@@ -176,6 +177,13 @@ fn part(problem: &Problem, index: usize) -> usize {
     let own = &channels[index];
     let is_its = |other: &Channel| other.sensor == own.sensor && other.group == own.group && other.lsb == own.lsb;
     channels.iter().position(is_its).unwrap_or(index)
+}
+
+/// The first channel of what a channel is mounted with.
+fn group(problem: &Problem, index: usize) -> usize {
+    let channels = &problem.twin.unit().channels;
+    let own = &channels[index].group;
+    channels.iter().position(|other| other.group == *own).unwrap_or(index)
 }
 
 /// The clock of a channel's part at the fitted samples, and what is left of them about what the channel is to `read`, in units of

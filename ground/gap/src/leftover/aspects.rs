@@ -8,9 +8,10 @@
 //! ([`super::spectrum`]); heavy tails; the size of the fitted calibration, without which an unknown effect hides in the
 //! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of
 //! a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that comes and
-//! goes in all of a kind; the same vector in all sensors of a kind, along any axes or one; the same factor, as of a supply they
+//! goes in all of a kind; the same vector in all sensors of a kind, along any axes or one, and in single samples; the same factor, as of a supply they
 //! share; the same small rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel
-//! shows; what is open of each sensor and was found alike in all of a kind ([`super::shared`]). Of a named effect: whether it
+//! shows; what is open of each channel and was found along one line in several
+//! ([`super::shared`]). Of a named effect: whether it
 //! is as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length
 //! have the energy that it claims, and outliers the size and the distance from the sample before, no more and no less: a law of
 //! outliers "anywhere in the range" would else stand for any, values that are sent again among them; and whether channels that
@@ -69,6 +70,8 @@ pub struct Sights<'a> {
     shapes: Vec<Shapes>,
     spectra: Vec<Spectrum>,
     vectors: Vec<Vec<Common<3>>>,
+    /// Of each kind, in single samples.
+    jolts: Vec<Common<3>>,
     factors: Vec<Vec<Common<1>>>,
     turns: Vec<Common<3>>,
     shared: Vec<Shared>,
@@ -86,6 +89,7 @@ impl<'a> Sights<'a> {
                 |index| views[index].kind == kind,
             )
         };
+        let jolts = |kind: usize| Common::of_samples(views, |view, _| view.axis_b, |index| views[index].kind == kind);
         let factor = |kind: usize, stretches: usize| {
             let felt = |view: &View, row: usize| Vector1::new(view.felt[row]);
             Common::new(views, stretches, felt, |index| views[index].kind == kind)
@@ -99,6 +103,7 @@ impl<'a> Sights<'a> {
             vectors: (0..kinds(views))
                 .map(|kind| COMMON.map(|stretches| vector(kind, stretches)).into())
                 .collect(),
+            jolts: (0..kinds(views)).map(jolts).collect(),
             factors: (0..kinds(views))
                 .map(|kind| COMMON.map(|stretches| factor(kind, stretches)).into())
                 .collect(),
@@ -137,6 +142,7 @@ impl<'a> Sights<'a> {
             of_all.extend(COMMON.iter().flat_map(|stretches| {
                 ["", " along one axis"].map(|way| format!("{name}: a common vector{way} in stretches of 1/{stretches}"))
             }));
+            of_all.push(format!("{name}: outliers along a common vector"));
             of_all.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
             of_all.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
             of_all.extend(BURSTS.map(|stretches| format!("{name}: noise that comes and goes in 1/{stretches}")));
@@ -152,10 +158,7 @@ impl<'a> Sights<'a> {
             ["", " about one axis"]
                 .map(|way| format!("all sensors: a common rotation{way} in stretches of 1/{stretches}"))
         }));
-        of_all.extend(self.shared.iter().map(|shared| {
-            let kind = name_of(shared.kind);
-            format!("{kind}, {} of all alike: {OF_CALIBRATION}", shared.name)
-        }));
+        of_all.extend(self.shared.iter().map(|shared| shared.what.clone()));
         of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
         labels.extend(of_all.into_iter().map(|what| Label {
             what,
@@ -265,6 +268,7 @@ impl<'a> Sights<'a> {
             sums.extend(together[kind]);
             sums.extend(common[kind].column_iter().map(|column| column.norm_squared()));
             sums.extend(self.vectors[kind].iter().flat_map(|vector| vector.sums(fitted)));
+            sums.push(self.jolts[kind].tails(fitted));
             sums.extend(self.factors[kind].iter().map(|factor| factor.sum(fitted)));
             sums.extend(stretches[kind]);
             sums.extend(bursts[kind].iter().map(Bursts::sum));

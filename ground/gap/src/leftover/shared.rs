@@ -1,52 +1,150 @@
-//! What is open of each sensor by itself and was found alike in all of a kind.
+//! What is open of each channel by itself and was found along one line in several.
 //!
-//! In: the names of what is open in each channel, and a fit. Out: for each name and kind the square of the mean over its
-//! channels, in units of what chance leaves of it. Each sensor was calibrated alone and each part converts by its own clock, so
-//! that all are off by the same is no calibration: where a delay of all gyros was taken for lost packets, the instants of four
-//! gyros were 2.6 to 3.9 sigmas early and those of all others late, and their squares, among those of biases, factors and axes,
-//! were not seen.
+//! In: what is open in each channel, and a fit. Out: for each set of channels that have something in common the square of what
+//! they were found to share, in units of what chance leaves of it. Each channel was calibrated alone and each part converts by
+//! its own clock, so that what is shared is no calibration: the same delay or factor in a kind of sensors, one vector on all
+//! zeros of a kind, one turn of the axes of a part, of a plate, of a kind or of all sensors. A magnet on the body that moves twelve
+//! zeros by 2.8 sigmas each is ten sigmas of one vector, and among the squares of biases, factors and axes was not seen.
 
-use super::{Fitted, View};
+use nalgebra::{Matrix3, Vector3};
 
-/// What is looked at, as [`crate::open::calibration`] names it. The directions across an axis are each channel's own.
-const SHARED: [&str; 4] = ["bias", "scale", "instant", "instant_drift"];
+use super::{
+    Fitted, View,
+    common::inverse_root,
+    label::{OF_CALIBRATION, name_of},
+};
 
 /// What a part has once for all of its channels.
 pub const OF_PART: [&str; 2] = ["instant", "instant_drift"];
 
-/// One name in one kind of sensors.
+/// The zero of a channel.
+const ZERO: &str = "bias";
+
+/// The directions in which its axis is open.
+const AXES: [&str; 2] = ["axis_1", "axis_2"];
+
+/// What may be off alike in all of a kind.
+const ALIKE: [&str; 4] = [ZERO, "scale", "instant", "instant_drift"];
+
+/// Of the mean of the diagonal: directions that nothing is open along stay closed.
+const RIDGE: f64 = 1e-3;
+
+/// What is open in one direction of a channel's calibration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Open {
+    /// What it is, the same word in all channels.
+    pub name: String,
+    /// In its sigmas, what a vector of 1 in b makes of a zero, or a turn of 1 rad about the axes of b of an axis; else zero.
+    pub by_b: Vector3<f64>,
+}
+
+impl Open {
+    /// Of a channel with its axis, and the two directions in which that is open, in b.
+    pub fn new(name: String, sigma: f64, axis_b: Vector3<f64>, across_b: [Vector3<f64>; 2]) -> Self {
+        let by_b = match AXES.iter().position(|own| *own == name) {
+            // The axis n moves by `turn x n`.
+            Some(own) => axis_b.cross(&across_b[own]) / sigma,
+            None if name == ZERO => axis_b / sigma,
+            None => Vector3::zeros(),
+        };
+        Open { name, by_b }
+    }
+}
+
+/// Channels that share something.
 pub struct Shared {
-    /// Which of the kinds.
-    pub kind: usize,
-    /// What is open.
-    pub name: &'static str,
-    /// Channels that have it, each with its place in what is open of it.
-    places: Vec<(usize, usize)>,
+    /// Which, and what.
+    pub what: String,
+    /// Each with its place in what is open of it, and what the shared vector makes of it.
+    places: Vec<(usize, usize, Vector3<f64>)>,
+    /// Inverse root of their normal matrix.
+    root: Matrix3<f64>,
 }
 
 impl Shared {
-    /// All that at least two channels have.
+    /// All that at least two directions of calibrations have.
     pub fn all(views: &[View], kinds: usize) -> Vec<Shared> {
-        let shared = |(kind, name): (usize, &'static str)| {
-            let own = views.iter().enumerate().filter(|(_, view)| view.kind == kind);
-            let places = own.filter_map(|(channel, view)| {
-                let place = view.open.iter().position(|open| open == name)?;
-                Some((channel, place))
-            });
-            let places: Vec<_> = places.collect();
-            (places.len() > 1).then_some(Shared { kind, name, places })
-        };
-        let each = (0..kinds).flat_map(|kind| SHARED.map(|name| (kind, name)));
-        each.filter_map(shared).collect()
+        let alike = |_: &Open| Vector3::x();
+        let by_b = |open: &Open| open.by_b;
+        let any = |_: &View| true;
+        let mut all = Vec::new();
+        for kind in 0..kinds {
+            let (own, called) = (|view: &View| view.kind == kind, name_of(kind));
+            all.extend(
+                ALIKE.map(|name| Shared::of(views, format!("{called}, {name} of all alike"), own, &[name], alike)),
+            );
+            all.push(Shared::of(
+                views,
+                format!("{called}, zeros along one vector"),
+                own,
+                &[ZERO],
+                by_b,
+            ));
+            all.push(Shared::of(views, format!("{called}, turned alike"), own, &AXES, by_b));
+        }
+        for (index, first) in views.iter().enumerate() {
+            if first.part == index {
+                let own = |view: &View| view.part == index;
+                all.push(Shared::of(
+                    views,
+                    format!("{}'s part, zeros", first.name),
+                    own,
+                    &[ZERO],
+                    by_b,
+                ));
+                all.push(Shared::of(
+                    views,
+                    format!("{}'s part, turned", first.name),
+                    own,
+                    &AXES,
+                    by_b,
+                ));
+            }
+            if first.group == index {
+                let own = |view: &View| view.group == index;
+                all.push(Shared::of(
+                    views,
+                    format!("what is mounted with {}, turned alike", first.name),
+                    own,
+                    &AXES,
+                    by_b,
+                ));
+            }
+        }
+        all.push(Shared::of(views, "all sensors, turned alike".into(), any, &AXES, by_b));
+        all.into_iter().flatten().collect()
     }
 
-    /// The square of the mean, times their number.
+    /// What is open by these names in the channels that are its own.
+    fn of(
+        views: &[View],
+        what: String,
+        is_own: impl Fn(&View) -> bool,
+        names: &[&str],
+        by: impl Fn(&Open) -> Vector3<f64>,
+    ) -> Option<Shared> {
+        let own = views.iter().enumerate().filter(|(_, view)| is_own(view));
+        let places = own.flat_map(|(channel, view)| {
+            let open = view.open.iter().enumerate();
+            let named = open.filter(|(_, open)| names.contains(&open.name.as_str()));
+            named
+                .map(|(place, open)| (channel, place, by(open)))
+                .collect::<Vec<_>>()
+        });
+        let places: Vec<_> = places.collect();
+        let normal: Matrix3<f64> = places.iter().map(|(_, _, by)| by * by.transpose()).sum();
+        let ridge = Matrix3::identity() * (RIDGE * normal.trace() / 3.0);
+        (places.len() > 1).then(|| Shared {
+            what: format!("{what}: {OF_CALIBRATION}"),
+            root: inverse_root(normal + ridge),
+            places,
+        })
+    }
+
+    /// The square of what they share.
     pub fn sum(&self, fitted: &Fitted) -> f64 {
-        let all: f64 = self
-            .places
-            .iter()
-            .map(|(channel, place)| fitted.nuisance[*channel][*place])
-            .sum();
-        all * all / self.places.len() as f64
+        let found = |(channel, place, by): &(usize, usize, Vector3<f64>)| by * fitted.nuisance[*channel][*place];
+        let score: Vector3<f64> = self.places.iter().map(found).sum();
+        (self.root * score).norm_squared()
     }
 }

@@ -118,12 +118,12 @@ fn of_part(view: &View, mut own: DVector<f64>, views: &[View], drawn: &[DVector<
     let Some((first, of_first)) = views.get(view.part).zip(drawn.get(view.part)) else {
         return own;
     };
-    for (value, name) in own
+    for (value, open) in own
         .iter_mut()
         .zip(&view.open)
-        .filter(|(_, name)| OF_PART.contains(&name.as_str()))
+        .filter(|(_, open)| OF_PART.contains(&open.name.as_str()))
     {
-        if let Some(place) = first.open.iter().position(|open| open == name) {
+        if let Some(place) = first.open.iter().position(|first| first.name == open.name) {
             *value = of_first[place];
         }
     }

@@ -50,33 +50,34 @@ pub fn squares(values: &[f64]) -> Vec<f64> {
 /// Squares of several channels in stretches of time: noise that comes and goes does so in all of a kind at once, and in each
 /// of them it may be weak.
 pub struct Bursts {
-    stretches: Vec<(f64, f64)>,
+    /// Of each half of a stretch the sum, and of how many.
+    halves: Vec<(f64, f64)>,
 }
 
 impl Bursts {
     /// None yet, in so many stretches.
     pub fn new(stretches: usize) -> Self {
         Bursts {
-            stretches: vec![(0.0, 0.0); stretches],
+            halves: vec![(0.0, 0.0); 2 * stretches],
         }
     }
 
     /// Adds a channel: squares about their mean, and the place of each sample in time, 0 to 1. Over their spread, or louder
     /// noise would come and go more.
     pub fn add(&mut self, phases: &[f64], squares: &[f64]) {
-        let of = self.stretches.len();
+        let of = self.halves.len();
         let energy: f64 = squares.iter().map(|square| square * square).sum();
         let spread = (energy / squares.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
         for (phase, square) in phases.iter().zip(squares) {
-            let (sum, count) = &mut self.stretches[place(*phase, of)];
+            let (sum, count) = &mut self.halves[place(*phase, of)];
             (*sum, *count) = (*sum + square / spread, *count + 1.0);
         }
     }
 
-    /// The energy of their means.
+    /// The energy of their means. Stretches overlap by half, or a burst across the edge of two would be half as loud in each.
     pub fn sum(&self) -> f64 {
-        let energy = |(sum, count): &(f64, f64)| sum * sum / f64::max(*count, 1.0);
-        self.stretches.iter().map(energy).sum()
+        let energy = |pair: &[(f64, f64)]| (pair[0].0 + pair[1].0).powi(2) / f64::max(pair[0].1 + pair[1].1, 1.0);
+        self.halves.windows(2).map(energy).sum()
     }
 }
 
@@ -88,4 +89,23 @@ pub fn between_levels(levels: &[u8], values: &[f64]) -> f64 {
         (*sum, *count) = (*sum + value, *count + 1.0);
     }
     sums.iter().map(|(sum, count)| sum * sum / f64::max(*count, 1.0)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_burst_across_the_edge_of_two_stretches_is_as_loud_as_within_one() {
+        const SAMPLES: usize = 1000;
+        let phases: Vec<f64> = (0..SAMPLES).map(|row| row as f64 / SAMPLES as f64).collect();
+        let loud = |from: usize| {
+            let square = |row: usize| f64::from(u8::from((from..from + 100).contains(&row))) - 0.1;
+            let mut bursts = Bursts::new(10);
+            bursts.add(&phases, &(0..SAMPLES).map(square).collect::<Vec<_>>());
+            bursts.sum()
+        };
+        let (within, across) = (loud(300), loud(350));
+        assert!((across / within - 1.0).abs() < 0.01, "{across} {within}");
+    }
 }

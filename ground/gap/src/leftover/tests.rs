@@ -1,6 +1,7 @@
 //! Residuals with and without something in them.
 
 mod clock;
+mod common;
 mod recurrence;
 mod scatter;
 mod shared;
@@ -15,23 +16,34 @@ const CHANNELS: usize = 3;
 
 /// Three gyros, each with an open bias of five sigma of noise.
 fn scene() -> (Vec<View>, Joint) {
+    scene_of(CHANNELS)
+}
+
+/// So many, along x, y, z and again.
+fn scene_of(channels: usize) -> (Vec<View>, Joint) {
     let phase: Vec<f64> = (0..SAMPLES).map(|row| row as f64 / SAMPLES as f64).collect();
     let view = |channel: usize| View {
         name: format!("g{channel}"),
         kind: 1,
         part: channel,
-        axis_b: Vector3::ith(channel, 1.0),
+        group: channel,
+        axis_b: Vector3::ith(channel % 3, 1.0),
         phase: phase.clone(),
         motion: DMatrix::from_fn(SAMPLES, 2, |row, column| {
             (row as f64 * 0.01 * (column + 1) as f64).sin()
         }),
         turned: DMatrix::from_fn(SAMPLES, 3, |row, axis| {
             let felt_b = Vector3::new(1.0, (row as f64 * 0.03).sin(), (row as f64 * 0.02).cos());
-            felt_b.cross(&Vector3::ith(channel, 1.0))[axis]
+            felt_b.cross(&Vector3::ith(channel % 3, 1.0))[axis]
         }),
         felt: DVector::from_fn(SAMPLES, |row, _| (row as f64 * 0.07 + channel as f64).sin()),
         predicted: DVector::from_fn(SAMPLES, |row, _| 40.0 * (row as f64 * 0.5 + channel as f64).sin()),
-        open: vec!["bias".into()],
+        open: vec![Open::new(
+            "bias".into(),
+            1.0,
+            Vector3::ith(channel % 3, 1.0),
+            [Vector3::zeros(); 2],
+        )],
         codes: None,
         clock: None,
         instrument: None,
@@ -43,15 +55,19 @@ fn scene() -> (Vec<View>, Joint) {
         effects: DMatrix::zeros(SAMPLES, 0),
     };
     (
-        (0..CHANNELS).map(view).collect(),
-        Joint::new(vec![columns; CHANNELS], &[]),
+        (0..channels).map(view).collect(),
+        Joint::new(vec![columns; channels], &[]),
     )
 }
 
 fn noise(seed: u64) -> Vec<DVector<f64>> {
+    noise_of(CHANNELS, seed)
+}
+
+fn noise_of(channels: usize, seed: u64) -> Vec<DVector<f64>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut channel = || DVector::from_fn(SAMPLES, |_, _| StandardNormal.sample(&mut random));
-    (0..CHANNELS).map(|_| channel()).collect()
+    (0..channels).map(|_| channel()).collect()
 }
 
 fn judged(change: impl Fn(usize, &mut DVector<f64>)) -> Leftover {
@@ -286,55 +302,6 @@ fn what_a_prior_takes_off_a_large_effect_is_no_leftover() {
     };
     let left = judge(&views, &joint, &joint.fit(&residuals), &[suspect], None);
     assert!(left.p > 0.05, "{left:?}");
-}
-
-#[test]
-fn a_supply_that_sags_is_found_by_the_factor_all_sensors_share() {
-    let left = judged(|channel, residual| {
-        let felt = scene().0[channel].felt.clone();
-        (residual.iter_mut().enumerate())
-            .for_each(|(row, value)| *value += 0.8 * (row as f64 / SAMPLES as f64 - 0.5) * felt[row]);
-    });
-    assert!(left.p < 0.01, "{left:?}");
-    assert!(
-        left.aspects.iter().any(|aspect| aspect.what.contains("common factor")),
-        "{left:?}"
-    );
-}
-
-#[test]
-fn a_mount_that_slips_is_found_by_the_rotation_all_sensors_share() {
-    let slips = |row: usize| if row * 7 / SAMPLES % 2 == 1 { 0.5 } else { 0.0 };
-    let left = judged(|channel, residual| {
-        let turned = scene().0[channel].turned.clone();
-        let about_z = |row: usize| slips(row) * turned[(row, 2)];
-        residual
-            .iter_mut()
-            .enumerate()
-            .for_each(|(row, value)| *value += about_z(row));
-    });
-    assert!(left.p < 0.01, "{left:?}");
-    assert!(
-        left.aspects
-            .iter()
-            .any(|aspect| aspect.what.contains("common rotation"))
-    );
-}
-
-#[test]
-fn what_goes_along_one_axis_is_seen_sharper_than_along_any() {
-    let slips = |row: usize| if row / 10 * 7 % 5 < 2 { 0.9 } else { 0.0 };
-    let left = judged(|channel, residual| {
-        let turned = &scene().0[channel].turned;
-        (residual.iter_mut().enumerate()).for_each(|(row, value)| *value += slips(row) * turned[(row, 2)]);
-    });
-    let size = |what: &str| {
-        let mut own = left.aspects.iter().filter(|aspect| aspect.what == what);
-        own.next().map_or(0.0, |aspect| aspect.size)
-    };
-    let one = size("all sensors: a common rotation about one axis in stretches of 1/60");
-    let any = size("all sensors: a common rotation in stretches of 1/60");
-    assert!(one > 5.0 && one > any + 1.0, "{one} {any}");
 }
 
 #[test]
