@@ -32,6 +32,10 @@ const FARTHEST: f64 = 16.0;
 /// Variance of two ages that are a whole period apart, over that of ages evenly between them.
 const AT_ONCE: f64 = 3.0;
 
+/// Variance of a square of noise, and of the part of its clock's scatter that a channel has, before anything is known of it.
+const OF_SQUARE: f64 = 2.0;
+const OF_PART_SHOWN: f64 = 1.0;
+
 /// [units of noise] to which the zero of a channel is known.
 const ZERO: f64 = 0.2;
 
@@ -140,8 +144,12 @@ impl Clock {
 
     /// Variance of a reading's age over that of one spread evenly over a period, by what is `left` of a channel: a clock that
     /// keeps step with the cycle scatters nothing, or, where it converts just when it is read, by a whole period. By least
-    /// squares of the squares, each with the weight that its own scatter leaves it.
+    /// squares of the squares, each with the weight that its own scatter leaves it, and evenly where they tell little: what is a
+    /// tenth of a thermometer's noise its squares do not show, and it is one line of its spectrum.
     pub fn part_shown(&self, left: impl Iterator<Item = f64>) -> f64 {
+        if !self.may_keep_step() {
+            return 1.0;
+        }
         let (mut along, mut energy) = (0.0, 0.0);
         for (slope, left) in self.slopes.iter().zip(left).filter(|(_, left)| left.is_finite()) {
             let even = (slope * self.period_s).powi(2) / 12.0;
@@ -151,17 +159,25 @@ impl Clock {
             along += weight * even * (square - 1.0);
             energy += weight * even * even;
         }
-        if energy > 0.0 {
-            (along / energy).clamp(0.0, AT_ONCE)
-        } else {
-            1.0
-        }
+        let told = OF_PART_SHOWN / OF_SQUARE;
+        ((1.0 + told * along) / (1.0 + told * energy)).clamp(0.0, AT_ONCE)
+    }
+
+    /// Whether it may convert a whole number of times a sample.
+    fn may_keep_step(&self) -> bool {
+        let beats = |rate: f64| (rate * self.step_s() / self.period_s).floor();
+        beats(1.0 + OFF) > beats(1.0 - OFF)
+    }
+
+    /// [s] between samples.
+    fn step_s(&self) -> f64 {
+        self.instants_s.get(1).map_or(0.0, |second| second - self.instants_s[0])
     }
 
     /// Adds what a clock of unknown phase and rate makes of a channel. The mean age is the calibration's.
     fn age(&self, residual: &mut DVector<f64>, random: &mut Xoshiro256PlusPlus) {
         let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
-        let step_s = self.instants_s.get(1).map_or(0.0, |second| second - self.instants_s[0]);
+        let step_s = self.step_s();
         let phase = between(0.0, 1.0);
         let mut period_s = self.period_s;
         for _ in 0..TRIES {
@@ -203,6 +219,18 @@ mod tests {
         left.apply(|value| *value += Distribution::<f64>::sample(&StandardNormal, &mut random));
         let shown = clock.clone().as_shown(left.iter().copied());
         (shown.slopes[0] / clock.slopes[0]).powi(2)
+    }
+
+    #[test]
+    fn a_clock_that_cannot_keep_step_is_spread_evenly_whatever_its_squares_say() {
+        let clock = |period_s: f64| Clock {
+            period_s,
+            instants_s: (0..SAMPLES).map(|row| row as f64 * 0.2).collect(),
+            slopes: vec![1.0 / period_s; SAMPLES],
+        };
+        let quiet = || (0..SAMPLES).map(|_| 0.9);
+        assert_eq!(clock(0.25).part_shown(quiet()), 1.0);
+        assert!(clock(0.02).part_shown(quiet()) < 0.1);
     }
 
     #[test]
