@@ -58,6 +58,7 @@ fn answer(file: &Path) -> Result<Answer, Box<dyn Error>> {
         in_library: effect["in_library"].as_bool().unwrap_or(true),
         channels: list(&effect["channels"]).iter().map(text).collect(),
         strength: effect["strength"].as_f64().unwrap_or(f64::NAN),
+        snr_marginal: effect["snr_marginal"].as_f64(),
         sizes: Vec::new(),
     };
     Ok(Answer {

@@ -13,6 +13,9 @@ pub struct Cause {
     pub channels: Vec<String>,
     /// Strength it was dealt with.
     pub strength: f64,
+    /// Its own part of [`Answer::snr_marginal`]; an effect at the largest size it is dealt at may be hardly there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snr_marginal: Option<f64>,
     /// Its sizes, where its law has parameters that verdicts state too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<Size>,

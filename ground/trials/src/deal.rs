@@ -122,7 +122,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     let snr = |flown: &Flown, random| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, FIT_S, random);
     let mut sizes = draw.stream(9);
     let mut strengths = Vec::new();
-    let mut energy = 0.0;
+    let mut ratios = Vec::new();
     for (index, disturbance) in chosen.iter().enumerate() {
         let wanted = given.map_or_else(|| sizes.log_uniform(SNR.0, SNR.1), |_| GIVEN_SNR);
         let at = |strength: f64| snr(&fly(&[(index, strength)]), disturbance.random);
@@ -138,17 +138,18 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
                 sized(wanted, gross, at(gross), power, largest)
             }
         };
-        energy += reached * reached;
+        ratios.push(reached);
         strengths.push((index, strength));
     }
     let flown = fly(&strengths);
     write(&folder.join(name), name, style, &flown, &instants)?;
-    let effects = (chosen.iter().zip(&flown.touched).zip(&strengths))
-        .map(|((disturbance, (touched, sizes)), (_, strength))| Cause {
+    let effects = (chosen.iter().zip(&flown.touched).zip(strengths.iter().zip(&ratios)))
+        .map(|((disturbance, (touched, sizes)), ((_, strength), ratio))| Cause {
             effect: disturbance.name.into(),
             in_library: ring != Ring::R3,
             channels: touched.iter().map(|index| CHANNELS[*index].name.into()).collect(),
             strength: *strength,
+            snr_marginal: Some(*ratio),
             sizes: sizes.clone(),
         })
         .collect();
@@ -157,7 +158,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         ring: format!("{ring:?}"),
         seed,
         effects,
-        snr_marginal: energy.sqrt(),
+        snr_marginal: ratios.iter().map(|ratio| ratio * ratio).sum::<f64>().sqrt(),
     })
 }
 

@@ -104,6 +104,7 @@ mod tests {
                     in_library: true,
                     channels: Vec::new(),
                     strength: 1.0,
+                    snr_marginal: None,
                     sizes: Vec::new(),
                 }],
                 snr_marginal: 20.0,

@@ -7,6 +7,7 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
         in_library: true,
         channels: vec!["g1".into()],
         strength: 1.0,
+        snr_marginal: None,
         sizes: Vec::new(),
     };
     Judged {
@@ -127,6 +128,18 @@ fn two_effects_are_counted_one_by_one() {
     ]);
     assert_eq!(value(&lines, "two effects: precision"), 0.75);
     assert_eq!(value(&lines, "two effects: recall"), 0.75);
+}
+
+#[test]
+fn of_two_effects_one_that_is_hardly_there_is_not_missed() {
+    let one = r#"{"causes":[{"effect":"gyro-bias","probability":0.9}]}"#;
+    let mut case = judged("R4", &["gyro-bias", "gyro-g2"], Some(one));
+    for (ratio, recall) in [(2.0, 1.0), (MARGINAL_SNR, 0.5)] {
+        case.answer.effects[1].snr_marginal = Some(ratio);
+        let lines = table(std::slice::from_ref(&case));
+        assert_eq!(value(&lines, "two effects: recall"), recall);
+        assert_eq!(value(&lines, "two effects: precision"), 1.0);
+    }
 }
 
 #[test]
