@@ -238,7 +238,8 @@ fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
     let (mut named, mut right) = (0, 0);
     let (mut there, mut found) = (0, 0);
     for judged in &cases {
-        let names: Vec<&str> = judged
+        // One effect in two places is one name, as it is one in the answer.
+        let names: BTreeSet<&str> = judged
             .verdict
             .iter()
             .flat_map(Verdict::said)
@@ -246,7 +247,7 @@ fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
             .collect();
         named += names.len();
         for cause in &judged.answer.effects {
-            let is_named = names.contains(&cause.effect.as_str());
+            let is_named = names.contains(cause.effect.as_str());
             let is_seen = cause.snr_marginal.is_none_or(|ratio| ratio >= MARGINAL_SNR);
             right += usize::from(is_named);
             there += usize::from(is_seen);

@@ -121,7 +121,8 @@ fn giving_up_counts_against_the_tool() {
 
 #[test]
 fn two_effects_are_counted_one_by_one() {
-    let both = r#"{"causes":[{"effect":"gyro-bias","probability":0.9},{"effect":"lever-arm","probability":0.9}]}"#;
+    let both = r#"{"causes":[{"effect":"gyro-bias","probability":0.9},{"effect":"lever-arm","probability":0.9},
+        {"effect":"gyro-bias","probability":0.8}]}"#;
     let lines = table(&[
         judged("R4", &["gyro-bias", "hard-iron"], Some(both)),
         judged("R4", &["gyro-bias", "lever-arm"], Some(both)),
