@@ -158,7 +158,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         ring: format!("{ring:?}"),
         seed,
         effects,
-        snr_marginal: ratios.iter().map(|ratio| ratio * ratio).sum::<f64>().sqrt(),
+        snr_marginal: ratios.iter().copied().fold(0.0, f64::hypot),
     })
 }
 
