@@ -28,6 +28,9 @@ const PAGE: Page = Page {
 /// Part of a blow by which it differs from sensor to sensor: they are read some milliseconds apart, and at some distance.
 const APART: f64 = 0.3;
 
+/// Part of the cycles that may be in a blow: what is off more often shakes.
+const MOST: f64 = 0.2;
+
 /// How often a blow turns the unit too, and does not go through its middle.
 const TURNS: f64 = 0.5;
 
@@ -96,8 +99,11 @@ impl Effect for Shock {
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let p = theta[0].clamp(0.0, 0.999);
-        let rows = of_rows(views, variant).into_iter();
-        rows.map(|[usual, hit]| mixed(p, usual, hit)).sum()
+        let rows = of_rows(views, variant);
+        let hits: f64 = rows.iter().map(|[usual, hit]| unusual_part(p, *usual, *hit)).sum();
+        let is_rare = hits <= MOST * rows.len() as f64;
+        let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(p, *usual, *hit) } else { *usual };
+        rows.iter().map(of_row).sum()
     }
 
     fn beneath(&self, theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {

@@ -385,6 +385,11 @@ fn what_shakes_at_any_frequency_for_a_while_is_neither_blows_nor_noise() {
             .fold(0.0, f64::max)
     };
     let vibration = gain("vibration");
+    assert!(
+        gain("shock") < 1.0,
+        "half of the time is not now and then: {}",
+        gain("shock")
+    );
     for other in ["shock", "noise-level", "packet-corruption"] {
         assert!(vibration > gain(other) + 100.0, "{other}: {} {vibration}", gain(other));
     }
