@@ -64,64 +64,44 @@ pub struct Shared {
 impl Shared {
     /// All that at least two directions of calibrations have.
     pub fn all(views: &[View], kinds: usize) -> Vec<Shared> {
-        let alike = |_: &Open| Vector3::x();
         let by_b = |open: &Open| open.by_b;
-        let any = |_: &View| true;
         let mut all = Vec::new();
+        let mut add =
+            |what: String, is_own: &dyn Fn(&View) -> bool, names: &[&str], by: &dyn Fn(&Open) -> Vector3<f64>| {
+                all.extend(Shared::of(views, what, is_own, names, by));
+            };
         for kind in 0..kinds {
             let (own, called) = (|view: &View| view.kind == kind, name_of(kind));
-            all.extend(
-                ALIKE.map(|name| Shared::of(views, format!("{called}, {name} of all alike"), own, &[name], alike)),
-            );
-            all.push(Shared::of(
-                views,
-                format!("{called}, zeros along one vector"),
-                own,
-                &[ZERO],
-                by_b,
-            ));
-            all.push(Shared::of(views, format!("{called}, turned alike"), own, &AXES, by_b));
+            for name in ALIKE {
+                add(format!("{called}, {name} of all alike"), &own, &[name], &|_| {
+                    Vector3::x()
+                });
+            }
+            add(format!("{called}, zeros along one vector"), &own, &[ZERO], &by_b);
+            add(format!("{called}, turned alike"), &own, &AXES, &by_b);
         }
-        for (index, first) in views.iter().enumerate() {
-            if first.part == index {
+        for (index, View { name, part, group, .. }) in views.iter().enumerate() {
+            if *part == index {
                 let own = |view: &View| view.part == index;
-                all.push(Shared::of(
-                    views,
-                    format!("{}'s part, zeros", first.name),
-                    own,
-                    &[ZERO],
-                    by_b,
-                ));
-                all.push(Shared::of(
-                    views,
-                    format!("{}'s part, turned", first.name),
-                    own,
-                    &AXES,
-                    by_b,
-                ));
+                add(format!("{name}'s part, zeros"), &own, &[ZERO], &by_b);
+                add(format!("{name}'s part, turned"), &own, &AXES, &by_b);
             }
-            if first.group == index {
+            if *group == index {
                 let own = |view: &View| view.group == index;
-                all.push(Shared::of(
-                    views,
-                    format!("what is mounted with {}, turned alike", first.name),
-                    own,
-                    &AXES,
-                    by_b,
-                ));
+                add(format!("what is mounted with {name}, turned alike"), &own, &AXES, &by_b);
             }
         }
-        all.push(Shared::of(views, "all sensors, turned alike".into(), any, &AXES, by_b));
-        all.into_iter().flatten().collect()
+        add("all sensors, turned alike".into(), &|_| true, &AXES, &by_b);
+        all
     }
 
     /// What is open by these names in the channels that are its own.
     fn of(
         views: &[View],
         what: String,
-        is_own: impl Fn(&View) -> bool,
+        is_own: &dyn Fn(&View) -> bool,
         names: &[&str],
-        by: impl Fn(&Open) -> Vector3<f64>,
+        by: &dyn Fn(&Open) -> Vector3<f64>,
     ) -> Option<Shared> {
         let own = views.iter().enumerate().filter(|(_, view)| is_own(view));
         let places = own.flat_map(|(channel, view)| {
