@@ -13,9 +13,13 @@ use super::{Fitted, View, aspects::place};
 /// tails than each of these, so the cut lies farther out than that of [`super::sums::tails`].
 const FARTHEST: f64 = 8.0;
 
+/// Of the mean of a normal matrix' diagonal: directions that nothing looks along stay closed.
+const RIDGE: f64 = 1e-3;
+
 /// Something of `D` components that some channels would see together, free in each stretch of time.
 pub struct Common<const D: usize> {
-    /// Per channel, for each sample its part of the log and what each component adds to it; empty for a channel that is not looked at.
+    /// Per channel, for each sample its part of the log and what each component adds to it; empty for a channel that is not
+    /// looked at.
     rows: Vec<Vec<(usize, SVector<f64, D>)>>,
     /// Parts of the log that a stretch has, each but the first of which is also in the one after.
     width: usize,
@@ -51,8 +55,6 @@ impl<const D: usize> Common<D> {
         design: impl Fn(&View, usize) -> SVector<f64, D>,
         is_seen: impl Fn(usize) -> bool,
     ) -> Self {
-        /// Of the mean of the diagonal: directions no sensor looks along stay closed.
-        const RIDGE: f64 = 1e-3;
         let mut normal = vec![SMatrix::<f64, D, D>::zeros(); parts];
         let mut rows = Vec::new();
         for (index, view) in views.iter().enumerate() {
@@ -65,13 +67,13 @@ impl<const D: usize> Common<D> {
                 .for_each(|(part, add)| normal[*part] += add * add.transpose());
             rows.push(own);
         }
-        let root = |normal: &SMatrix<f64, D, D>| {
-            inverse_root(normal + SMatrix::identity() * (RIDGE * normal.trace() / D as f64))
-        };
         Common {
             rows,
             width,
-            roots: normal.windows(width).map(|own| root(&own.iter().sum())).collect(),
+            roots: normal
+                .windows(width)
+                .map(|own| inverse_root(own.iter().sum()))
+                .collect(),
         }
     }
 
@@ -104,9 +106,10 @@ impl<const D: usize> Common<D> {
     }
 }
 
-/// Zero of a matrix that is zero.
-pub fn inverse_root<const D: usize>(matrix: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    let eigen = dynamic(&matrix).symmetric_eigen();
+/// Inverse root of a normal matrix with its ridge; zero of a matrix that is zero.
+pub fn inverse_root<const D: usize>(normal: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let ridge = SMatrix::identity() * (RIDGE * normal.trace() / D as f64);
+    let eigen = dynamic(&(normal + ridge)).symmetric_eigen();
     let inverse = eigen
         .eigenvalues
         .map(|value| if value > 0.0 { value.sqrt().recip() } else { 0.0 });

@@ -26,9 +26,6 @@ const AXES: [&str; 2] = ["axis_1", "axis_2"];
 /// What may be off alike in all of a kind.
 const ALIKE: [&str; 4] = [ZERO, "scale", "instant", "instant_drift"];
 
-/// Of the mean of the diagonal: directions that nothing is open along stay closed.
-const RIDGE: f64 = 1e-3;
-
 /// What is open in one direction of a channel's calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Open {
@@ -113,10 +110,9 @@ impl Shared {
         });
         let places: Vec<_> = places.collect();
         let normal: Matrix3<f64> = places.iter().map(|(_, _, by)| by * by.transpose()).sum();
-        let ridge = Matrix3::identity() * (RIDGE * normal.trace() / 3.0);
         (places.len() > 1).then(|| Shared {
             what: format!("{what}: {OF_CALIBRATION}"),
-            root: inverse_root(normal + ridge),
+            root: inverse_root(normal),
             places,
         })
     }
