@@ -45,6 +45,7 @@ mod high_pass;
 mod hysteresis;
 mod latency;
 mod lever_arm;
+mod line;
 mod mains_alias;
 mod misalignment;
 mod mounting;
@@ -199,9 +200,14 @@ pub trait Effect: Sync {
 
     /// ln probability of the logs of the channels of one block under this effect, for one that changes their scatter; the
     /// nominal one for the others. Where the block is a channel the logarithms of several channels add up, so that the set of
-    /// channels concerned can be found one by one.
+    /// channels concerned can be found one by one; unless they share what is unknown of it.
     fn log_likelihood(&self, _theta: &[f64], _variant: f64, views: &[View]) -> f64 {
         views.iter().map(View::nominal).sum()
+    }
+
+    /// The same as a function of the parameters, for a search: what does not depend on them is done once.
+    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Box<dyn Fn(&[f64]) -> f64 + 'a> {
+        Box::new(move |theta| self.log_likelihood(theta, variant, views))
     }
 
     /// What the channels of one block would have measured with this effect, before rounding, for one that changes their

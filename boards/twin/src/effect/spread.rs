@@ -184,7 +184,8 @@ pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f6
     let Some(symbol) = effect.page().parameters.first() else {
         return (Vec::new(), effect.log_likelihood(&[], variant, views) - nominal);
     };
-    let likelihood = |theta: f64| effect.log_likelihood(&[theta], variant, views) - nominal;
+    let of = effect.likelihood(variant, views);
+    let likelihood = |theta: f64| of(&[theta]) - nominal;
     let signs: &[f64] = if symbol.signed { &[1.0, -1.0] } else { &[1.0] };
     let mut best = (0.0, 0.0);
     for sign in signs {

@@ -10,8 +10,13 @@ use crate::problem::Problem;
 /// Effects that only make a sample scatter more: a reference that errs does so too.
 const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];
 
-/// Shakes each axis by another amount, so no kind alike.
-const UNLIKE: &str = "vibration";
+/// Stands in a spectrum where neither energy nor neighbours say anything of it.
+const LINE: &str = "vibration";
+
+/// Whether a residual that scatters as described as far as [`super::odd`] sees may hold it.
+pub fn is_hidden(effect: &dyn Effect) -> bool {
+    effect.page().name == LINE
+}
 
 /// Blocks of the effect's own scope.
 pub fn own(problem: &Problem, effect: &dyn Effect) -> Vec<Vec<usize>> {
@@ -34,7 +39,7 @@ pub fn own(problem: &Problem, effect: &dyn Effect) -> Vec<Vec<usize>> {
 /// of them is not worth its price in any.
 pub fn kinds(problem: &Problem, effect: &dyn Effect) -> Vec<Vec<usize>> {
     let page = effect.page();
-    if page.scope != Scope::Channel || !page.common || page.name == UNLIKE {
+    if page.scope != Scope::Channel || !page.common {
         return Vec::new();
     }
     let concerned = concerned(problem, effect);

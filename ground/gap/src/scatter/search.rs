@@ -283,12 +283,13 @@ impl<'a> Search<'a> {
         let mut blocks = blocks::own(self.problem, effect);
         let of = blocks.len();
         let odd_in = |block: &[usize]| -> Vec<Oddness> { block.iter().map(|index| self.odd[*index]).collect() };
-        blocks.retain(|block| is_odd(&odd_in(block)));
+        let is_hidden = blocks::is_hidden(effect);
+        blocks.retain(|block| is_hidden || is_odd(&odd_in(block)));
         let each = self.gathered_in(&blocks, of, effect, variant, price, &judged);
         let mut kinds = blocks::kinds(self.problem, effect);
         let of = kinds.len();
         let is_found = |index: &usize| each.as_ref().is_some_and(|each| each.channels.contains(index));
-        kinds.retain(|block| are_odd(&odd_in(block)) && !block.iter().all(is_found));
+        kinds.retain(|block| (is_hidden || are_odd(&odd_in(block))) && !block.iter().all(is_found));
         let alike = self.gathered_in(&kinds, of, effect, variant, price, &judged);
         match (each, alike) {
             (Some(each), Some(alike)) if alike.gain <= each.gain => Some(each),
