@@ -74,16 +74,26 @@ pub struct Quality {
     pub noise: f64,
     /// On the biases.
     pub bias: f64,
+    /// Which flight of these parts: they are the same in each, and their noise is another.
+    pub flight: u64,
 }
 
 impl Quality {
     /// As the parts are.
-    pub const NOMINAL: Quality = Quality { noise: 1.0, bias: 1.0 };
+    pub const NOMINAL: Quality = Quality {
+        noise: 1.0,
+        bias: 1.0,
+        flight: 0,
+    };
     /// Parts without noise or bias, for tests of everything else.
-    pub const IDEAL: Quality = Quality { noise: 0.0, bias: 0.0 };
+    pub const IDEAL: Quality = Quality {
+        noise: 0.0,
+        bias: 0.0,
+        flight: 0,
+    };
 
     fn draw<const N: usize>(self, spread: Spread, stream: Noise) -> Specimen<N> {
-        Specimen::draw(stream, spread.noise * self.noise, spread.bias * self.bias)
+        Specimen::draw(stream, spread.noise * self.noise, spread.bias * self.bias, self.flight)
     }
 }
 

@@ -46,8 +46,10 @@ const SNR: (f64, f64) = (8.0, 100.0);
 /// The one of a case whose disturbance is given: plain, but not by its mere size.
 const GIVEN_SNR: f64 = 30.0;
 
-/// Where a disturbance's size is measured: far above the rounding of codes.
-const LARGE_SNR: f64 = 400.0;
+/// Steps of the search for a strength, the largest factor of one, and the logarithm of one that is none.
+const STEPS: usize = 6;
+const FURTHEST: f64 = 10.0;
+const CLOSE: f64 = 0.02;
 
 /// Largest strength of what has a name, in typical sizes: no part of its kind is worse, and the priors of a diagnosis say so.
 const LARGEST: f64 = 5.0;
@@ -100,14 +102,18 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     };
     let instants = flight::instants(seed).ok_or(DealError::NoInstants(seed))?;
     let wander = Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1));
-    let fly = |struck: &[(usize, f64)]| {
+    let fly = |struck: &[(usize, f64)], flight: u64| {
         let mut scene = Scene::new(wander.clone(), site, &mut draw.stream(2));
         let struck = struck.iter().map(|(index, strength)| {
             let touched = (chosen[*index].apply)(&mut scene, &mut draw.stream(3 + *index as u64), *strength);
             (touched, std::mem::take(&mut scene.sizes))
         });
         let touched: Vec<(Vec<usize>, Vec<Size>)> = struck.collect();
-        let plant = Plant::seeing(&scene.views, scene.source.clone(), seed, Quality::NOMINAL);
+        let quality = Quality {
+            flight,
+            ..Quality::NOMINAL
+        };
+        let plant = Plant::seeing(&scene.views, scene.source.clone(), seed, quality);
         let mut readings = flight::fly(plant, DURATION_S + 1.0);
         for transit in &scene.transit {
             transit(&mut readings);
@@ -118,30 +124,32 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             touched,
         }
     };
-    let quiet = fly(&[]);
-    let snr = |flown: &Flown, random| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, FIT_S, random);
+    let quiet = [0, 1].map(|flight| fly(&[], flight));
+    let snr = |struck: &[(usize, f64)], random: bool| {
+        let flown = [0, 1].map(|flight| fly(struck, flight));
+        let told = flown.each_ref().map(Flown::told);
+        let quiet = quiet.each_ref().map(Flown::told);
+        let flights = [[&told[0], &quiet[0]], [&told[1], &quiet[1]]];
+        sensitivity::marginal_snr(flights, &instants, FIT_S, random)
+    };
     let mut sizes = draw.stream(9);
     let mut strengths = Vec::new();
     let mut ratios = Vec::new();
     for (index, disturbance) in chosen.iter().enumerate() {
         let wanted = given.map_or_else(|| sizes.log_uniform(SNR.0, SNR.1), |_| GIVEN_SNR);
-        let at = |strength: f64| snr(&fly(&[(index, strength)]), disturbance.random);
-        // The ratio of a variance goes with the square of its strength.
-        let power = if disturbance.random { 0.5 } else { 1.0 };
+        let at = |strength: f64| snr(&[(index, strength)], disturbance.random);
         let (strength, reached) = match disturbance.graded {
             false => (1.0, at(1.0)),
             true => {
-                // Near the size of a count, rounding adds to the difference of two flights: measured where it does not
-                // matter and scaled down.
-                let gross = (LARGE_SNR / at(1.0).max(0.1)).powf(power).clamp(0.1, 100.0);
                 let largest = if ring == Ring::R3 { LARGEST_NOVEL } else { LARGEST };
-                sized(wanted, gross, at(gross), power, largest)
+                // The ratio of a variance goes with the square of its strength.
+                sized(wanted, if disturbance.random { 0.5 } else { 1.0 }, largest, at)
             }
         };
         ratios.push(reached);
         strengths.push((index, strength));
     }
-    let flown = fly(&strengths);
+    let flown = fly(&strengths, 0);
     write(&folder.join(name), name, style, &flown, &instants)?;
     let effects = (chosen.iter().zip(&flown.touched).zip(strengths.iter().zip(&ratios)))
         .map(|((disturbance, (touched, sizes)), ((_, strength), ratio))| Cause {
@@ -162,14 +170,23 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     })
 }
 
-/// The strength that has the ratio that is wanted, where a strength `gross` has `of_gross`, and the ratio that it has: less than
-/// what is wanted if that takes more than the largest.
-fn sized(wanted: f64, gross: f64, of_gross: f64, power: f64, largest: f64) -> (f64, f64) {
-    let strength = gross * (wanted / of_gross.max(0.1)).powf(power);
-    match strength <= largest {
-        true => (strength, wanted),
-        false => (largest, wanted * (largest / strength).powf(1.0 / power)),
+/// The strength that has the ratio that is wanted, and the ratio that it has: less than what is wanted if that takes more than
+/// the largest. What a clock or a range hides at one size it does not at another, so each is measured.
+fn sized(wanted: f64, power: f64, largest: f64, at: impl Fn(f64) -> f64) -> (f64, f64) {
+    let mut best = (1.0, at(1.0));
+    let (mut strength, mut reached) = best;
+    for _ in 0..STEPS {
+        let factor = (wanted / reached.max(f64::MIN_POSITIVE)).powf(power);
+        let next = (strength * factor.clamp(1.0 / FURTHEST, FURTHEST)).min(largest);
+        if (next / strength).ln().abs() < CLOSE {
+            break;
+        }
+        (strength, reached) = (next, at(next));
+        if (reached / wanted).ln().abs() <= (best.1 / wanted).ln().abs() {
+            best = (strength, reached);
+        }
     }
+    best
 }
 
 /// A flight of a scene.
@@ -278,14 +295,54 @@ mod tests {
 
     #[test]
     fn what_a_motion_does_not_bring_out_has_a_small_ratio() {
-        assert_eq!(sized(12.0, 10.0, 400.0, 1.0, LARGEST), (0.3, 12.0));
+        assert_eq!(sized(12.0, 1.0, LARGEST, |strength| 40.0 * strength).0, 0.3);
         // A leak of a rate about an axis that never turns.
-        let (strength, reached) = sized(10.0, 100.0, 0.0, 1.0, LARGEST_NOVEL);
-        assert_eq!(strength, LARGEST_NOVEL);
-        assert!(reached < 0.1, "{reached}");
+        assert_eq!(sized(10.0, 1.0, LARGEST_NOVEL, |_| 0.0), (LARGEST_NOVEL, 0.0));
         // A variance goes with the square.
-        let (strength, reached) = sized(40.0, 10.0, 10.0, 0.5, LARGEST);
-        assert_eq!((strength, reached), (5.0, 2.5));
+        assert_eq!(
+            sized(40.0, 0.5, LARGEST, |strength| 0.1 * strength * strength),
+            (5.0, 2.5)
+        );
+        // A delay is hidden by the clock of its part as long as it is small.
+        let (strength, reached) = sized(20.0, 1.0, LARGEST, |strength| strength.max(8.0 * strength * strength));
+        assert!(
+            (reached / 20.0).ln().abs() < 0.1 && strength < 2.0,
+            "{strength} {reached}"
+        );
+    }
+
+    #[test]
+    fn a_delay_within_the_clock_of_a_part_is_no_disturbance() {
+        const LONG_S: f64 = 60.0;
+        let instants = flight::instants(3).expect("derived frames");
+        let fly = |delay_s: f64, flight: u64| {
+            let wander = Wander::draw(Style::Hand, true, LONG_S + 2.0, &mut Draw::new(11));
+            let mut scene = Scene::new(wander, Environment::laboratory(), &mut Draw::new(12));
+            for view in &mut scene.views.field_p_ut {
+                let prompt = view.clone();
+                *view = std::sync::Arc::new(move |t_s| prompt(t_s - delay_s));
+            }
+            let quality = Quality {
+                flight,
+                ..Quality::NOMINAL
+            };
+            let plant = Plant::seeing(&scene.views, scene.source.clone(), 3, quality);
+            Flown {
+                readings: flight::fly(plant, LONG_S + 1.0),
+                scene,
+                touched: Vec::new(),
+            }
+        };
+        let [quiet, late] = [0.0, 0.002].map(|delay_s| [0, 1].map(|flight| fly(delay_s, flight)));
+        let snr = |second: usize| {
+            let of = |flight: usize| [late[flight].told(), quiet[flight].told()];
+            let [first, second] = [of(0), of(second)];
+            let flights = [[&first[0], &first[1]], [&second[0], &second[1]]];
+            sensitivity::marginal_snr(flights, &instants, LONG_S, false)
+        };
+        // Half of a sigma of each of four clocks. Squared, the rounding of codes is most of it.
+        assert!(snr(1) < 2.5, "{}", snr(1));
+        assert!(snr(0) > 5.0, "{}", snr(0));
     }
 
     #[test]
@@ -326,8 +383,10 @@ mod tests {
             }
         };
         let quiet = fly(None);
-        let snr =
-            |flown: &Flown, random| sensitivity::marginal_snr(&flown.told(), &quiet.told(), &instants, LONG_S, random);
+        let snr = |flown: &Flown, random| {
+            let (flown, quiet) = (flown.told(), quiet.told());
+            sensitivity::marginal_snr([[&flown, &quiet]; 2], &instants, LONG_S, random)
+        };
         assert!(snr(&quiet, false) < 1e-6);
         for disturbance in [disturbance::named(), novel::ALL.to_vec()].concat() {
             let flown = fly(Some(disturbance));

@@ -1,10 +1,13 @@
 //! How much of a disturbance calibration errors cannot imitate.
 //!
-//! In: two flights of the same parts with the same noise, one of them disturbed, each with its record and stated
+//! In: twice two flights of the same parts with the same noise, one of them disturbed, each with its record and stated
 //! environment. Out: the marginal signal to noise ratio, sqrt(d' (I + N L N')^-1 d) over standardised differences d of
 //! "measured minus what the record says", where N holds for each channel a bias, a scale and two axis errors, and for each part,
 //! which converts all of its channels at once, the instant of sampling, with the sigmas of the unit's description: the measure in
 //! which the diagnosis' targets are stated.
+//!
+//! One d is of the first two flights and the other of the second two, which have another noise: below a count the difference
+//! of two codes is mostly rounding, which the square would count and this product does not.
 //!
 //! What is random from sample to sample has no shape that could be matched, only a variance: of it the ratio is that of the
 //! best test of a variance, sqrt(sum of E^2 / 2n) over stretches of n samples whose energy is E.
@@ -41,30 +44,54 @@ const OWN: usize = 4;
 /// Samples of a stretch in which a variance is taken as one: four seconds.
 const STRETCH: usize = 20;
 
-/// Over packets whose time is below `until_s`; `random` if it is so from sample to sample.
-pub fn marginal_snr(disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64, random: bool) -> f64 {
-    let mut parts: BTreeMap<(&str, usize), Vec<Differences>> = BTreeMap::new();
+/// Of flights "disturbed, undisturbed", over packets whose time is below `until_s`; `random` if it is so from sample to sample.
+pub fn marginal_snr(flights: [[&Told; 2]; 2], instants: &Instants, until_s: f64, random: bool) -> f64 {
+    let mut parts: BTreeMap<(&str, usize), Vec<[Differences; 2]>> = BTreeMap::new();
     for (index, channel) in CHANNELS.iter().enumerate() {
-        let own = Differences::of(index, disturbed, undisturbed, instants, until_s);
+        let [first, second] = flights.map(|flown| Differences::of(index, flown, instants, until_s));
         let part = (kind(channel.quantity).sensor, channel.plate);
+        let own = first.zip(second).map(|(first, second)| [first, second]);
         parts.entry(part).or_default().extend(own);
     }
     let energy: f64 = match random {
-        true => parts.values().flatten().map(Differences::in_variance).sum(),
+        true => parts.values().flatten().map(|[first, _]| first.in_variance()).sum(),
         false => parts.values().map(|part| in_shape(part)).sum(),
     };
     energy.max(0.0).sqrt()
 }
 
 /// Of the channels of a part. With `M = I + N N'` of a channel's own errors and `t` what its instant does, a common instant of
-/// sigma 1 takes off `(sum t'M^-1 d)^2 / (1 + sum t'M^-1 t)`.
-fn in_shape(part: &[Differences]) -> f64 {
-    let sums: Vector3<f64> = part.iter().map(Differences::products).sum();
-    sums.x - sums.y * sums.y / (1.0 + sums.z)
+/// sigma 1 takes off `(sum t'M^-1 d1) (sum t'M^-1 d2) / (1 + sum t'M^-1 t)`.
+fn in_shape(part: &[[Differences; 2]]) -> f64 {
+    let sums: Vector4<f64> = part.iter().map(products).sum();
+    sums.x - sums.y * sums.z / (1.0 + sums.w)
+}
+
+/// `d1'M^-1 d2`, `t'M^-1 d1`, `t'M^-1 d2` and `t'M^-1 t` over the samples that both flights have.
+fn products([first, second]: &[Differences; 2]) -> Vector4<f64> {
+    let rows: Vec<(usize, usize)> = (first.rows.iter().enumerate())
+        .filter_map(|(at, row)| Some((at, second.rows.binary_search(row).ok()?)))
+        .collect();
+    let nuisance = DMatrix::from_fn(rows.len(), OWN, |row, column| first.nuisance[(rows[row].0, column)]);
+    // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
+    let inner = (nuisance.tr_mul(&nuisance) + DMatrix::identity(OWN, OWN)).cholesky();
+    let product = |one: &DVector<f64>, other: &DVector<f64>| {
+        let [left, right] = [one, other].map(|column| nuisance.tr_mul(column));
+        let imitated = inner.as_ref().map_or(0.0, |inner| left.dot(&inner.solve(&right)));
+        one.dot(other) - imitated
+    };
+    let of = |values: &DVector<f64>, place: fn(&(usize, usize)) -> usize| {
+        DVector::from_iterator(rows.len(), rows.iter().map(|row| values[place(row)]))
+    };
+    let (d1, d2) = (of(&first.difference, |row| row.0), of(&second.difference, |row| row.1));
+    let t = of(&first.aged, |row| row.0);
+    Vector4::new(product(&d1, &d2), product(&t, &d1), product(&t, &d2), product(&t, &t))
 }
 
 /// What a disturbance changes in a channel, in units of noise.
 struct Differences {
+    /// Packets it is of, ascending.
+    rows: Vec<u16>,
     difference: DVector<f64>,
     /// What its own calibration errors may do, times their sigmas.
     nuisance: DMatrix<f64>,
@@ -73,20 +100,6 @@ struct Differences {
 }
 
 impl Differences {
-    /// `d'M^-1 d`, `t'M^-1 d` and `t'M^-1 t`.
-    fn products(&self) -> Vector3<f64> {
-        // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
-        let inner = self.nuisance.tr_mul(&self.nuisance) + DMatrix::identity(OWN, OWN);
-        let inner = inner.cholesky();
-        let product = |one: &DVector<f64>, other: &DVector<f64>| {
-            let [left, right] = [one, other].map(|column| self.nuisance.tr_mul(column));
-            let imitated = inner.as_ref().map_or(0.0, |inner| left.dot(&inner.solve(&right)));
-            one.dot(other) - imitated
-        };
-        let (d, t) = (&self.difference, &self.aged);
-        Vector3::new(product(d, d), product(t, d), product(t, t))
-    }
-
     fn in_variance(&self) -> f64 {
         let stretches = self.difference.as_slice().chunks(STRETCH);
         let of_stretch = |values: &[f64]| {
@@ -101,7 +114,7 @@ impl Differences {
     }
 
     /// `None` for a channel without an axis.
-    fn of(index: usize, disturbed: &Told, undisturbed: &Told, instants: &Instants, until_s: f64) -> Option<Self> {
+    fn of(index: usize, [disturbed, undisturbed]: [&Told; 2], instants: &Instants, until_s: f64) -> Option<Self> {
         let channel = CHANNELS[index];
         let facts = kind(channel.quantity);
         let (lsb, _) = channel.quantity.scale();
@@ -120,7 +133,7 @@ impl Differences {
                 .readings
                 .get(usize::from(reading.counter.checked_sub(first)?))
         };
-        let (mut rows, mut differences, mut aged) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rows, mut nuisances, mut differences, mut aged) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for reading in disturbed.readings {
             let time_s = CYCLE_S * f64::from(reading.counter);
             if time_s >= until_s {
@@ -134,7 +147,8 @@ impl Differences {
             differences.push(((code - quiet) * lsb - axis_b.dot(&(told - felt))) / sigma);
             let [earlier, later] = [-STEP_S, STEP_S].map(|step_s| self::felt(undisturbed, channel, at_s + step_s));
             aged.push(facts.instant_sigma_s * axis_b.dot(&(later - earlier)) / (2.0 * STEP_S) / sigma);
-            rows.push(
+            rows.push(reading.counter);
+            nuisances.push(
                 Vector4::new(
                     facts.bias,
                     facts.scale * axis_b.dot(&felt),
@@ -144,7 +158,8 @@ impl Differences {
             );
         }
         Some(Differences {
-            nuisance: DMatrix::from_fn(rows.len(), OWN, |row, column| rows[row][column]),
+            nuisance: DMatrix::from_fn(rows.len(), OWN, |row, column| nuisances[row][column]),
+            rows,
             difference: DVector::from_vec(differences),
             aged: DVector::from_vec(aged),
         })
@@ -206,13 +221,8 @@ mod tests {
             .map(|counter| reading(counter, i16::from(counter >= 200)))
             .collect();
         let snr = |readings: &[Reading]| {
-            marginal_snr(
-                &told(readings, &still, &site),
-                &told(&quiet, &still, &site),
-                &instants,
-                80.0,
-                false,
-            )
+            let (disturbed, quiet) = (told(readings, &still, &site), told(&quiet, &still, &site));
+            marginal_snr([[&disturbed, &quiet]; 2], &instants, 80.0, false)
         };
         // One count is 0.85 of a calibration's sigma and 0.37 of the noise's: over 400 packets 7.4 sigmas in all.
         assert!(snr(&biased) < 1.0, "{}", snr(&biased));
@@ -226,12 +236,15 @@ mod tests {
         let mut column = |size: f64| DVector::from_fn(500, |_, _| size * random.normal());
         let aged: Vec<DVector<f64>> = (0..3).map(|_| column(0.5)).collect();
         let late = |signs: [f64; 3]| {
-            let channel = |(aged, sign): (&DVector<f64>, f64)| Differences {
-                difference: aged * (sign * 2.0),
-                nuisance: DMatrix::zeros(aged.len(), OWN),
-                aged: aged.clone(),
+            let channel = |(aged, sign): (&DVector<f64>, f64)| {
+                [(); 2].map(|()| Differences {
+                    rows: (0..aged.len() as u16).collect(),
+                    difference: aged * (sign * 2.0),
+                    nuisance: DMatrix::zeros(aged.len(), OWN),
+                    aged: aged.clone(),
+                })
             };
-            let part: Vec<Differences> = aged.iter().zip(signs).map(channel).collect();
+            let part: Vec<[Differences; 2]> = aged.iter().zip(signs).map(channel).collect();
             in_shape(&part)
         };
         // Two sigmas late are a surprise of four; axes that are late by different times are no lateness of the part: of an energy
@@ -258,13 +271,8 @@ mod tests {
                 reading
             })
             .collect();
-        let snr = marginal_snr(
-            &told(&readings, &tilted, &site),
-            &told(&readings, &still, &site),
-            &instants,
-            80.0,
-            false,
-        );
+        let (wrong, right) = (told(&readings, &tilted, &site), told(&readings, &still, &site));
+        let snr = marginal_snr([[&wrong, &right]; 2], &instants, 80.0, false);
         // Four plates feel 9.8 m/s2 * 0.01 rad * sin in all: rms 0.069 over 0.0458 noise, 400 packets, four plates.
         assert!((snr - 60.0).abs() < 6.0, "{snr}");
     }
@@ -279,6 +287,7 @@ mod tests {
             let nuisance = DMatrix::zeros(difference.len(), OWN);
             let aged = DVector::zeros(difference.len());
             let differences = Differences {
+                rows: (0..difference.len() as u16).collect(),
                 difference,
                 nuisance,
                 aged,

@@ -59,7 +59,7 @@ mod testing {
     impl<const N: usize> Specimen<N> {
         /// No bias, no noise, conversions at whole periods.
         pub fn ideal() -> Self {
-            let mut specimen = Specimen::draw(Noise::new(0), 0.0, 0.0);
+            let mut specimen = Specimen::draw(Noise::new(0), 0.0, 0.0, 0);
             specimen.phase = 0.0;
             specimen
         }

@@ -158,14 +158,15 @@ pub struct Specimen<const N: usize> {
 }
 
 impl<const N: usize> Specimen<N> {
-    /// Draws one. `sigma` and `bias_sigma` are standard deviations in the unit of the quantity.
-    pub fn draw(stream: Noise, sigma: f64, bias_sigma: f64) -> Self {
+    /// Draws one. `sigma` and `bias_sigma` are standard deviations in the unit of the quantity; the same specimen has another
+    /// noise in each `flight`.
+    pub fn draw(stream: Noise, sigma: f64, bias_sigma: f64, flight: u64) -> Self {
         let [phases, biases, noises] = [0, 1, 2].map(|index| stream.stream(index));
         Specimen {
             phase: phases.uniform(0),
             bias: SVector::from_fn(|axis, _| bias_sigma * biases.normal(axis as u64)),
             sigma,
-            axes: core::array::from_fn(|axis| noises.stream(axis as u64)),
+            axes: core::array::from_fn(|axis| noises.stream(flight * N as u64 + axis as u64)),
         }
     }
 
@@ -255,7 +256,7 @@ mod tests {
     #[test]
     fn noise_is_normal_white_and_the_same_on_every_axis() {
         const COUNT: usize = 200_000;
-        let specimen = Specimen::<3>::draw(Noise::new(1).stream(4), 2.0, 0.0);
+        let specimen = Specimen::<3>::draw(Noise::new(1).stream(4), 2.0, 0.0, 0);
         let samples: Vec<_> = (0..COUNT)
             .map(|k| specimen.noise(k as i64 * PERIOD_NS as i64))
             .collect();
