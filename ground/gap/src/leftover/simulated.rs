@@ -32,9 +32,13 @@ const FARTHEST: f64 = 16.0;
 /// Variance of two ages that are a whole period apart, over that of ages evenly between them.
 const AT_ONCE: f64 = 3.0;
 
-/// Variance of a square of noise, and of the part of its clock's scatter that a channel has, before anything is known of it.
+/// Variance of a square of noise.
 const OF_SQUARE: f64 = 2.0;
+
+/// Variance of the part of its clock's scatter that a channel has, before anything is known of it: of a clock that may keep step,
+/// and of one that cannot, which scatters evenly if it is as described.
 const OF_PART_SHOWN: f64 = 1.0;
+const OF_CLOCK: f64 = 0.05;
 
 /// [units of noise] to which the zero of a channel is known.
 const ZERO: f64 = 0.2;
@@ -147,9 +151,6 @@ impl Clock {
     /// squares of the squares, each with the weight that its own scatter leaves it, and evenly where they tell little: what is a
     /// tenth of a thermometer's noise its squares do not show, and it is one line of its spectrum.
     pub fn part_shown(&self, left: impl Iterator<Item = f64>) -> f64 {
-        if !self.may_keep_step() {
-            return 1.0;
-        }
         let (mut along, mut energy) = (0.0, 0.0);
         for (slope, left) in self.slopes.iter().zip(left).filter(|(_, left)| left.is_finite()) {
             let even = (slope * self.period_s).powi(2) / 12.0;
@@ -159,7 +160,8 @@ impl Clock {
             along += weight * even * (square - 1.0);
             energy += weight * even * even;
         }
-        let told = OF_PART_SHOWN / OF_SQUARE;
+        let open = if self.may_keep_step() { OF_PART_SHOWN } else { OF_CLOCK };
+        let told = open / OF_SQUARE;
         ((1.0 + told * along) / (1.0 + told * energy)).clamp(0.0, AT_ONCE)
     }
 
@@ -222,15 +224,19 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_cannot_keep_step_is_spread_evenly_whatever_its_squares_say() {
-        let clock = |period_s: f64| Clock {
-            period_s,
-            instants_s: (0..SAMPLES).map(|row| row as f64 * 0.2).collect(),
-            slopes: vec![1.0 / period_s; SAMPLES],
+    fn a_clock_that_cannot_keep_step_is_spread_evenly_unless_much_says_otherwise() {
+        let shown = |period_s: f64, slope: f64| {
+            let clock = Clock {
+                period_s,
+                instants_s: (0..SAMPLES).map(|row| row as f64 * 0.2).collect(),
+                slopes: vec![slope / period_s; SAMPLES],
+            };
+            clock.part_shown((0..SAMPLES).map(|_| 1.0))
         };
-        let quiet = || (0..SAMPLES).map(|_| 0.9);
-        assert_eq!(clock(0.25).part_shown(quiet()), 1.0);
-        assert!(clock(0.02).part_shown(quiet()) < 0.1);
+        assert!(shown(0.25, 1.0) > 0.8, "{}", shown(0.25, 1.0));
+        assert!(shown(0.02, 1.0) < 0.2, "{}", shown(0.02, 1.0));
+        // Twice the noise, and none of it there: no such clock.
+        assert!(shown(0.25, 5.0) < 0.2, "{}", shown(0.25, 5.0));
     }
 
     #[test]
