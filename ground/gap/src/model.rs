@@ -7,6 +7,9 @@ use crate::{
     problem::{Component, Problem},
 };
 
+/// Square root of an energy, in units of noise, that no test of what is left sees.
+const AT_BEST: f64 = 0.5;
+
 /// Effects with everything else refitted around them.
 pub struct Model {
     /// The effects.
@@ -20,8 +23,21 @@ pub struct Model {
 }
 
 impl Model {
-    /// Refits calibration and reference around effects whose parameters `theta` are the best already.
+    /// Refits calibration and reference around effects whose parameters `theta` are the best already, or nearly: where the
+    /// calibration can take the place of a part of an effect a little more noise in one channel moves both far, and what is
+    /// predicted must have both from one fit.
     pub fn around(problem: &Problem, components: Vec<Component>) -> Self {
+        let near = Model::linear(problem, components);
+        let off = near.off(problem);
+        if off < AT_BEST {
+            return near;
+        }
+        let moved = Model::linear(problem, near.at_best(problem));
+        if moved.off(problem) < off { moved } else { near }
+    }
+
+    /// Everything fitted with the effects' slopes about their parameters; predicted with these.
+    fn linear(problem: &Problem, components: Vec<Component>) -> Self {
         let mut slopes = problem.reference_columns();
         let mut sigmas: Vec<f64> = problem.reference.iter().map(|column| column.sigma).collect();
         let mut values = vec![0.0; slopes.len()];
@@ -52,6 +68,31 @@ impl Model {
             fitted,
             predicted,
         }
+    }
+
+    /// Its effects with the parameters that the fit found.
+    fn at_best(&self, problem: &Problem) -> Vec<Component> {
+        let mut found = self.fitted.parameters.iter().skip(problem.reference.len());
+        let mut components = self.components.clone();
+        for component in &mut components {
+            if !component.active.cause.parameters(problem.twin.unit()).is_empty() {
+                let theta = component.active.theta.iter_mut();
+                theta.zip(&mut found).for_each(|(theta, found)| *theta = *found);
+            }
+        }
+        components
+    }
+
+    /// How far what is predicted is from what the fit found, in square roots of the energy of noise.
+    fn off(&self, problem: &Problem) -> f64 {
+        let of = |(channel, rest): (usize, &DVector<f64>)| -> f64 {
+            let (frame, predicted) = (&problem.frames[channel], &self.predicted[channel]);
+            let rows = frame.series.rows.iter().zip(&frame.series.values);
+            let left = rows.map(|(row, value)| value - predicted[*row as usize]);
+            let both = left.zip(frame.weights.iter()).zip(rest.iter());
+            both.map(|((left, weight), rest)| (left / weight - rest).powi(2)).sum()
+        };
+        self.fitted.rest.iter().enumerate().map(of).sum::<f64>().sqrt()
     }
 
     /// The energy of what is left, per channel.

@@ -123,3 +123,27 @@ fn what_comes_again_is_found_with_its_period() {
         assert!(none.is_none(), "{none:?}");
     }
 }
+
+#[test]
+fn what_is_predicted_is_of_one_fit_where_the_calibration_can_take_the_place_of_the_effect() {
+    // A part of a delay of 20 ms may be the instants of the channels.
+    let folder = erring(|t_s| rate(t_s - 0.02) - rate(t_s), "instant_sigma_s = 0.003\n");
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let mut library = Library::new(&problem, &[], &|_| {});
+    let found = attribute(&problem, &mut library, &|_| {});
+    let mut components = found.model(&library);
+    components[0].active.theta[0] += 0.004;
+    let model = Model::around(&problem, components);
+    for (channel, (frame, rest)) in problem.frames.iter().zip(&model.fitted.rest).enumerate() {
+        let rows = frame
+            .series
+            .rows
+            .iter()
+            .zip(&frame.series.values)
+            .zip(frame.weights.iter());
+        let left = rows.map(|((row, value), weight)| (value - model.predicted[channel][*row as usize]) / weight);
+        let off: f64 = left.zip(rest.iter()).map(|(left, rest)| (left - rest).powi(2)).sum();
+        assert!(off < 1.0, "channel {channel}: {off}");
+    }
+}
