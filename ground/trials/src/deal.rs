@@ -51,6 +51,9 @@ const STEPS: usize = 6;
 const FURTHEST: f64 = 10.0;
 const CLOSE: f64 = 0.02;
 
+/// Powers of the strength with which a ratio may go.
+const POWERS: [f64; 2] = [0.5, 3.0];
+
 /// Largest strength of what has a name, in typical sizes: no part of its kind is worse, and the priors of a diagnosis say so.
 const LARGEST: f64 = 5.0;
 
@@ -143,7 +146,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             true => {
                 let largest = if ring == Ring::R3 { LARGEST_NOVEL } else { LARGEST };
                 // The ratio of a variance goes with the square of its strength.
-                sized(wanted, if disturbance.random { 0.5 } else { 1.0 }, largest, at)
+                sized(wanted, if disturbance.random { 2.0 } else { 1.0 }, largest, at)
             }
         };
         ratios.push(reached);
@@ -171,17 +174,24 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
 }
 
 /// The strength that has the ratio that is wanted, and the ratio that it has: less than what is wanted if that takes more than
-/// the largest. What a clock or a range hides at one size it does not at another, so each is measured.
-fn sized(wanted: f64, power: f64, largest: f64, at: impl Fn(f64) -> f64) -> (f64, f64) {
-    let mut best = (1.0, at(1.0));
-    let (mut strength, mut reached) = best;
+/// the largest. What a clock or a range hides at one size it does not at another, so each is measured; the ratio goes with a
+/// `power` of the strength, of which each measurement tells more.
+fn sized(wanted: f64, mut power: f64, largest: f64, at: impl Fn(f64) -> f64) -> (f64, f64) {
+    let (mut strength, mut reached) = (1.0, at(1.0));
+    let mut best = (strength, reached);
     for _ in 0..STEPS {
-        let factor = (wanted / reached.max(f64::MIN_POSITIVE)).powf(power);
+        let factor = (wanted / reached.max(f64::MIN_POSITIVE)).powf(1.0 / power);
         let next = (strength * factor.clamp(1.0 / FURTHEST, FURTHEST)).min(largest);
-        if (next / strength).ln().abs() < CLOSE {
+        let step = (next / strength).ln();
+        if step.abs() < CLOSE {
             break;
         }
-        (strength, reached) = (next, at(next));
+        let found = at(next);
+        let told = (found / reached).ln() / step;
+        if told.is_finite() {
+            power = told.clamp(POWERS[0], POWERS[1]);
+        }
+        (strength, reached) = (next, found);
         if (reached / wanted).ln().abs() <= (best.1 / wanted).ln().abs() {
             best = (strength, reached);
         }
@@ -300,7 +310,7 @@ mod tests {
         assert_eq!(sized(10.0, 1.0, LARGEST_NOVEL, |_| 0.0), (LARGEST_NOVEL, 0.0));
         // A variance goes with the square.
         assert_eq!(
-            sized(40.0, 0.5, LARGEST, |strength| 0.1 * strength * strength),
+            sized(40.0, 2.0, LARGEST, |strength| 0.1 * strength * strength),
             (5.0, 2.5)
         );
         // A delay is hidden by the clock of its part as long as it is small.

@@ -54,7 +54,7 @@ pub fn marginal_snr(flights: [[&Told; 2]; 2], instants: &Instants, until_s: f64,
         parts.entry(part).or_default().extend(own);
     }
     let energy: f64 = match random {
-        true => parts.values().flatten().map(|[first, _]| first.in_variance()).sum(),
+        true => parts.values().flatten().map(in_variance).sum(),
         false => parts.values().map(|part| in_shape(part)).sum(),
     };
     energy.max(0.0).sqrt()
@@ -69,9 +69,7 @@ fn in_shape(part: &[[Differences; 2]]) -> f64 {
 
 /// `d1'M^-1 d2`, `t'M^-1 d1`, `t'M^-1 d2` and `t'M^-1 t` over the samples that both flights have.
 fn products([first, second]: &[Differences; 2]) -> Vector4<f64> {
-    let rows: Vec<(usize, usize)> = (first.rows.iter().enumerate())
-        .filter_map(|(at, row)| Some((at, second.rows.binary_search(row).ok()?)))
-        .collect();
+    let rows = both(first, second);
     let nuisance = DMatrix::from_fn(rows.len(), OWN, |row, column| first.nuisance[(rows[row].0, column)]);
     // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
     let inner = (nuisance.tr_mul(&nuisance) + DMatrix::identity(OWN, OWN)).cholesky();
@@ -88,6 +86,27 @@ fn products([first, second]: &[Differences; 2]) -> Vector4<f64> {
     Vector4::new(product(&d1, &d2), product(&t, &d1), product(&t, &d2), product(&t, &t))
 }
 
+/// Of one channel. The square of a sum of squares of noise is too large; the product of those of every other sample with those
+/// between them is not.
+fn in_variance([first, second]: &[Differences; 2]) -> f64 {
+    let rows = both(first, second);
+    let squares: Vec<f64> = (rows.iter())
+        .map(|(one, other)| first.difference[*one] * second.difference[*other])
+        .collect();
+    let of_stretch = |squares: &[f64]| {
+        let every_other = |from: usize| squares.iter().skip(from).step_by(2).sum::<f64>();
+        4.0 * every_other(0) * every_other(1) / (2.0 * squares.len() as f64)
+    };
+    squares.chunks(STRETCH).map(of_stretch).sum()
+}
+
+/// Places of the samples that both flights have.
+fn both(first: &Differences, second: &Differences) -> Vec<(usize, usize)> {
+    (first.rows.iter().enumerate())
+        .filter_map(|(at, row)| Some((at, second.rows.binary_search(row).ok()?)))
+        .collect()
+}
+
 /// What a disturbance changes in a channel, in units of noise.
 struct Differences {
     /// Packets it is of, ascending.
@@ -100,19 +119,6 @@ struct Differences {
 }
 
 impl Differences {
-    fn in_variance(&self) -> f64 {
-        let stretches = self.difference.as_slice().chunks(STRETCH);
-        let of_stretch = |values: &[f64]| {
-            let (count, energy) = (
-                values.len() as f64,
-                values.iter().map(|value| value * value).sum::<f64>(),
-            );
-            // The square of a sum of n squares of a Gaussian is too large by 2/n.
-            energy * energy / (2.0 * count) / (1.0 + 2.0 / count)
-        };
-        stretches.map(of_stretch).sum()
-    }
-
     /// `None` for a channel without an axis.
     fn of(index: usize, [disturbed, undisturbed]: [&Told; 2], instants: &Instants, until_s: f64) -> Option<Self> {
         let channel = CHANNELS[index];
@@ -286,13 +292,13 @@ mod tests {
         let snr = |difference: DVector<f64>| {
             let nuisance = DMatrix::zeros(difference.len(), OWN);
             let aged = DVector::zeros(difference.len());
-            let differences = Differences {
+            let differences = [(); 2].map(|()| Differences {
                 rows: (0..difference.len() as u16).collect(),
-                difference,
-                nuisance,
-                aged,
-            };
-            differences.in_variance().sqrt()
+                difference: difference.clone(),
+                nuisance: nuisance.clone(),
+                aged: aged.clone(),
+            });
+            in_variance(&differences).sqrt()
         };
         assert!((snr(difference.clone()) - 4500.0 / 30_000f64.sqrt()).abs() < 1.0);
         // All of it in a tenth of the time is plainer by the root of ten.
