@@ -184,6 +184,9 @@ pub fn onsets(starts_s: &[f64]) -> impl Iterator<Item = f64> {
     (1..=ONSETS).map(move |k| from_s + (to_s - from_s) * k as f64 / (ONSETS + 1) as f64)
 }
 
+/// ln probability of some logs, as a function of an effect's parameters.
+pub type Likelihood<'a> = Box<dyn Fn(&[f64]) -> f64 + 'a>;
+
 /// A physical effect.
 pub trait Effect: Sync {
     /// What it is.
@@ -206,7 +209,7 @@ pub trait Effect: Sync {
     }
 
     /// The same as a function of the parameters, for a search: what does not depend on them is done once.
-    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Box<dyn Fn(&[f64]) -> f64 + 'a> {
+    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
         Box::new(move |theta| self.log_likelihood(theta, variant, views))
     }
 

@@ -11,7 +11,7 @@ use core::f64::consts::{PI, TAU};
 
 use super::line::{BLOCKS, Block, first_bin, mean_of, spectra, summed};
 use super::spread::{View, mixed};
-use super::{Effect, Nature, Page, Symbol};
+use super::{Effect, Likelihood, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
 
@@ -70,7 +70,7 @@ impl Effect for Vibration {
         self.likelihood(variant, views)(theta)
     }
 
-    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Box<dyn Fn(&[f64]) -> f64 + 'a> {
+    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
         if variant == WANDERS {
             return Box::new(|theta| views.iter().map(|view| wandering(theta[0], view)).sum());
         }

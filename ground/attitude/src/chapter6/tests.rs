@@ -85,9 +85,9 @@ fn both_methods_find_the_biases_the_parts_were_made_with() {
     // As `twin::plant` draws them: a stream a plate, the gyros' after the plates', in it a stream a part.
     let stream = |number: usize, part: u64| Noise::new(SEED).stream(number as u64).stream(part);
     for plate in 0..4 {
-        let acc = Specimen::<3>::draw(stream(plate, 0), 0.0, 0.02 / ACC_LSB).bias;
-        let mag = Specimen::<3>::draw(stream(plate, 1), 0.0, 0.1 / MAG_LSB_UT).bias;
-        let gyro = Specimen::<1>::draw(stream(4 + plate, 0), 0.0, 0.0015 / GYRO_LSB).bias;
+        let acc = Specimen::<3>::draw(stream(plate, 0), 0.0, 0.02 / ACC_LSB, 0).bias;
+        let mag = Specimen::<3>::draw(stream(plate, 1), 0.0, 0.1 / MAG_LSB_UT, 0).bias;
+        let gyro = Specimen::<1>::draw(stream(4 + plate, 0), 0.0, 0.0015 / GYRO_LSB, 0).bias;
         for axis in 0..3 {
             let k = 3 * plate + axis;
             same("acc, LMS EC", lms_ec.acc[k].bias_counts, acc[axis]);
