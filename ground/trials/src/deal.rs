@@ -30,7 +30,7 @@ use crate::{
     motion::{Style, Wander},
     scene::Scene,
     sensitivity::{self, Told},
-    unit,
+    strength, unit,
 };
 
 /// [s] of a case, and where its fit window ends and its hold window begins.
@@ -45,14 +45,6 @@ const SNR: (f64, f64) = (8.0, 100.0);
 
 /// The one of a case whose disturbance is given: plain, but not by its mere size.
 const GIVEN_SNR: f64 = 30.0;
-
-/// Steps of the search for a strength, the largest factor of one, and the logarithm of one that is none.
-const STEPS: usize = 6;
-const FURTHEST: f64 = 10.0;
-const CLOSE: f64 = 0.02;
-
-/// Powers of the strength with which a ratio may go.
-const POWERS: [f64; 2] = [0.5, 3.0];
 
 /// Largest strength of what has a name, in typical sizes: no part of its kind is worse, and the priors of a diagnosis say so.
 const LARGEST: f64 = 5.0;
@@ -146,7 +138,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             true => {
                 let largest = if ring == Ring::R3 { LARGEST_NOVEL } else { LARGEST };
                 // The ratio of a variance goes with the square of its strength.
-                sized(wanted, if disturbance.random { 2.0 } else { 1.0 }, largest, at)
+                strength::sized(wanted, if disturbance.random { 2.0 } else { 1.0 }, largest, at)
             }
         };
         ratios.push(reached);
@@ -171,32 +163,6 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         effects,
         snr_marginal: ratios.iter().copied().fold(0.0, f64::hypot),
     })
-}
-
-/// The strength that has the ratio that is wanted, and the ratio that it has: less than what is wanted if that takes more than
-/// the largest. What a clock or a range hides at one size it does not at another, so each is measured; the ratio goes with a
-/// `power` of the strength, of which each measurement tells more.
-fn sized(wanted: f64, mut power: f64, largest: f64, at: impl Fn(f64) -> f64) -> (f64, f64) {
-    let (mut strength, mut reached) = (1.0, at(1.0));
-    let mut best = (strength, reached);
-    for _ in 0..STEPS {
-        let factor = (wanted / reached.max(f64::MIN_POSITIVE)).powf(1.0 / power);
-        let next = (strength * factor.clamp(1.0 / FURTHEST, FURTHEST)).min(largest);
-        let step = (next / strength).ln();
-        if step.abs() < CLOSE {
-            break;
-        }
-        let found = at(next);
-        let told = (found / reached).ln() / step;
-        if told.is_finite() {
-            power = told.clamp(POWERS[0], POWERS[1]);
-        }
-        (strength, reached) = (next, found);
-        if (reached / wanted).ln().abs() <= (best.1 / wanted).ln().abs() {
-            best = (strength, reached);
-        }
-    }
-    best
 }
 
 /// A flight of a scene.
@@ -302,58 +268,6 @@ fn case_toml(name: &str, style: Style, claimed: &Environment) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_a_motion_does_not_bring_out_has_a_small_ratio() {
-        assert_eq!(sized(12.0, 1.0, LARGEST, |strength| 40.0 * strength).0, 0.3);
-        // A leak of a rate about an axis that never turns.
-        assert_eq!(sized(10.0, 1.0, LARGEST_NOVEL, |_| 0.0), (LARGEST_NOVEL, 0.0));
-        // A variance goes with the square.
-        assert_eq!(
-            sized(40.0, 2.0, LARGEST, |strength| 0.1 * strength * strength),
-            (5.0, 2.5)
-        );
-        // A delay is hidden by the clock of its part as long as it is small.
-        let (strength, reached) = sized(20.0, 1.0, LARGEST, |strength| strength.max(8.0 * strength * strength));
-        assert!(
-            (reached / 20.0).ln().abs() < 0.1 && strength < 2.0,
-            "{strength} {reached}"
-        );
-    }
-
-    #[test]
-    fn a_delay_within_the_clock_of_a_part_is_no_disturbance() {
-        const LONG_S: f64 = 60.0;
-        let instants = flight::instants(3).expect("derived frames");
-        let fly = |delay_s: f64, flight: u64| {
-            let wander = Wander::draw(Style::Hand, true, LONG_S + 2.0, &mut Draw::new(11));
-            let mut scene = Scene::new(wander, Environment::laboratory(), &mut Draw::new(12));
-            for view in &mut scene.views.field_p_ut {
-                let prompt = view.clone();
-                *view = std::sync::Arc::new(move |t_s| prompt(t_s - delay_s));
-            }
-            let quality = Quality {
-                flight,
-                ..Quality::NOMINAL
-            };
-            let plant = Plant::seeing(&scene.views, scene.source.clone(), 3, quality);
-            Flown {
-                readings: flight::fly(plant, LONG_S + 1.0),
-                scene,
-                touched: Vec::new(),
-            }
-        };
-        let [quiet, late] = [0.0, 0.002].map(|delay_s| [0, 1].map(|flight| fly(delay_s, flight)));
-        let snr = |second: usize| {
-            let of = |flight: usize| [late[flight].told(), quiet[flight].told()];
-            let [first, second] = [of(0), of(second)];
-            let flights = [[&first[0], &first[1]], [&second[0], &second[1]]];
-            sensitivity::marginal_snr(flights, &instants, LONG_S, false)
-        };
-        // Half of a sigma of each of four clocks. Squared, the rounding of codes is most of it.
-        assert!(snr(1) < 2.5, "{}", snr(1));
-        assert!(snr(0) > 5.0, "{}", snr(0));
-    }
 
     #[test]
     fn a_seed_is_a_case() {

@@ -19,4 +19,5 @@ pub mod reliability;
 pub mod scene;
 pub mod score;
 mod sensitivity;
+mod strength;
 mod unit;

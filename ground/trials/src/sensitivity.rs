@@ -199,9 +199,15 @@ mod tests {
     use std::sync::Arc;
 
     use nalgebra::UnitQuaternion;
+    use twin::plant::{Plant, Quality};
 
     use super::*;
-    use crate::{draw::Draw, flight::instants};
+    use crate::{
+        draw::Draw,
+        flight::{fly, instants},
+        motion::{Style, Wander},
+        scene::Scene,
+    };
 
     fn told<'a>(readings: &'a [Reading], record: &'a Record, claimed: &'a Environment) -> Told<'a> {
         Told {
@@ -310,5 +316,39 @@ mod tests {
             }
         });
         assert!((snr(bursts) / snr(difference) - 10f64.sqrt()).abs() < 0.5);
+    }
+
+    #[test]
+    fn a_delay_within_the_clock_of_a_part_is_no_disturbance() {
+        const LONG_S: f64 = 60.0;
+        let instants = instants(3).expect("derived frames");
+        let flown = |delay_s: f64, flight: u64| {
+            let wander = Wander::draw(Style::Hand, true, LONG_S + 2.0, &mut Draw::new(11));
+            let mut scene = Scene::new(wander, Environment::laboratory(), &mut Draw::new(12));
+            for view in &mut scene.views.field_p_ut {
+                let prompt = view.clone();
+                *view = Arc::new(move |t_s| prompt(t_s - delay_s));
+            }
+            let quality = Quality {
+                flight,
+                ..Quality::NOMINAL
+            };
+            let plant = Plant::seeing(&scene.views, scene.source.clone(), 3, quality);
+            (fly(plant, LONG_S + 1.0), scene)
+        };
+        let flights = [0, 1].map(|flight| [0.002, 0.0].map(|delay_s| flown(delay_s, flight)));
+        let snr = |second: usize| {
+            let told = |flight: usize| {
+                [0, 1].map(|which| {
+                    let (readings, scene) = &flights[flight][which];
+                    told(readings, &scene.record, &scene.claimed)
+                })
+            };
+            let told = [told(0), told(second)];
+            marginal_snr(told.each_ref().map(|told| told.each_ref()), &instants, LONG_S, false)
+        };
+        // Half of a sigma of each of four clocks. Squared, the rounding of codes is most of it.
+        assert!(snr(1) < 2.5, "{}", snr(1));
+        assert!(snr(0) > 5.0, "{}", snr(0));
     }
 }
