@@ -55,7 +55,8 @@ const MEDIAN_OF_NORMAL: f64 = 0.6745;
 /// [nats] what a part's own clock explains of a log.
 pub fn own_clock(view: &View) -> f64 {
     let sigma_s = instant_sigma_s(view.channel);
-    let is_polled = view.channel.bits.is_some() && view.channel.sensor != Kind::Thermometer;
+    let is_said = view.channel.bits.is_some() || view.channel.instant_sigma_s.is_some();
+    let is_polled = is_said && view.channel.sensor != Kind::Thermometer;
     let jitter = twin::effect::by_name("sampling-jitter").filter(|_| is_polled && sigma_s > 0.0);
     jitter.map_or(0.0, |jitter| {
         (jitter.log_likelihood(&[sigma_s], 0.0, &[*view]) - view.nominal()).max(0.0)
