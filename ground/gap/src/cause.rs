@@ -140,12 +140,15 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
                 prior_sigma: symbol.prior_sigma,
                 signed: symbol.signed,
             };
-            // A scale of scatter fitted to n samples is known to one part in the root of 2n.
+            // A scale of scatter fitted to n samples is known to one part in the root of 2n, a line's amplitude to the noise
+            // over the root of n/2.
             let samples = subject.fit.channels[*channel].rows.len().max(1) as f64;
+            let relative = value.abs() / (2.0 * samples).sqrt();
+            let is_line = scatter.is_line();
             parameters.push(Sized {
                 parameter,
                 value: *value,
-                sigma: value.abs() / (2.0 * samples).sqrt(),
+                sigma: if is_line { (2.0 / samples).sqrt() } else { relative },
             });
         }
     }

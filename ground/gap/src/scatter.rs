@@ -108,6 +108,11 @@ impl Scatter {
         }
     }
 
+    /// Whether it is a line of one frequency, of some amplitude in each channel.
+    pub fn is_line(&self) -> bool {
+        blocks::is_hidden(self.effect) && self.variant > 0.0
+    }
+
     /// Whether it says what the samples of a channel were before it.
     pub fn tells_of(&self, channel: usize) -> bool {
         let told = self.channels.iter().zip(&self.beneath);

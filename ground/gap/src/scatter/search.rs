@@ -329,7 +329,13 @@ impl<'a> Search<'a> {
             if gain > price {
                 scatter.gain += gain - price;
                 scatter.channels.extend(block);
-                scatter.thetas.extend(block.iter().map(|_| found.theta.clone()));
+                // A line has one frequency, and in each channel a size of its own.
+                let is_line = blocks::is_hidden(effect) && variant > 0.0 && block.len() > 1;
+                let own = |channel: &usize| match is_line {
+                    true => most_likely(effect, variant, &self.views(&[*channel], |channel| &self.near[channel])).0,
+                    false => found.theta.clone(),
+                };
+                scatter.thetas.extend(block.iter().map(own));
                 scatter.beneath.extend(found.beneath);
             }
         }
