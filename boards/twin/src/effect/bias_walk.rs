@@ -6,12 +6,17 @@
 use core::f64::consts::PI;
 
 use super::spread::View;
-use super::{Effect, Nature, Page, Symbol};
+use super::{Effect, Likelihood, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
 
 /// Terms looked at.
 const TERMS: usize = 48;
+
+/// `x_k` of term k.
+fn place(term: usize) -> f64 {
+    (term as f64 - 0.5) * PI
+}
 
 /// Of the residual along sin(x t/T) of unit norm.
 fn coefficient(view: &View, x: f64) -> f64 {
@@ -47,23 +52,30 @@ impl Effect for BiasWalk {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
-        let _ = variant;
-        let of = |view: &View| -> f64 {
-            let (count, span_s) = (
-                view.t_s.len() as f64,
-                view.t_s.last().unwrap_or(&0.0) - view.t_s.first().unwrap_or(&0.0),
-            );
-            let white = view.channel.sigma().powi(2);
-            let change = |term: usize| {
-                let x = (term as f64 - 0.5) * PI;
-                let energy = coefficient(view, x).powi(2);
-                let variance = |walk: f64| white + (walk * span_s / x).powi(2) * count / span_s.max(f64::MIN_POSITIVE);
-                let (with, without) = (variance(theta[0].hypot(view.channel.drift_sigma)), white);
-                0.5 * ((without / with).ln() + energy / without - energy / with)
+        self.likelihood(variant, views)(theta)
+    }
+
+    fn likelihood<'a>(&'a self, _variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
+        let energies = |view: &View| (1..=TERMS).map(|term| coefficient(view, place(term)).powi(2)).collect();
+        let known: Vec<(f64, Vec<f64>)> = views.iter().map(|view| (view.nominal(), energies(view))).collect();
+        Box::new(move |theta| {
+            let of = |(view, (nominal, energies)): (&View, &(f64, Vec<f64>))| -> f64 {
+                let (count, span_s) = (
+                    view.t_s.len() as f64,
+                    view.t_s.last().unwrap_or(&0.0) - view.t_s.first().unwrap_or(&0.0),
+                );
+                let white = view.channel.sigma().powi(2);
+                let change = |(term, energy): (usize, &f64)| {
+                    let x = place(term);
+                    let variance =
+                        |walk: f64| white + (walk * span_s / x).powi(2) * count / span_s.max(f64::MIN_POSITIVE);
+                    let (with, without) = (variance(theta[0].hypot(view.channel.drift_sigma)), white);
+                    0.5 * ((without / with).ln() + energy / without - energy / with)
+                };
+                nominal + (1..=TERMS).zip(energies).map(change).sum::<f64>()
             };
-            view.nominal() + (1..=TERMS).map(change).sum::<f64>()
-        };
-        views.iter().map(of).sum()
+            views.iter().zip(&known).map(of).sum()
+        })
     }
 
     fn disturb(&self, theta: &[f64], variant: f64, views: &[View], noise: Noise) -> Vec<Vec<f64>> {

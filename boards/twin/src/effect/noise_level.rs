@@ -31,8 +31,8 @@ impl Effect for NoiseLevel {
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let _ = variant;
         let of = |view: &View| -> f64 {
-            let sigma = view.channel.sigma() * theta[0].exp();
-            view.residuals().map(|(_, residual)| view.normal(residual, sigma)).sum()
+            let law = view.normal_law(view.channel.sigma() * theta[0].exp());
+            view.residuals().map(|(_, residual)| law(residual)).sum()
         };
         views.iter().map(of).sum()
     }

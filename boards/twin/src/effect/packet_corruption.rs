@@ -32,9 +32,10 @@ impl Effect for PacketCorruption {
         let _ = variant;
         let p = theta[0].clamp(0.0, 0.999);
         let of = |view: &View| -> f64 {
-            let (sigma, anything) = (view.channel.sigma(), (view.resolution() / view.span()).ln());
+            let anything = (view.resolution() / view.span()).ln();
+            let law = view.normal_law(view.channel.sigma());
             view.residuals()
-                .map(|(_, residual)| mixed(p, view.normal(residual, sigma), anything))
+                .map(|(_, residual)| mixed(p, law(residual), anything))
                 .sum()
         };
         views.iter().map(of).sum()

@@ -3,7 +3,7 @@
 //! Each reading may be late by itself, or a cycle as a whole: then one number explains what 28 channels read.
 
 use super::spread::{Beneath, View};
-use super::{Effect, Nature, Page, Scope, Symbol};
+use super::{Effect, Likelihood, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
 
@@ -65,24 +65,33 @@ impl Effect for SamplingJitter {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
+        self.likelihood(variant, views)(theta)
+    }
+
+    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
         if variant == OF_CYCLE {
             let nominal: f64 = views.iter().map(View::nominal).sum();
-            let variance = theta[0] * theta[0];
-            // The ratio of a normal law whose covariance has one direction more to one without.
-            let change = |[pull, stiffness]: &[f64; 2]| {
-                let grown = 1.0 + variance * stiffness;
-                0.5 * (variance * pull * pull / grown - grown.ln())
-            };
-            return nominal + cycles(views).iter().map(change).sum::<f64>();
+            let cycles = cycles(views);
+            return Box::new(move |theta| {
+                let variance = theta[0] * theta[0];
+                // The ratio of a normal law whose covariance has one direction more to one without.
+                let change = |[pull, stiffness]: &[f64; 2]| {
+                    let grown = 1.0 + variance * stiffness;
+                    0.5 * (variance * pull * pull / grown - grown.ln())
+                };
+                nominal + cycles.iter().map(change).sum::<f64>()
+            });
         }
-        let of = |view: &View| -> f64 {
-            let slopes = slopes(view);
-            let sigma = |k: usize| view.channel.sigma().hypot(theta[0] * slopes[k]);
-            view.residuals()
-                .map(|(k, residual)| view.normal(residual, sigma(k)))
-                .sum()
-        };
-        views.iter().map(of).sum()
+        let slopes: Vec<Vec<f64>> = views.iter().map(slopes).collect();
+        Box::new(move |theta| {
+            let of = |(view, slopes): (&View, &Vec<f64>)| -> f64 {
+                let sigma = |k: usize| view.channel.sigma().hypot(theta[0] * slopes[k]);
+                view.residuals()
+                    .map(|(k, residual)| view.normal(residual, sigma(k)))
+                    .sum()
+            };
+            views.iter().zip(&slopes).map(of).sum()
+        })
     }
 
     fn beneath(&self, theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {

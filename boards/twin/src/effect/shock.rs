@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::spread::{Beneath, View, mixed, unusual_part};
-use super::{Effect, Nature, Page, Scope, Symbol};
+use super::{Effect, Likelihood, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
 
@@ -76,9 +76,10 @@ fn of_rows(views: &[View], variant: f64) -> Vec<[f64; 2]> {
     let mut rows = vec![(0.0, [Jolt::default(); 2]); count];
     for view in views {
         let (sigma, axis_b) = (view.channel.sigma(), view.channel.axis_b);
+        let law = view.normal_law(sigma);
         let of_kind = usize::from(view.channel.sensor == Kind::Gyro);
         for (k, residual) in view.residuals() {
-            rows[k].0 += view.normal(residual, sigma);
+            rows[k].0 += law(residual);
             rows[k].1[of_kind].add(axis_b, residual / sigma);
         }
     }
@@ -98,12 +99,18 @@ impl Effect for Shock {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
-        let p = theta[0].clamp(0.0, 0.999);
+        self.likelihood(variant, views)(theta)
+    }
+
+    fn likelihood<'a>(&'a self, variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
         let rows = of_rows(views, variant);
-        let hits: f64 = rows.iter().map(|[usual, hit]| unusual_part(p, *usual, *hit)).sum();
-        let is_rare = hits <= MOST * rows.len() as f64;
-        let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(p, *usual, *hit) } else { *usual };
-        rows.iter().map(of_row).sum()
+        Box::new(move |theta| {
+            let p = theta[0].clamp(0.0, 0.999);
+            let hits: f64 = rows.iter().map(|[usual, hit]| unusual_part(p, *usual, *hit)).sum();
+            let is_rare = hits <= MOST * rows.len() as f64;
+            let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(p, *usual, *hit) } else { *usual };
+            rows.iter().map(of_row).sum()
+        })
     }
 
     fn beneath(&self, theta: &[f64], variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {

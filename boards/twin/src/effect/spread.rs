@@ -86,8 +86,13 @@ impl View<'_> {
 
     /// ln probability of a sample with this residual under a normal scatter of `sigma`.
     pub fn normal(&self, residual: f64, sigma: f64) -> f64 {
-        let density = -0.5 * (residual / sigma).powi(2) - (sigma * core::f64::consts::TAU.sqrt()).ln();
-        density + self.resolution().ln()
+        self.normal_law(sigma)(residual)
+    }
+
+    /// The same of any residual: the logarithms are taken once.
+    pub fn normal_law(&self, sigma: f64) -> impl Fn(f64) -> f64 {
+        let (width, resolution) = ((sigma * core::f64::consts::TAU.sqrt()).ln(), self.resolution().ln());
+        move |residual| -0.5 * (residual / sigma).powi(2) - width + resolution
     }
 
     /// ln probability that the unrounded value lies within `low` to `high` of its prediction.
@@ -150,8 +155,8 @@ impl View<'_> {
 
     /// ln probability of the log of this channel if nothing is wrong.
     pub fn nominal(&self) -> f64 {
-        let sigma = self.channel.sigma();
-        self.residuals().map(|(_, residual)| self.normal(residual, sigma)).sum()
+        let law = self.normal_law(self.channel.sigma());
+        self.residuals().map(|(_, residual)| law(residual)).sum()
     }
 }
 

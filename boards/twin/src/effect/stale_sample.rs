@@ -1,7 +1,7 @@
 //! Stale samples: now and then a read times out and the value before is sent again.
 
 use super::spread::{Beneath, View, mixed, unusual_part};
-use super::{Effect, Nature, Page, Symbol};
+use super::{Effect, Likelihood, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
 
@@ -47,14 +47,20 @@ impl Effect for StaleSample {
     }
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
-        let _ = variant;
-        let p = theta[0].clamp(0.0, 0.999);
-        let of = |view: &View| -> f64 {
-            let stale = stale(view);
-            let sample = |(k, residual): (usize, f64)| mixed(p, view.normal(residual, view.channel.sigma()), stale[k]);
-            view.residuals().map(sample).sum()
-        };
-        views.iter().map(of).sum()
+        self.likelihood(variant, views)(theta)
+    }
+
+    fn likelihood<'a>(&'a self, _variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
+        let stale: Vec<Vec<f64>> = views.iter().map(stale).collect();
+        Box::new(move |theta| {
+            let p = theta[0].clamp(0.0, 0.999);
+            let of = |(view, stale): (&View, &Vec<f64>)| -> f64 {
+                let law = view.normal_law(view.channel.sigma());
+                let sample = |(k, residual): (usize, f64)| mixed(p, law(residual), stale[k]);
+                view.residuals().map(sample).sum()
+            };
+            views.iter().zip(&stale).map(of).sum()
+        })
     }
 
     fn beneath(&self, theta: &[f64], _variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
