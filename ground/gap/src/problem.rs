@@ -115,6 +115,8 @@ pub struct Problem<'a> {
     pub instrument: &'a Reference,
     /// The twin along what the unit truly did, where that is not what was told.
     retold: Option<Twin>,
+    /// What is open of each channel.
+    open: Vec<Vec<Column>>,
 }
 
 impl<'a> Problem<'a> {
@@ -162,6 +164,7 @@ impl<'a> Problem<'a> {
             reference: Vec::new(),
             instrument,
             retold: None,
+            open: Vec::new(),
         };
         problem.open_all();
         problem
@@ -173,8 +176,8 @@ impl<'a> Problem<'a> {
     }
 
     /// What is open of a channel.
-    pub fn open(&self, channel: usize) -> Vec<Column> {
-        calibration(self.true_twin(), self.instrument, channel)
+    pub fn open(&self, channel: usize) -> &[Column] {
+        &self.open[channel]
     }
 
     /// Takes the motion for what it is with this cause: what the unit's calibration and the field leave open is open along
@@ -190,15 +193,18 @@ impl<'a> Problem<'a> {
 
     /// Makes the columns of what is open.
     fn open_all(&mut self) {
-        for channel in 0..self.frames.len() {
-            let columns = self.open(channel);
-            let frame = &mut self.frames[channel];
+        let channels = 0..self.frames.len();
+        self.open = channels
+            .map(|channel| calibration(self.true_twin(), self.instrument, channel))
+            .collect();
+        for (frame, columns) in self.frames.iter_mut().zip(&self.open) {
             frame.nuisance = DMatrix::from_fn(frame.series.rows.len(), columns.len(), |row, column| {
                 let column = &columns[column];
                 column.entries[0].1[frame.series.rows[row] as usize] * column.sigma / frame.weights[row]
             });
             frame.factorise();
-            frame.nuisance_names = columns.into_iter().map(|column| (column.name, column.sigma)).collect();
+            let names = columns.iter().map(|column| (column.name.clone(), column.sigma));
+            frame.nuisance_names = names.collect();
         }
         self.reference = self.true_twin().field_columns(&self.instrument.accuracy);
         self.settle();
