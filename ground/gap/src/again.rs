@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::{
     evidence::Screen,
     library::Entries,
-    on::On,
+    on::{On, phase},
     problem::{Frame, Problem},
     windows::Span,
 };
@@ -36,6 +36,8 @@ const MARGIN: f64 = 10.0;
 
 /// The residuals of the channels that an effect touches.
 struct Folded<'a> {
+    /// [s] instants of the rows of the log.
+    starts_s: &'a [f64],
     channels: Vec<Channel<'a>>,
     sigmas: &'a [f64],
 }
@@ -73,7 +75,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
     let edges = |around: &[f64], step: f64| -> Vec<f64> {
         let near = |edge: &f64| {
             (-3..=3)
-                .map(|index| (edge + step * f64::from(index)).rem_euclid(1.0))
+                .map(|index| phase(edge + step * f64::from(index)))
                 .collect::<Vec<_>>()
         };
         around.iter().flat_map(near).collect()
@@ -94,7 +96,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
     let from = from_s + on * every_s;
     let stretch = Span {
         from,
-        to: from + (off - on).rem_euclid(1.0) * every_s,
+        to: from + phase(off - on) * every_s,
     };
     let on = On {
         stretch,
@@ -139,6 +141,7 @@ impl<'a> Folded<'a> {
             })
         });
         Folded {
+            starts_s,
             channels: channels.collect(),
             sigmas,
         }
@@ -146,12 +149,14 @@ impl<'a> Folded<'a> {
 
     /// How much the phases of a period differ: the energy of their means.
     fn differ(&self, every_s: f64) -> f64 {
+        let phase_of = |t_s: &f64| (phase(t_s / every_s) * PHASES as f64) as usize % PHASES;
+        let phase_of: Vec<usize> = self.starts_s.iter().map(phase_of).collect();
         let of_channel = |channel: &Channel| -> f64 {
             let mut phases = [(0.0, 0.0); PHASES];
-            for (t_s, left) in channel.t_s.iter().zip(channel.left.iter()) {
-                let phase = ((t_s / every_s).rem_euclid(1.0) * PHASES as f64) as usize % PHASES;
-                phases[phase].0 += left;
-                phases[phase].1 += 1.0;
+            for (row, left) in channel.frame.series.rows.iter().zip(channel.left.iter()) {
+                let phase = &mut phases[phase_of[*row as usize]];
+                phase.0 += left;
+                phase.1 += 1.0;
             }
             phases
                 .iter()
@@ -199,7 +204,7 @@ impl<'a> Folded<'a> {
         for (at, channel) in self.channels.iter().enumerate() {
             let mut rows: Vec<Vec<usize>> = vec![Vec::new(); edges.len()];
             for (row, t_s) in channel.t_s.iter().enumerate() {
-                let phase = ((t_s - from_s) / every_s).rem_euclid(1.0);
+                let phase = phase((t_s - from_s) / every_s);
                 let piece = edges.partition_point(|edge| *edge <= phase);
                 rows[(piece + edges.len() - 1) % edges.len()].push(row);
             }

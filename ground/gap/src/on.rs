@@ -23,6 +23,12 @@ impl On {
     }
 }
 
+/// Part of a cycle, 0 to 1, after so many cycles.
+pub fn phase(cycles: f64) -> f64 {
+    // A remainder by one, and a tenth of its time.
+    cycles - cycles.floor()
+}
+
 impl From<Span> for On {
     fn from(stretch: Span) -> Self {
         On { stretch, every_s: None }

@@ -11,7 +11,7 @@ use rand_distr::{ChiSquared, Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
 use super::{View, codes::Counts, instrument::Played, shared::OF_PART};
-use crate::joint::Joint;
+use crate::{joint::Joint, on::phase};
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
 const TAILS: f64 = 10.0;
@@ -180,7 +180,7 @@ impl Clock {
     fn age(&self, residual: &mut DVector<f64>, random: &mut Xoshiro256PlusPlus) {
         let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
         let step_s = self.step_s();
-        let phase = between(0.0, 1.0);
+        let begun = between(0.0, 1.0);
         let mut period_s = self.period_s;
         for _ in 0..TRIES {
             period_s = self.period_s * (1.0 + between(-OFF, OFF));
@@ -190,7 +190,7 @@ impl Clock {
             }
         }
         let ages_s: Vec<f64> = (self.instants_s.iter())
-            .map(|t_s| (t_s / period_s + phase).rem_euclid(1.0) * period_s)
+            .map(|t_s| phase(t_s / period_s + begun) * period_s)
             .collect();
         let mean_s = ages_s.iter().sum::<f64>() / ages_s.len().max(1) as f64;
         for ((residual, age_s), slope) in residual.iter_mut().zip(ages_s).zip(&self.slopes) {
