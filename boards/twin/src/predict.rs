@@ -12,6 +12,7 @@ mod chain;
 mod emems;
 mod grid;
 mod heading;
+mod input;
 mod scene;
 #[cfg(test)]
 mod tests;
@@ -23,15 +24,13 @@ pub use calibration::{Accuracy, Column};
 pub use chain::Chain;
 pub use emems::{emems, thesis_slot_s};
 pub use grid::{Grid, LowPass};
+use input::{Filters, Look, Memory};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
 
 use crate::effect::{Active, Cause, Nature, Site, UnknownEffect};
 use crate::environment::Environment;
 
-/// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
-/// low-passes divide zero by zero.
-const APART: f64 = 1e-4;
 /// Step of the difference quotients, in prior sigmas: rounding is then 1e-12 of a prior effect and curvature 1e-6.
 const STEP: f64 = 1e-3;
 
@@ -43,7 +42,7 @@ pub struct Twin {
     /// [s] when the cycles begin.
     starts_s: Vec<f64>,
     /// Low-passes of the nominal channels, by kind and time constant.
-    filters: Vec<(Kind, f64, Filter)>,
+    filters: Filters,
     known: Vec<Active>,
     /// What the centre feels when a channel is read, less the delay of its low-pass, by that instant after the start of the
     /// cycle [s]: many effects ask for it, and few move the instants.
@@ -66,7 +65,7 @@ impl Twin {
             .iter()
             .map(|known| Active::known(known, &unit))
             .collect::<Result<_, _>>()?;
-        let mut filters: Vec<(Kind, f64, Filter)> = Vec::new();
+        let mut filters = Filters::new();
         for channel in &unit.channels {
             let (sensor, tau_s) = (channel.sensor, channel.tau_s());
             if !filters.iter().any(|(kind, tau, _)| (*kind, *tau) == (sensor, tau_s)) {
@@ -95,11 +94,12 @@ impl Twin {
         twin.plain = (0..twin.unit.channels.len())
             .map(|index| {
                 let channel = &twin.unit.channels[index];
-                twin.inputs(&Chain::of(channel), channel.tau_s(), &twin.instants_s(index))
+                let look = Look::of(&Chain::of(channel), &twin.instants_s(index));
+                twin.filtered(&look, channel.tau_s(), &mut Filters::new())
             })
             .collect();
         twin.nominal = (0..twin.unit.channels.len())
-            .map(|index| twin.computed(index, &[]))
+            .map(|index| twin.computed(index, &[], &mut Memory::default()))
             .collect();
         Ok(twin)
     }
@@ -181,12 +181,12 @@ impl Twin {
     /// Readings of one channel.
     pub fn channel(&self, index: usize, active: &[Active]) -> Cow<'_, [f64]> {
         match active.iter().any(|active| active.touches(index, &self.unit)) {
-            true => Cow::Owned(self.computed(index, active)),
+            true => Cow::Owned(self.computed(index, active, &mut Memory::default())),
             false => Cow::Borrowed(&self.nominal[index]),
         }
     }
 
-    fn computed(&self, index: usize, active: &[Active]) -> Vec<f64> {
+    fn computed(&self, index: usize, active: &[Active], memory: &mut Memory) -> Vec<f64> {
         let channel = &self.unit.channels[index];
         let t_s = self.instants_s(index);
         let site = self.site(index);
@@ -196,7 +196,7 @@ impl Twin {
         }
         let mut readings = match chain.looks_as(channel) {
             true => self.plain[index].clone(),
-            false => self.inputs(&chain, channel.tau_s(), &t_s),
+            false => self.input(index, Look::of(&chain, &t_s), memory),
         };
         let felt = match chain.is_delayed() {
             true => None,
@@ -220,44 +220,6 @@ impl Twin {
         readings
     }
 
-    /// The channel's input after its filters. Filters in a row are a weighted sum of first-order ones (partial fractions).
-    fn inputs(&self, chain: &Chain, tau_s: f64, t_s: &[f64]) -> Vec<f64> {
-        let through = |tau_s: f64| -> Vec<f64> {
-            let cached = self
-                .filters
-                .iter()
-                .find(|(kind, tau, _)| (*kind, *tau) == (chain.aim.sensor, tau_s));
-            let filter = match cached {
-                Some((_, _, filter)) => Cow::Borrowed(filter),
-                None => Cow::Owned(self.scene.filter(chain.aim.sensor, tau_s)),
-            };
-            t_s.iter()
-                .map(|t_s| self.scene.input(&chain.aim, &filter, chain.instant(*t_s)))
-                .collect()
-        };
-        let mut slow = through(tau_s);
-        if chain.lag_s > 0.0 {
-            let lag_s = apart(chain.lag_s, tau_s);
-            let second = through(lag_s);
-            combine(&mut slow, tau_s / (tau_s - lag_s), &second, -lag_s / (tau_s - lag_s));
-        } else if chain.lag_s < 0.0 {
-            // Low-pass and lead: y + |lag| y', and tau y' = u - y.
-            let lead_s = -chain.lag_s;
-            let tau_s = if tau_s > 0.0 { tau_s } else { lead_s * APART };
-            let sharper = through(0.0);
-            let softer = if slow == sharper { through(tau_s) } else { slow.clone() };
-            combine(&mut slow, 1.0, &sharper, lead_s / tau_s);
-            combine(&mut slow, 1.0, &softer, -lead_s / tau_s);
-        }
-        if let Some(high_pass_s) = chain.high_pass_s {
-            let high_pass_s = apart(high_pass_s, tau_s);
-            let kept = through(high_pass_s);
-            let gain = high_pass_s / (high_pass_s - tau_s);
-            combine(&mut slow, gain, &kept, -gain);
-        }
-        slow
-    }
-
     /// Derivatives of the readings by the parameters of `active[of]`, one column a parameter: central differences, exact
     /// for what is linear. Channels the effect does not touch are left out.
     pub fn jacobian(&self, active: &[Active], of: usize) -> Vec<Column> {
@@ -265,7 +227,7 @@ impl Twin {
         let touched: Vec<usize> = (0..self.unit.channels.len())
             .filter(|&channel| active[of].touches(channel, &self.unit))
             .collect();
-        let mut moved = active.to_vec();
+        let (mut moved, mut memory) = (active.to_vec(), Memory::default());
         let columns = parameters.into_iter().enumerate().map(|(i, parameter)| {
             let step = STEP * parameter.prior_sigma;
             let theta = active[of].theta[i];
@@ -274,7 +236,7 @@ impl Twin {
                 let of_parameter = moved[of].cause.touched_by(i, &self.unit);
                 let channels = touched.iter().copied().filter(|channel| of_parameter.contains(channel));
                 channels
-                    .map(|channel| (channel, self.computed(channel, &moved)))
+                    .map(|channel| (channel, self.computed(channel, &moved, &mut memory)))
                     .collect()
             };
             let (mut entries, before) = (at(theta + step), at(theta - step));
@@ -298,18 +260,4 @@ impl Twin {
 /// constant. What an effect adds comes from then; for terms of some percent of a reading that is exact enough.
 fn seen_s(channel: &Channel) -> f64 {
     channel.slot_s - channel.tau_s()
-}
-
-fn combine(sum: &mut [f64], weight: f64, other: &[f64], other_weight: f64) {
-    for (sum, other) in sum.iter_mut().zip(other) {
-        *sum = *sum * weight + other * other_weight;
-    }
-}
-
-fn apart(tau_s: f64, from_s: f64) -> f64 {
-    if (tau_s - from_s).abs() < APART * from_s {
-        from_s * (1.0 + APART)
-    } else {
-        tau_s
-    }
 }

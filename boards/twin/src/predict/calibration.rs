@@ -10,6 +10,7 @@ use core::f64::consts::{PI, SQRT_2};
 
 use nalgebra::Vector3;
 
+use super::input::{Filters, Look};
 use super::unit::{Channel, Kind};
 use super::{Aim, Twin};
 
@@ -120,7 +121,8 @@ impl Twin {
         let channel = &self.unit.channels[index];
         let mut chain = super::Chain::of(channel);
         chain.read_late(move |_| later_s);
-        self.inputs(&chain, channel.tau_s(), &self.instants_s(index))
+        let look = Look::of(&chain, &self.instants_s(index));
+        self.filtered(&look, channel.tau_s(), &mut Filters::new())
     }
 
     /// What this channel would feel along another axis, without its bias.
@@ -132,7 +134,8 @@ impl Twin {
         };
         let mut chain = super::Chain::of(channel);
         chain.aim = aim;
-        self.inputs(&chain, channel.tau_s(), &self.instants_s(index))
+        let look = Look::of(&chain, &self.instants_s(index));
+        self.filtered(&look, channel.tau_s(), &mut Filters::new())
     }
 
     fn drift<'a>(&self, channel: &Channel, t_s: &'a [f64]) -> impl Iterator<Item = (String, f64, Vec<f64>)> + 'a {

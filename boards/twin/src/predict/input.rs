@@ -1,0 +1,124 @@
+//! The input of a channel after its filters, made once for all questions that have it in common.
+//!
+//! In: what a channel looks at, when, and through what ([`Look`]). Out: its input at those instants. A low-pass runs over the
+//! whole motion and is the same for all sensors of a kind; an input is the same for all effects that are added to it. A
+//! [`Memory`] keeps both from one question to the next, as of a derivative by one parameter after another.
+
+use super::{Aim, Chain, Filter, Kind, Twin};
+
+/// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
+/// low-passes divide zero by zero.
+const APART: f64 = 1e-4;
+
+/// Low-passes by kind and time constant.
+pub(super) type Filters = Vec<(Kind, f64, Filter)>;
+
+/// What a channel's input depends on.
+#[derive(PartialEq)]
+pub(super) struct Look {
+    aim: Aim,
+    /// [s] time constant of the second low-pass, or below zero of a lead.
+    lag_s: f64,
+    /// [s] time constant of the high-pass.
+    high_pass_s: Option<f64>,
+    /// [s] when it is read, one instant a cycle.
+    instants_s: Vec<f64>,
+}
+
+impl Look {
+    /// That of a chain, whose readings are logged at `t_s`.
+    pub fn of(chain: &Chain, t_s: &[f64]) -> Self {
+        Self {
+            aim: chain.aim,
+            lag_s: chain.lag_s,
+            high_pass_s: chain.high_pass_s,
+            instants_s: t_s.iter().map(|t_s| chain.instant(*t_s)).collect(),
+        }
+    }
+}
+
+/// What questions have in common.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// Low-passes beside the nominal channels' own.
+    filters: Filters,
+    /// The latest input of each channel.
+    inputs: Vec<(usize, Look, Vec<f64>)>,
+}
+
+impl Twin {
+    /// The input of a channel that looks so.
+    pub(super) fn input(&self, index: usize, look: Look, memory: &mut Memory) -> Vec<f64> {
+        let Memory { filters, inputs } = memory;
+        let latest = inputs.iter().position(|(channel, ..)| *channel == index);
+        if let Some((_, known, input)) = latest.map(|at| &inputs[at])
+            && *known == look
+        {
+            return input.clone();
+        }
+        let input = self.filtered(&look, self.unit.channels[index].tau_s(), filters);
+        latest.map(|at| inputs.swap_remove(at));
+        inputs.push((index, look, input.clone()));
+        input
+    }
+
+    /// The input through a low-pass of `tau_s` and what the look has beside it; filters that are made for it are added to
+    /// `filters`. Filters in a row are a weighted sum of first-order ones (partial fractions).
+    pub(super) fn filtered(&self, look: &Look, tau_s: f64, filters: &mut Filters) -> Vec<f64> {
+        let mut through = |tau_s: f64| self.through(look, tau_s, filters);
+        let mut slow = through(tau_s);
+        if look.lag_s > 0.0 {
+            let lag_s = apart(look.lag_s, tau_s);
+            let second = through(lag_s);
+            combine(&mut slow, tau_s / (tau_s - lag_s), &second, -lag_s / (tau_s - lag_s));
+        } else if look.lag_s < 0.0 {
+            // Low-pass and lead: y + |lag| y', and tau y' = u - y.
+            let lead_s = -look.lag_s;
+            let tau_s = if tau_s > 0.0 { tau_s } else { lead_s * APART };
+            let sharper = through(0.0);
+            let softer = if slow == sharper { through(tau_s) } else { slow.clone() };
+            combine(&mut slow, 1.0, &sharper, lead_s / tau_s);
+            combine(&mut slow, 1.0, &softer, -lead_s / tau_s);
+        }
+        if let Some(high_pass_s) = look.high_pass_s {
+            let high_pass_s = apart(high_pass_s, tau_s);
+            let kept = through(high_pass_s);
+            let gain = high_pass_s / (high_pass_s - tau_s);
+            combine(&mut slow, gain, &kept, -gain);
+        }
+        slow
+    }
+
+    /// The input through one low-pass.
+    fn through(&self, look: &Look, tau_s: f64, filters: &mut Filters) -> Vec<f64> {
+        let sensor = look.aim.sensor;
+        let at = |filter: &Filter| -> Vec<f64> {
+            let instants_s = look.instants_s.iter();
+            instants_s
+                .map(|t_s| self.scene.input(&look.aim, filter, *t_s))
+                .collect()
+        };
+        let mut known = self.filters.iter().chain(filters.iter());
+        if let Some((.., filter)) = known.find(|(kind, tau, _)| (*kind, *tau) == (sensor, tau_s)) {
+            return at(filter);
+        }
+        let filter = self.scene.filter(sensor, tau_s);
+        let input = at(&filter);
+        filters.push((sensor, tau_s, filter));
+        input
+    }
+}
+
+fn combine(sum: &mut [f64], weight: f64, other: &[f64], other_weight: f64) {
+    for (sum, other) in sum.iter_mut().zip(other) {
+        *sum = *sum * weight + other * other_weight;
+    }
+}
+
+fn apart(tau_s: f64, from_s: f64) -> f64 {
+    if (tau_s - from_s).abs() < APART * from_s {
+        from_s * (1.0 + APART)
+    } else {
+        tau_s
+    }
+}
