@@ -5,13 +5,14 @@
 //! is taken (epoch folding; Leahy et al. 1983); then all stretches of phases are compared by their evidence, finer and finer,
 //! as [`crate::onset`] does for one stretch. Having looked costs the logarithm of how many were compared.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::{
     evidence::Screen,
     library::Entries,
     on::{On, phase},
-    problem::{Frame, Problem},
+    piece::{Piece, Touched},
+    problem::Problem,
     windows::Span,
 };
 
@@ -38,27 +39,17 @@ const MARGIN: f64 = 10.0;
 struct Folded<'a> {
     /// [s] instants of the rows of the log.
     starts_s: &'a [f64],
-    channels: Vec<Channel<'a>>,
+    channels: Vec<Touched<'a>>,
     sigmas: &'a [f64],
-}
-
-/// One of them.
-struct Channel<'a> {
-    frame: &'a Frame,
-    /// [s] instants of its samples.
-    t_s: Vec<f64>,
-    slopes: DMatrix<f64>,
-    /// What the calibration leaves of its residual.
-    left: DVector<f64>,
 }
 
 /// The stretch that comes again in which the effect with these `slopes` is on, and the nats it gains over always; `None` for
 /// none that is much better. `rest` is the residual of every channel without it.
 pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(On, f64)> {
     let folded = Folded::new(problem, rest, slopes, sigmas);
-    let instants = folded.channels.iter().flat_map(|channel| &channel.t_s);
+    let instants = folded.channels.iter().flat_map(|channel| folded.instants_s(channel));
     let (from_s, to_s) = instants.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t_s| {
-        (from.min(*t_s), to.max(*t_s))
+        (from.min(t_s), to.max(t_s))
     });
     let span_s = to_s - from_s;
     let (least_hz, most_hz) = (FEWEST / span_s, 1.0 / SHORTEST_S);
@@ -116,44 +107,28 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
 
 impl<'a> Folded<'a> {
     fn new(problem: &'a Problem<'a>, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &'a [f64]) -> Self {
-        let starts_s = problem.twin.starts_s();
-        let channels = (0..problem.frames.len()).filter_map(|channel| {
-            let of = |entries: &Entries| {
-                let own = entries.iter().find(|(index, _)| *index == channel);
-                own.map(|(_, values)| values.clone())
-            };
-            let columns: Vec<Option<DVector<f64>>> = slopes.iter().map(of).collect();
-            if columns.iter().all(Option::is_none) {
-                return None;
-            }
-            let frame = &problem.frames[channel];
-            let none = DVector::zeros(frame.series.rows.len());
-            let columns: Vec<DVector<f64>> = columns
-                .into_iter()
-                .map(|own| own.unwrap_or_else(|| none.clone()))
-                .collect();
-            let t_s = frame.series.rows.iter().map(|row| starts_s[*row as usize]).collect();
-            Some(Channel {
-                frame,
-                t_s,
-                slopes: DMatrix::from_columns(&columns),
-                left: frame.left(&rest[channel]),
-            })
-        });
+        // What the calibration leaves of it.
+        let left = |channel: usize| problem.frames[channel].left(&rest[channel]);
         Folded {
-            starts_s,
-            channels: channels.collect(),
+            starts_s: problem.twin.starts_s(),
+            channels: Touched::all(problem, slopes, left),
             sigmas,
         }
+    }
+
+    /// [s] instants of a channel's samples.
+    fn instants_s(&self, channel: &Touched) -> impl Iterator<Item = f64> {
+        let rows = channel.frame.series.rows.iter();
+        rows.map(|row| self.starts_s[*row as usize])
     }
 
     /// How much the phases of a period differ: the energy of their means.
     fn differ(&self, every_s: f64) -> f64 {
         let phase_of = |t_s: &f64| (phase(t_s / every_s) * PHASES as f64) as usize % PHASES;
         let phase_of: Vec<usize> = self.starts_s.iter().map(phase_of).collect();
-        let of_channel = |channel: &Channel| -> f64 {
+        let of_channel = |channel: &Touched| -> f64 {
             let mut phases = [(0.0, 0.0); PHASES];
-            for (row, left) in channel.frame.series.rows.iter().zip(channel.left.iter()) {
+            for (row, left) in channel.frame.series.rows.iter().zip(channel.residual.iter()) {
                 let phase = &mut phases[phase_of[*row as usize]];
                 phase.0 += left;
                 phase.1 += 1.0;
@@ -189,27 +164,21 @@ impl<'a> Folded<'a> {
     }
 
     fn none(&self) -> Piece {
-        let width = self.sigmas.len();
-        let open = |channel: &Channel| DMatrix::zeros(channel.frame.nuisance.ncols(), width);
-        Piece {
-            information: DMatrix::zeros(width, width),
-            score: DVector::zeros(width),
-            open: self.channels.iter().map(open).collect(),
-        }
+        Piece::none(&self.channels, self.sigmas.len())
     }
 
     /// Sums between each phase and the next.
     fn pieces(&self, every_s: f64, from_s: f64, edges: &[f64]) -> Vec<Piece> {
         let mut pieces: Vec<Piece> = edges.iter().map(|_| self.none()).collect();
         for (at, channel) in self.channels.iter().enumerate() {
-            let mut rows: Vec<Vec<usize>> = vec![Vec::new(); edges.len()];
-            for (row, t_s) in channel.t_s.iter().enumerate() {
+            let mut samples: Vec<Vec<usize>> = vec![Vec::new(); edges.len()];
+            for (sample, t_s) in self.instants_s(channel).enumerate() {
                 let phase = phase((t_s - from_s) / every_s);
                 let piece = edges.partition_point(|edge| *edge <= phase);
-                rows[(piece + edges.len() - 1) % edges.len()].push(row);
+                samples[(piece + edges.len() - 1) % edges.len()].push(sample);
             }
-            for (piece, rows) in pieces.iter_mut().zip(rows) {
-                piece.add(at, channel, &rows);
+            for (piece, samples) in pieces.iter_mut().zip(samples) {
+                piece.add(at, channel, &samples);
             }
         }
         pieces
@@ -219,9 +188,10 @@ impl<'a> Folded<'a> {
     fn within(&self, on: On, part: Span) -> Screen {
         let mut piece = self.none();
         for (at, channel) in self.channels.iter().enumerate() {
-            let is_in = |row: &usize| on.contains(channel.t_s[*row]) && part.contains(channel.t_s[*row]);
-            let rows: Vec<usize> = (0..channel.t_s.len()).filter(is_in).collect();
-            piece.add(at, channel, &rows);
+            let is_in = |(_, t_s): &(usize, f64)| on.contains(*t_s) && part.contains(*t_s);
+            let samples = self.instants_s(channel).enumerate().filter(is_in);
+            let samples: Vec<usize> = samples.map(|(sample, _)| sample).collect();
+            piece.add(at, channel, &samples);
         }
         self.screen(&piece)
     }
@@ -244,40 +214,6 @@ impl<'a> Folded<'a> {
     }
 
     fn screen(&self, piece: &Piece) -> Screen {
-        let mut screen = Screen::zeros(self.sigmas.to_vec());
-        screen.information.copy_from(&piece.information);
-        // What is left by the calibration has its part taken off already.
-        screen.score.copy_from(&piece.score);
-        piece
-            .open
-            .iter()
-            .for_each(|open| screen.information -= open.tr_mul(open));
-        screen
-    }
-}
-
-/// Sums of one stretch: products of the slopes, with what is left, and what the calibration can imitate.
-struct Piece {
-    information: DMatrix<f64>,
-    score: DVector<f64>,
-    open: Vec<DMatrix<f64>>,
-}
-
-impl Piece {
-    /// Adds samples of one channel, the `at`-th.
-    fn add(&mut self, at: usize, channel: &Channel, rows: &[usize]) {
-        let slopes = channel.slopes.select_rows(rows);
-        self.information += slopes.tr_mul(&slopes);
-        self.score += slopes.tr_mul(&channel.left.select_rows(rows));
-        let mut open = channel.frame.nuisance.select_rows(rows).tr_mul(&slopes);
-        channel.frame.solve_open(&mut open);
-        self.open[at] += open;
-    }
-
-    fn and(mut self, other: &Piece) -> Self {
-        self.information += &other.information;
-        self.score += &other.score;
-        (self.open.iter_mut().zip(&other.open)).for_each(|(sum, open)| *sum += open);
-        self
+        piece.screen(&self.channels, self.sigmas, &[])
     }
 }

@@ -45,6 +45,7 @@ pub mod on;
 pub mod onset;
 pub mod open;
 pub mod page;
+pub mod piece;
 pub mod place;
 pub mod problem;
 pub mod products;

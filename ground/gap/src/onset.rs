@@ -6,9 +6,14 @@
 //! of their number. A stretch that reaches an end of the fit is open there. Only effects whose cause
 //! [passes](twin::effect::Page::passes) have stretches.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use crate::{evidence::Screen, library::Entries, problem::Problem, windows::Span};
+use crate::{
+    library::Entries,
+    piece::{Piece, Touched},
+    problem::Problem,
+    windows::Span,
+};
 
 /// Instants at which an effect may begin or end.
 const EDGES: usize = 41;
@@ -22,33 +27,6 @@ const FINE: i32 = 8;
 /// [nats] a stretch must gain over always, beyond the price of having looked.
 const MARGIN: f64 = 10.0;
 
-/// Sums of one stretch: products of the columns, with the residual, and what the calibration can imitate.
-struct Piece {
-    information: DMatrix<f64>,
-    score: DVector<f64>,
-    open: Vec<DMatrix<f64>>,
-}
-
-impl Piece {
-    fn none(problem: &Problem, touched: &[usize], width: usize) -> Self {
-        let open = |channel: &usize| DMatrix::zeros(problem.frames[*channel].nuisance.ncols(), width);
-        Piece {
-            information: DMatrix::zeros(width, width),
-            score: DVector::zeros(width),
-            open: touched.iter().map(open).collect(),
-        }
-    }
-
-    fn add(&mut self, other: &Piece) {
-        self.information += &other.information;
-        self.score += &other.score;
-        self.open
-            .iter_mut()
-            .zip(&other.open)
-            .for_each(|(sum, open)| *sum += open);
-    }
-}
-
 /// The stretch of time in which the effect with these `slopes` is on, and the nats it gains over always, the price of having
 /// looked taken off; `None` for always. `rest` is the residual of every channel without it.
 pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(Span, f64)> {
@@ -61,41 +39,23 @@ pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sig
     let (from_s, to_s) = rows.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t| {
         (from.min(t), to.max(t))
     });
-    let touched: Vec<usize> = (0..problem.frames.len())
-        .filter(|channel| {
-            slopes
-                .iter()
-                .any(|entries| entries.iter().any(|(index, _)| index == channel))
-        })
-        .collect();
-    let residuals: Vec<&DVector<f64>> = touched.iter().map(|channel| &rest[*channel]).collect();
-    let open_residuals: Vec<DVector<f64>> = touched
-        .iter()
-        .zip(&residuals)
-        .map(|(channel, residual)| problem.frames[*channel].open_part(residual))
-        .collect();
+    let touched = Touched::all(problem, slopes, |channel| rest[channel].clone());
+    let taken = touched.iter().map(|own| own.frame.open_part(&own.residual));
+    let taken: Vec<DVector<f64>> = taken.collect();
     let sums = |edges: &[f64]| -> Vec<Piece> {
-        let mut sums = vec![Piece::none(problem, &touched, slopes.len())];
+        let mut sums = vec![Piece::none(&touched, slopes.len())];
         for pair in edges.windows(2) {
             let span = Span {
                 from: pair[0],
                 to: pair[1],
             };
-            let mut sum = piece(problem, &touched, &residuals, slopes, span);
-            sum.add(&sums[sums.len() - 1]);
-            sums.push(sum);
+            let sum = piece(&touched, slopes.len(), starts_s, span);
+            sums.push(sum.and(&sums[sums.len() - 1]));
         }
         sums
     };
     let evidence = |from: &Piece, to: &Piece| -> f64 {
-        let mut screen = Screen::zeros(sigmas.to_vec());
-        screen.information = &to.information - &from.information;
-        screen.score = &to.score - &from.score;
-        for ((to, from), residual) in to.open.iter().zip(&from.open).zip(&open_residuals) {
-            let open = to - from;
-            screen.information -= open.tr_mul(&open);
-            screen.score -= open.tr_mul(residual);
-        }
+        let screen = to.less(from).screen(&touched, sigmas, &taken);
         screen.log_evidence().unwrap_or(f64::NEG_INFINITY)
     };
     let best = |edges: &[f64], is_tried: &dyn Fn(f64, f64) -> bool| -> Option<(f64, (f64, f64))> {
@@ -148,36 +108,15 @@ pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sig
     Some((span, most - price))
 }
 
-fn piece(problem: &Problem, touched: &[usize], residuals: &[&DVector<f64>], slopes: &[Entries], span: Span) -> Piece {
-    let starts_s = problem.twin.starts_s();
-    let width = slopes.len();
-    let mut piece = Piece {
-        information: DMatrix::zeros(width, width),
-        score: DVector::zeros(width),
-        open: Vec::new(),
-    };
-    for (channel, residual) in touched.iter().zip(residuals) {
-        let frame = &problem.frames[*channel];
+/// What a stretch adds.
+fn piece(touched: &[Touched], width: usize, starts_s: &[f64], span: Span) -> Piece {
+    let mut piece = Piece::none(touched, width);
+    for (at, own) in touched.iter().enumerate() {
+        let rows = &own.frame.series.rows;
         // The rows of a stretch are consecutive, because rows rise with time.
-        let first = frame
-            .series
-            .rows
-            .partition_point(|row| starts_s[*row as usize] < span.from);
-        let last = frame
-            .series
-            .rows
-            .partition_point(|row| starts_s[*row as usize] < span.to);
-        let mut columns = DMatrix::zeros(last - first, width);
-        for (place, entries) in slopes.iter().enumerate() {
-            if let Some((_, values)) = entries.iter().find(|(index, _)| index == channel) {
-                columns.set_column(place, &values.rows(first, last - first));
-            }
-        }
-        piece.information += columns.tr_mul(&columns);
-        piece.score += columns.tr_mul(&residual.rows(first, last - first));
-        let mut open = frame.nuisance.rows(first, last - first).tr_mul(&columns);
-        frame.solve_open(&mut open);
-        piece.open.push(open);
+        let place = |t_s: f64| rows.partition_point(|row| starts_s[*row as usize] < t_s);
+        let samples: Vec<usize> = (place(span.from)..place(span.to)).collect();
+        piece.add(at, own, &samples);
     }
     piece
 }
