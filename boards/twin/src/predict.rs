@@ -28,7 +28,7 @@ use input::{Filters, Look, Memory};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
 
-use crate::effect::{Active, Cause, Nature, Site, UnknownEffect};
+use crate::effect::{Active, Cause, Nature, Parameter, Site, UnknownEffect};
 use crate::environment::Environment;
 
 /// Step of the difference quotients, in prior sigmas: rounding is then 1e-12 of a prior effect and curvature 1e-6.
@@ -196,18 +196,18 @@ impl Twin {
         }
         let mut readings = match chain.looks_as(channel) {
             true => self.plain[index].clone(),
-            false => self.input(index, Look::of(&chain, &t_s), memory),
+            false => self.input(index, Look::of(&chain, &t_s), memory).to_vec(),
         };
-        let felt = match chain.is_delayed() {
-            true => None,
-            false => self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel)),
+        let felt: &[Feel] = match (chain.is_additive(), chain.is_delayed()) {
+            (false, _) => &[],
+            (true, true) => self.felt(index, Look::of(&chain, &t_s), memory),
+            (true, false) => {
+                let known = self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel));
+                known.map_or(&[], |(_, felt)| felt)
+            }
         };
         for (row, (reading, t_s)) in readings.iter_mut().zip(&t_s).enumerate() {
-            let added = match (chain.is_additive(), felt) {
-                (false, _) => 0.0,
-                (true, Some((_, felt))) => chain.added(&felt[row], *reading),
-                (true, None) => chain.added(&self.scene.feel(chain.instant(*t_s) - channel.tau_s()), *reading),
-            };
+            let added = felt.get(row).map_or(0.0, |feel| chain.added(feel, *reading));
             let felt_before = |ago_s: f64| self.scene.feel(chain.instant(*t_s) - ago_s);
             let added = added + chain.added_gross(channel.tau_s(), felt_before);
             // A high-pass takes the bias with it.
@@ -228,31 +228,33 @@ impl Twin {
             .filter(|&channel| active[of].touches(channel, &self.unit))
             .collect();
         let (mut moved, mut memory) = (active.to_vec(), Memory::default());
-        let columns = parameters.into_iter().enumerate().map(|(i, parameter)| {
-            let step = STEP * parameter.prior_sigma;
-            let theta = active[of].theta[i];
-            let mut at = |value: f64| -> Vec<(usize, Vec<f64>)> {
-                moved[of].theta[i] = value;
-                let of_parameter = moved[of].cause.touched_by(i, &self.unit);
-                let channels = touched.iter().copied().filter(|channel| of_parameter.contains(channel));
-                channels
-                    .map(|channel| (channel, self.computed(channel, &moved, &mut memory)))
-                    .collect()
-            };
-            let (mut entries, before) = (at(theta + step), at(theta - step));
-            moved[of].theta[i] = theta;
-            for ((_, after), (_, before)) in entries.iter_mut().zip(before) {
-                for (after, before) in after.iter_mut().zip(before) {
-                    *after = (*after - before) / (2.0 * step);
-                }
+        let of_parameter = |i: usize| active[of].cause.touched_by(i, &self.unit);
+        let of_parameter: Vec<Vec<usize>> = (0..parameters.len()).map(of_parameter).collect();
+        let column = |parameter: Parameter| Column {
+            name: parameter.name,
+            sigma: parameter.prior_sigma,
+            entries: Vec::new(),
+        };
+        let mut columns: Vec<Column> = parameters.into_iter().map(column).collect();
+        for channel in touched {
+            let own = (columns.iter_mut().zip(&of_parameter)).enumerate();
+            for (i, (column, _)) in own.filter(|(_, (_, channels))| channels.contains(&channel)) {
+                let step = STEP * column.sigma;
+                let theta = active[of].theta[i];
+                let mut at = |value: f64| {
+                    moved[of].theta[i] = value;
+                    self.computed(channel, &moved, &mut memory)
+                };
+                let (after, before) = (at(theta + step), at(theta - step));
+                moved[of].theta[i] = theta;
+                let slopes = after
+                    .iter()
+                    .zip(before)
+                    .map(|(after, before)| (after - before) / (2.0 * step));
+                column.entries.push((channel, slopes.collect()));
             }
-            Column {
-                name: parameter.name,
-                sigma: parameter.prior_sigma,
-                entries,
-            }
-        });
-        columns.collect()
+        }
+        columns
     }
 }
 

@@ -4,7 +4,7 @@
 //! whole motion and is the same for all sensors of a kind; an input is the same for all effects that are added to it. A
 //! [`Memory`] keeps both from one question to the next, as of a derivative by one parameter after another.
 
-use super::{Aim, Chain, Filter, Kind, Twin};
+use super::{Aim, Chain, Feel, Filter, Kind, Twin};
 
 /// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
 /// low-passes divide zero by zero.
@@ -42,24 +42,46 @@ impl Look {
 pub(super) struct Memory {
     /// Low-passes beside the nominal channels' own.
     filters: Filters,
-    /// The latest input of each channel.
-    inputs: Vec<(usize, Look, Vec<f64>)>,
+    latest: Option<Latest>,
+}
+
+/// The latest question of a channel that does not look as described.
+struct Latest {
+    channel: usize,
+    look: Look,
+    input: Vec<f64>,
+    /// What the centre feels when what it reads passes its low-pass; empty until it is asked for.
+    felt: Vec<Feel>,
 }
 
 impl Twin {
     /// The input of a channel that looks so.
-    pub(super) fn input(&self, index: usize, look: Look, memory: &mut Memory) -> Vec<f64> {
-        let Memory { filters, inputs } = memory;
-        let latest = inputs.iter().position(|(channel, ..)| *channel == index);
-        if let Some((_, known, input)) = latest.map(|at| &inputs[at])
-            && *known == look
-        {
-            return input.clone();
+    pub(super) fn input<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a [f64] {
+        &self.latest(channel, look, memory).input
+    }
+
+    /// What the centre feels when what a channel that looks so reads passes its low-pass.
+    pub(super) fn felt<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a [Feel] {
+        let tau_s = self.unit.channels[channel].tau_s();
+        let latest = self.latest(channel, look, memory);
+        if latest.felt.is_empty() {
+            let instants_s = latest.look.instants_s.iter();
+            latest.felt = instants_s.map(|t_s| self.scene.feel(t_s - tau_s)).collect();
         }
-        let input = self.filtered(&look, self.unit.channels[index].tau_s(), filters);
-        latest.map(|at| inputs.swap_remove(at));
-        inputs.push((index, look, input.clone()));
-        input
+        &latest.felt
+    }
+
+    fn latest<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a mut Latest {
+        let Memory { filters, latest } = memory;
+        let known = latest
+            .take()
+            .filter(|known| known.channel == channel && known.look == look);
+        latest.insert(known.unwrap_or_else(|| Latest {
+            channel,
+            input: self.filtered(&look, self.unit.channels[channel].tau_s(), filters),
+            look,
+            felt: Vec::new(),
+        }))
     }
 
     /// The input through a low-pass of `tau_s` and what the look has beside it; filters that are made for it are added to
