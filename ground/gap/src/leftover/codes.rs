@@ -42,13 +42,13 @@ impl Codes {
 }
 
 fn counts(codes: impl Iterator<Item = i64>) -> Counts {
-    let mut counts = [0.0; BITS];
+    let mut counts = [0u32; BITS];
     for code in codes {
         for (bit, count) in counts.iter_mut().enumerate() {
-            *count += f64::from((code >> bit & 1) as u8);
+            *count += (code >> bit & 1) as u32;
         }
     }
-    counts
+    counts.map(f64::from)
 }
 
 /// How far counts are from those of simulated logs, as a sum of squares: of each simulated one, and of the log's.
