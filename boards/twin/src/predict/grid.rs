@@ -42,6 +42,12 @@ impl<const N: usize> Piece<N> {
         let bend = c2 * 2.0 + c3 * (6.0 * s);
         self.value(s) - (self.slope(s) - (bend - c3 * (6.0 * tau_s)) * tau_s) * tau_s
     }
+
+    /// The same at its beginning, where most terms vanish.
+    fn low_passed_first(&self, tau_s: f64) -> SVector<f64, N> {
+        let [c0, c1, c2, c3] = self.0;
+        c0 - (c1 - (c2 * 2.0 - c3 * (6.0 * tau_s)) * tau_s) * tau_s
+    }
 }
 
 impl<const N: usize> Grid<N> {
@@ -121,7 +127,7 @@ impl<const N: usize> Grid<N> {
             nodes.push(output);
             for i in 0..self.values.len() - 1 {
                 let piece = self.piece(i);
-                output = piece.low_passed(self.step_s, tau_s) + (output - piece.low_passed(0.0, tau_s)) * decay;
+                output = piece.low_passed(self.step_s, tau_s) + (output - piece.low_passed_first(tau_s)) * decay;
                 nodes.push(output);
             }
         }
@@ -145,7 +151,7 @@ impl<const N: usize> LowPass<N> {
         match self.nodes.get(i) {
             Some(node) => {
                 let decay = (-s / self.tau_s).exp();
-                piece.low_passed(s, self.tau_s) + (node - piece.low_passed(0.0, self.tau_s)) * decay
+                piece.low_passed(s, self.tau_s) + (node - piece.low_passed_first(self.tau_s)) * decay
             }
             None => piece.value(s),
         }
