@@ -24,7 +24,8 @@ pub use calibration::{Accuracy, Column};
 pub use chain::Chain;
 pub use emems::{emems, thesis_slot_s};
 pub use grid::{Grid, LowPass};
-use input::{Filters, Look, Memory};
+pub use input::Memory;
+use input::{Filters, Look};
 pub use scene::{Aim, Feel, Filter, Scene};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
 
@@ -173,15 +174,21 @@ impl Twin {
 
     /// Readings of every channel, in the order of the unit, with these effects.
     pub fn predict(&self, active: &[Active]) -> Vec<Vec<f64>> {
+        let mut memory = Memory::default();
         (0..self.unit.channels.len())
-            .map(|index| self.channel(index, active).into_owned())
+            .map(|index| self.channel_with(index, active, &mut memory).into_owned())
             .collect()
     }
 
     /// Readings of one channel.
     pub fn channel(&self, index: usize, active: &[Active]) -> Cow<'_, [f64]> {
+        self.channel_with(index, active, &mut Memory::default())
+    }
+
+    /// The same, with what is kept from other channels.
+    pub fn channel_with(&self, index: usize, active: &[Active], memory: &mut Memory) -> Cow<'_, [f64]> {
         match active.iter().any(|active| active.touches(index, &self.unit)) {
-            true => Cow::Owned(self.computed(index, active, &mut Memory::default())),
+            true => Cow::Owned(self.computed(index, active, memory)),
             false => Cow::Borrowed(&self.nominal[index]),
         }
     }

@@ -265,9 +265,7 @@ fn is_physical(library: &Library, set: &[usize], refined: &Refined) -> bool {
 /// Scores of every column about a refined set, whose own columns are renewed in place; its parameters count from zero.
 fn renewed_scores(problem: &Problem, library: &mut Library, set: &[usize], refined: &Refined) -> Vec<f64> {
     let model = model_of(library, set, &refined.thetas);
-    let mut residuals: Vec<DVector<f64>> = (0..problem.frames.len())
-        .map(|channel| problem.residual(channel, &model))
-        .collect();
+    let mut residuals = problem.residuals(&model);
     let mut slopes = refined.slopes.iter().skip(library.reference);
     for (hypothesis, theta) in set.iter().zip(&refined.thetas) {
         for (place, value) in library.hypotheses[*hypothesis].places.iter().zip(theta.iter()) {

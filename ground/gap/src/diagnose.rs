@@ -108,9 +108,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         false => left_by(&problem, &explanation),
     };
 
-    let before: Vec<Vec<f64>> = (0..problem.frames.len())
-        .map(|channel| problem.predict(channel, &[]))
-        .collect();
+    let before = problem.predictions(&[]);
     let as_described = vec![1.0; problem.frames.len()];
     let floor = floor(&problem, &explanation.model);
     let without = Finished {

@@ -54,14 +54,14 @@ impl Model {
         let values = DVector::from_vec(values);
         let about_zero: Vec<DVector<f64>> = columns
             .iter()
-            .enumerate()
-            .map(|(channel, columns)| problem.residual(channel, &components) + &columns.effects * &values)
+            .zip(problem.residuals(&components))
+            .map(|(columns, residual)| residual + &columns.effects * &values)
             .collect();
         let joint = Joint::new(columns, &sigmas);
         let fitted = joint.fit(&about_zero);
-        let predicted = (0..problem.frames.len())
-            .map(|channel| readings(problem, &components, &fitted, channel))
-            .collect();
+        let predicted = problem.predictions(&components).into_iter().enumerate();
+        let predicted = predicted.map(|(channel, readings)| finished(problem, readings, &fitted, channel));
+        let predicted = predicted.collect();
         Model {
             components,
             joint,
@@ -101,9 +101,8 @@ impl Model {
     }
 }
 
-/// Readings of one channel at every row.
-fn readings(problem: &Problem, components: &[Component], fitted: &Fitted, channel: usize) -> Vec<f64> {
-    let mut readings = problem.predict(channel, components);
+/// Readings of one channel at every row, with calibration and reference as fitted.
+fn finished(problem: &Problem, mut readings: Vec<f64>, fitted: &Fitted, channel: usize) -> Vec<f64> {
     let columns = problem.open(channel);
     let calibration = columns
         .iter()

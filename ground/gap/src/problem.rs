@@ -10,7 +10,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::{
     effect::{Active, Cause},
-    predict::{Column, Kind, Twin},
+    predict::{Column, Kind, Memory, Twin},
 };
 
 use crate::{gram::Normal, joint::Columns, log::Series, on::On, open::calibration, reference::Reference, windows::Fit};
@@ -250,10 +250,23 @@ impl<'a> Problem<'a> {
 
     /// Readings of one channel at every row of the log.
     pub fn predict(&self, channel: usize, model: &[Component]) -> Vec<f64> {
+        self.predict_with(channel, model, &mut Memory::default())
+    }
+
+    /// The same of every channel.
+    pub fn predictions(&self, model: &[Component]) -> Vec<Vec<f64>> {
+        let mut memory = Memory::default();
+        (0..self.frames.len())
+            .map(|channel| self.predict_with(channel, model, &mut memory))
+            .collect()
+    }
+
+    /// The same of one channel, with what is kept from others.
+    fn predict_with(&self, channel: usize, model: &[Component], memory: &mut Memory) -> Vec<f64> {
         let (always, passing): (Vec<&Component>, Vec<&Component>) =
             model.iter().partition(|component| component.span.is_none());
         let always: Vec<Active> = always.into_iter().map(|component| component.active.clone()).collect();
-        let base = self.twin.channel(channel, &always).into_owned();
+        let base = self.twin.channel_with(channel, &always, memory).into_owned();
         let mut readings = base.clone();
         for component in passing {
             if !component.active.touches(channel, self.twin.unit()) {
@@ -261,7 +274,7 @@ impl<'a> Problem<'a> {
             }
             let mut with = always.clone();
             with.push(component.active.clone());
-            let with = self.twin.channel(channel, &with);
+            let with = self.twin.channel_with(channel, &with, memory);
             for (row, start_s) in self.twin.starts_s().iter().enumerate() {
                 if component.span.is_none_or(|span| span.contains(*start_s)) {
                     readings[row] += with[row] - base[row];
@@ -281,7 +294,20 @@ impl<'a> Problem<'a> {
 
     /// Measured minus predicted of one channel, in units of noise.
     pub fn residual(&self, channel: usize, model: &[Component]) -> DVector<f64> {
-        let predicted = self.predict(channel, model);
+        self.residual_with(channel, model, &mut Memory::default())
+    }
+
+    /// The same of every channel.
+    pub fn residuals(&self, model: &[Component]) -> Vec<DVector<f64>> {
+        let mut memory = Memory::default();
+        (0..self.frames.len())
+            .map(|channel| self.residual_with(channel, model, &mut memory))
+            .collect()
+    }
+
+    /// The same of one channel, with what is kept from others.
+    pub fn residual_with(&self, channel: usize, model: &[Component], memory: &mut Memory) -> DVector<f64> {
+        let predicted = self.predict_with(channel, model, memory);
         let frame = &self.frames[channel];
         let samples = frame
             .series

@@ -6,6 +6,7 @@
 //! Parameters and covariance are those of the usual size, which data that say anything outweigh.
 
 use nalgebra::{DMatrix, DVector};
+use twin::predict::Memory;
 
 use crate::{
     evidence::{Estimate, Screen},
@@ -156,7 +157,7 @@ impl Point {
             );
         }
         let mut screen = Screen::zeros(sigmas);
-        let mut energy = 0.0;
+        let (mut energy, mut memory) = (0.0, Memory::default());
         for (channel, frame) in problem.frames.iter().enumerate() {
             let entries = slopes.iter().enumerate().filter_map(|(place, entries)| {
                 entries
@@ -173,7 +174,7 @@ impl Point {
                 energy += frame.quiet_energy;
                 continue;
             }
-            let mut about_zero = problem.residual(channel, &model);
+            let mut about_zero = problem.residual_with(channel, &model, &mut memory);
             let mut effects = DMatrix::zeros(about_zero.len(), places.len());
             for (index, (place, column)) in places.iter().zip(columns).enumerate() {
                 effects.set_column(index, column);

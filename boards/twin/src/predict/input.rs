@@ -37,9 +37,9 @@ impl Look {
     }
 }
 
-/// What questions have in common.
+/// What questions to one [`Twin`] have in common.
 #[derive(Default)]
-pub(super) struct Memory {
+pub struct Memory {
     /// Low-passes beside the nominal channels' own.
     filters: Filters,
     latest: Option<Latest>,

@@ -31,9 +31,7 @@ pub(super) fn stretches(
 ) -> Vec<Option<On>> {
     let model = model_of(library, set, &best.thetas);
     let least = PASSING_PART * (best.log_evidence - nothing);
-    let rest: Vec<DVector<f64>> = (0..problem.frames.len())
-        .map(|channel| problem.residual(channel, &model))
-        .collect();
+    let rest = problem.residuals(&model);
     let starts_s = problem.twin.starts_s();
     let stretch = |(hypothesis, gain): (&Hypothesis, &mut f64)| {
         let effect = hypothesis.cause.effect;
@@ -128,9 +126,7 @@ pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], b
         return best;
     }
     let model = model_of(library, others, &best.thetas[..others.len()]);
-    let rest: Vec<DVector<f64>> = (0..problem.frames.len())
-        .map(|channel| problem.residual(channel, &model))
-        .collect();
+    let rest = problem.residuals(&model);
     let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
     let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
     let Some((span, _)) = onset::stretch(problem, &rest, slopes, &sigmas) else {
