@@ -33,11 +33,19 @@ pub fn mean_logarithm(sizes: impl Iterator<Item = f64>) -> f64 {
 /// Squares of the covariances of neighbours, in units of the energy.
 pub fn alike(values: &[f64]) -> f64 {
     let energy: f64 = values.iter().map(|value| value * value).sum();
-    let covariances = (1..=LAGS).map(|lag| {
-        let pairs = values.iter().zip(values.iter().skip(lag));
-        pairs.map(|(a, b)| a * b).sum::<f64>().powi(2)
-    });
-    covariances.sum::<f64>() / energy.max(1.0)
+    // All lags in one pass: a sum by itself waits for every one of its additions.
+    let mut covariances = [0.0; LAGS];
+    let mut add = |value: f64, after: &[f64]| {
+        (covariances.iter_mut().zip(after)).for_each(|(sum, other)| *sum += value * other);
+    };
+    for own in values.windows(LAGS + 1) {
+        add(own[0], &own[1..=LAGS]);
+    }
+    for at in values.len().saturating_sub(LAGS)..values.len() {
+        add(values[at], &values[at + 1..]);
+    }
+    let squares = covariances.iter().map(|sum: &f64| sum.powi(2));
+    squares.sum::<f64>() / energy.max(1.0)
 }
 
 /// Squares about their mean.
