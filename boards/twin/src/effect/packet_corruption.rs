@@ -1,6 +1,6 @@
 //! Corruption: a damaged packet passes for a whole one, and a value is anything.
 
-use super::spread::{Beneath, View, mixed, unusual_part};
+use super::spread::{Beneath, View, mixture, unusual_part};
 use super::{Effect, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -30,12 +30,12 @@ impl Effect for PacketCorruption {
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let _ = variant;
-        let p = theta[0].clamp(0.0, 0.999);
+        let mixed = mixture(theta[0].clamp(0.0, 0.999));
         let of = |view: &View| -> f64 {
             let anything = (view.resolution() / view.span()).ln();
             let law = view.normal_law(view.channel.sigma());
             view.residuals()
-                .map(|(_, residual)| mixed(p, law(residual), anything))
+                .map(|(_, residual)| mixed(law(residual), anything))
                 .sum()
         };
         views.iter().map(of).sum()

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::spread::{Beneath, View, mixed, unusual_part};
+use super::spread::{Beneath, View, mixed, mixture, unusual_part};
 use super::{Effect, Likelihood, Nature, Page, Scope, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -106,9 +106,10 @@ impl Effect for Shock {
         let rows = of_rows(views, variant);
         Box::new(move |theta| {
             let p = theta[0].clamp(0.0, 0.999);
+            let mixed = mixture(p);
             let hits: f64 = rows.iter().map(|[usual, hit]| unusual_part(p, *usual, *hit)).sum();
             let is_rare = hits <= MOST * rows.len() as f64;
-            let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(p, *usual, *hit) } else { *usual };
+            let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(*usual, *hit) } else { *usual };
             rows.iter().map(of_row).sum()
         })
     }

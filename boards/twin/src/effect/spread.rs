@@ -162,12 +162,20 @@ impl View<'_> {
 
 /// ln((1 - p) exp(usual) + p exp(unusual)).
 pub(super) fn mixed(p: f64, usual: f64, unusual: f64) -> f64 {
-    let (usual, unusual) = ((-p).ln_1p() + usual, p.ln() + unusual);
-    let most = usual.max(unusual);
-    if most == f64::NEG_INFINITY {
-        most
-    } else {
-        most + ((usual - most).exp() + (unusual - most).exp()).ln()
+    mixture(p)(usual, unusual)
+}
+
+/// The same of any two: the logarithms of `p` are taken once.
+pub(super) fn mixture(p: f64) -> impl Fn(f64, f64) -> f64 {
+    let (rarely, often) = (p.ln(), (-p).ln_1p());
+    move |usual, unusual| {
+        let (usual, unusual) = (often + usual, rarely + unusual);
+        let most = usual.max(unusual);
+        if most == f64::NEG_INFINITY {
+            most
+        } else {
+            most + ((usual - most).exp() + (unusual - most).exp()).ln()
+        }
     }
 }
 

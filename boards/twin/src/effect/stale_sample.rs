@@ -1,6 +1,6 @@
 //! Stale samples: now and then a read times out and the value before is sent again.
 
-use super::spread::{Beneath, View, mixed, unusual_part};
+use super::spread::{Beneath, View, mixture, unusual_part};
 use super::{Effect, Likelihood, Nature, Page, Symbol};
 use crate::part::signal::Noise;
 use crate::predict::Kind;
@@ -53,10 +53,10 @@ impl Effect for StaleSample {
     fn likelihood<'a>(&'a self, _variant: f64, views: &'a [View<'a>]) -> Likelihood<'a> {
         let stale: Vec<Vec<f64>> = views.iter().map(stale).collect();
         Box::new(move |theta| {
-            let p = theta[0].clamp(0.0, 0.999);
+            let mixed = mixture(theta[0].clamp(0.0, 0.999));
             let of = |(view, stale): (&View, &Vec<f64>)| -> f64 {
                 let law = view.normal_law(view.channel.sigma());
-                let sample = |(k, residual): (usize, f64)| mixed(p, law(residual), stale[k]);
+                let sample = |(k, residual): (usize, f64)| mixed(law(residual), stale[k]);
                 view.residuals().map(sample).sum()
             };
             views.iter().zip(&stale).map(of).sum()
