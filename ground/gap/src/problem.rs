@@ -7,13 +7,16 @@
 //! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
 //! errors are [`crate::reference`]'s and make some samples worth less than others.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+mod frame;
+
+use nalgebra::{DMatrix, DVector};
 use twin::{
     effect::{Active, Cause},
     predict::{Column, Kind, Memory, Twin},
 };
 
-use crate::{gram::Normal, joint::Columns, log::Series, on::On, open::calibration, reference::Reference, windows::Fit};
+pub use self::frame::Frame;
+use crate::{joint::Columns, on::On, open::calibration, reference::Reference, windows::Fit};
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
 /// in it.
@@ -26,76 +29,6 @@ pub struct Component {
     pub active: Active,
     /// When; `None` for always.
     pub span: Option<On>,
-}
-
-/// One channel of the fit windows.
-#[derive(Clone, Debug)]
-pub struct Frame {
-    /// Its samples.
-    pub series: Series,
-    /// Physical units a unit of noise in the fit, sample by sample.
-    pub weights: DVector<f64>,
-    /// The sensor's own noise over that, as described.
-    pub own: DVector<f64>,
-    /// What the calibration leaves open, in units of noise for one prior sigma.
-    pub nuisance: DMatrix<f64>,
-    /// Names and prior sigmas of those columns.
-    pub nuisance_names: Vec<(String, f64)>,
-    /// `r'Pr` with no effect in.
-    pub quiet_energy: f64,
-    factor: Option<Cholesky<f64, Dyn>>,
-}
-
-impl Frame {
-    /// `L^-1 N'x`: what the calibration can imitate of a column.
-    pub fn open_part(&self, column: &DVector<f64>) -> DVector<f64> {
-        let mut open = DMatrix::from_columns(&[self.nuisance.tr_mul(column)]);
-        self.solve_open(&mut open);
-        open.column(0).into_owned()
-    }
-
-    /// `N'x` to `L^-1 N'x`, in place.
-    pub fn solve_open(&self, open: &mut DMatrix<f64>) {
-        match &self.factor {
-            Some(factor) => {
-                factor.l_dirty().solve_lower_triangular_mut(open);
-            }
-            None => open.fill(0.0),
-        }
-    }
-
-    /// What of a residual the calibration does not take up.
-    pub fn left(&self, residual: &DVector<f64>) -> DVector<f64> {
-        let mut left = residual.clone();
-        if let Some(factor) = &self.factor {
-            left.gemv(
-                -1.0,
-                &self.nuisance,
-                &factor.solve(&self.nuisance.tr_mul(residual)),
-                1.0,
-            );
-        }
-        left
-    }
-
-    /// Weighs its samples anew: the noise of each is so many times what it was taken for.
-    pub fn reweigh(&mut self, factors: &DVector<f64>) {
-        self.weights.component_mul_assign(factors);
-        for mut column in self.nuisance.column_iter_mut() {
-            column.component_div_assign(factors);
-        }
-        self.factorise();
-    }
-
-    fn factorise(&mut self) {
-        let open = self.nuisance.ncols();
-        self.factor = Cholesky::new(DMatrix::identity(open, open) + self.nuisance.tr_mul(&self.nuisance));
-    }
-
-    /// Normal equations of some columns with the calibration marginalised.
-    pub fn normal(&self, effects: &DMatrix<f64>, residual: &DVector<f64>) -> Normal {
-        Normal::marginal(&self.nuisance, self.factor.as_ref(), effects, residual)
-    }
 }
 
 /// The least-squares problem of a case.
