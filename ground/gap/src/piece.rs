@@ -116,3 +116,73 @@ impl Piece {
         screen
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use twin::{
+        environment::Environment,
+        motion::Tumble,
+        predict::{Scene, Twin, emems},
+    };
+
+    use super::*;
+    use crate::{log::Series, reference::Reference, windows::Fit};
+
+    const ROWS: usize = 100;
+
+    /// Relative rounding of some thousand sums.
+    const ROUNDING: f64 = 1e-9;
+
+    fn wave(rate: f64) -> DVector<f64> {
+        DVector::from_fn(ROWS, |row, _| (row as f64 * rate).sin())
+    }
+
+    #[test]
+    fn two_halves_are_the_normal_equations_of_all_samples() {
+        let environment = Environment::laboratory();
+        let starts_s: Vec<f64> = (0..ROWS).map(|row| row as f64 * 0.2).collect();
+        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 20.0, 0.01);
+        let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s).expect("no effect is named");
+        let all = Series {
+            rows: (0..ROWS as u32).collect(),
+            values: vec![0.0; ROWS],
+        };
+        let fit = Fit {
+            channels: vec![all; twin.unit().channels.len()],
+        };
+        let exact = Reference::default();
+        let problem = Problem::new(&twin, &fit, &exact);
+        // Two parameters, of which the first is in one of two channels.
+        let slopes: [Entries; 2] = [vec![(3, wave(0.3))], vec![(3, wave(0.7)), (5, wave(1.1))]];
+        let residual = |channel: usize| wave(0.05 * channel as f64);
+        let sigmas = [2.0, 0.5];
+        let mut expected = Screen::zeros(sigmas.to_vec());
+        for (channel, places) in [(3, vec![0, 1]), (5, vec![1])] {
+            let columns: Vec<DVector<f64>> =
+                [vec![wave(0.3), wave(0.7)], vec![wave(1.1)]][usize::from(channel == 5)].clone();
+            let effects = DMatrix::from_columns(&columns);
+            expected.add(&places, &problem.frames[channel].normal(&effects, &residual(channel)));
+        }
+        let touched = Touched::all(&problem, &slopes, residual);
+        let over = |samples: std::ops::Range<usize>| {
+            let samples: Vec<usize> = samples.collect();
+            let mut piece = Piece::none(&touched, slopes.len());
+            (touched.iter().enumerate()).for_each(|(at, own)| piece.add(at, own, &samples));
+            piece
+        };
+        let taken: Vec<DVector<f64>> = touched.iter().map(|own| own.frame.open_part(&own.residual)).collect();
+        let (first, second) = (over(0..ROWS / 2), over(ROWS / 2..ROWS));
+        let whole = first.and(&second);
+        let found = whole.screen(&touched, &sigmas, &taken);
+        let near = |found: f64, expected: f64| (found - expected).abs() < ROUNDING * expected.abs().max(1.0);
+        assert!(near(
+            found.log_evidence().expect("finite"),
+            expected.log_evidence().expect("finite")
+        ));
+        assert!((found.information - expected.information).norm() < ROUNDING * ROWS as f64);
+        let half = whole.less(&second).screen(&touched, &sigmas, &taken);
+        let again = over(0..ROWS / 2).screen(&touched, &sigmas, &taken);
+        assert!((half.information - again.information).norm() < ROUNDING * ROWS as f64);
+        assert!((half.score - again.score).norm() < ROUNDING * ROWS as f64);
+    }
+}
