@@ -1,14 +1,15 @@
 //! The derived frame: what a packet has no room for.
 //!
-//! In: a [`Derived`]; out: 486 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
+//! In: a [`Derived`]; out: 652 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
 //! neither `@` nor `#`, so a reader of 156-byte packets passes over it; it is off unless asked for (G_DL).
 //!
 //! Between `$` and `*` stand upper-case hexadecimal fields, fixed width, most significant digit first; `CCCC` is
 //! CRC-16/CCITT-FALSE over them. Layout, with the digits of each field:
 //!
 //! ```text
-//! version 2 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
+//! version 3 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
 //! covered_us 6 | end_us 16 | angle_b 8 x 3 | for each gyro: integral 8, least 4, most 4, count 2
+//! for each reading of the accelerometers in between: covered_us 6, after_us 5, angle_b 8 x 3, counts 4 x 12
 //! estimate_us 5 | force_b 8 x 3 | field_b_ut 8 x 3 | rate_b 8 x 3 | sensors 8 | triad_nb 8 x 4 (0: none)
 //! q_nb 8 x 4 (0: none) | covariance_n 8 x 6 | bias_b 8 x 3 | bias_sd 8 x 3
 //! ```
@@ -25,7 +26,7 @@ use crc::{CRC_16_IBM_3740, Crc};
 use crate::{
     estimate::Estimate,
     faults::SensorHealth,
-    increments::{Channel, Increments},
+    increments::{Channel, Force, Increments, forces::READINGS},
     mode::Mode,
     packet::hex_value,
     sample::{NO_SLOT, SENSOR_COUNT},
@@ -39,10 +40,11 @@ pub const DERIVED_START: u8 = b'$';
 /// Bytes of a derived frame.
 pub const DERIVED_BYTES: usize = 1 + FIELD_DIGITS + 1 + 4 + 1;
 
-const VERSION: u64 = 2;
-const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + ESTIMATE_DIGITS;
+const VERSION: u64 = 3;
+const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + FORCE_DIGITS + ESTIMATE_DIGITS;
 const CYCLE_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT;
 const GYRO_DIGITS: usize = 6 + 16 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
+const FORCE_DIGITS: usize = READINGS * (6 + 5 + 8 * 3 + 4 * 12);
 const ESTIMATE_DIGITS: usize = 5 + 8 * (3 + 3 + 3 + 1 + 4 + 4 + 6 + 3 + 3);
 const NO_SLOT_CODE: u64 = 0xF_FFFF;
 
@@ -139,6 +141,14 @@ pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
         fields.put((channel.most as u16).into(), 4);
         fields.put(channel.count.into(), 2);
     }
+    for force in &derived.increments.forces {
+        fields.put(u64::from(force.covered_us).min(0xFF_FFFF), 6);
+        fields.put(u64::from(force.after_us).min(0xF_FFFF), 5);
+        fields.reals(&force.angle_b);
+        for counts in force.acc_p.as_flattened() {
+            fields.put((*counts as u16).into(), 4);
+        }
+    }
     fields.put(u64::from(derived.estimate_us).min(0xF_FFFF), 5);
     let estimate = &derived.estimate;
     for vector in [&estimate.force_b, &estimate.field_b_ut, &estimate.rate_b] {
@@ -213,6 +223,12 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
                     count: fields.take(2) as u8,
                 }
             }),
+            forces: core::array::from_fn(|_| Force {
+                covered_us: fields.take(6) as u32,
+                after_us: fields.take(5) as u32,
+                angle_b: fields.reals(),
+                acc_p: core::array::from_fn(|_| core::array::from_fn(|_| fields.word() as i16)),
+            }),
         },
         estimate_us: fields.take(5) as u32,
         estimate: Estimate {
@@ -278,74 +294,4 @@ impl Reader<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::packet;
-
-    fn derived() -> Derived {
-        let channel = |count| Channel {
-            integral_counts_s: -1.25,
-            least: -300,
-            most: 12,
-            count,
-        };
-        let mut slots_us = core::array::from_fn(|slot| 225 * slot as u32);
-        slots_us[7] = NO_SLOT;
-        Derived {
-            counter: 0xBEEF,
-            start_us: 86_400_000_000,
-            mode: Mode::Flight,
-            health: Health(0x80).with(Health::RECORDING),
-            cycle_us: 3_700,
-            slots_us,
-            estimate_us: 240,
-            estimate: Estimate {
-                force_b: [0.1, 0.0, -9.8],
-                field_b_ut: [17.0, -6.9, -14.2],
-                rate_b: [-0.0, 1e-3, 2.0],
-                sensors: SensorHealth(0x8400_0001),
-                triad_nb: None,
-                q_nb: Some([0.5, -0.5, 0.5, -0.5]),
-                covariance_n: [1e-5, -1e-7, 0.0, 2e-5, 3e-7, 4e-4],
-                bias_b: [1e-3, -2e-3, 0.0],
-                bias_sd: [1e-4, 1e-4, 2e-4],
-            },
-            increments: Increments {
-                angle_b: [0.1, -0.2, 1.0e-7],
-                covered_us: 200_000,
-                end_us: 86_399_995_100,
-                gyro: [channel(20), channel(19), channel(0), channel(255)],
-            },
-        }
-    }
-
-    #[test]
-    fn a_frame_says_what_it_was_given() {
-        assert_eq!(decode(&encode(&derived())), Ok(derived()));
-        assert_eq!(DERIVED_BYTES, 486);
-    }
-
-    #[test]
-    fn the_checksum_is_ccitt_false() {
-        assert_eq!(CRC.checksum(b"123456789"), 0x29B1);
-    }
-
-    #[test]
-    fn a_reader_of_packets_never_sees_one_begin_or_end_in_it() {
-        assert!(
-            !encode(&derived())
-                .iter()
-                .any(|byte| matches!(*byte, packet::START | packet::END))
-        );
-    }
-
-    #[test]
-    fn every_one_bit_error_is_refused() {
-        for bit in 0..8 * DERIVED_BYTES {
-            let mut frame = encode(&derived());
-            frame[bit / 8] ^= 1 << (bit % 8);
-            assert!(decode(&frame).is_err(), "bit {bit}");
-        }
-        assert_eq!(decode(b"$"), Err(DerivedError::Length(1)));
-    }
-}
+mod tests;

@@ -7,6 +7,7 @@
 //! counts --calibration--> along 28 axes --faults--> force_b, field_b, rate_b, health --triad--> attitude of this cycle
 //! increments --turn--> rotation through the same calibration -----------.
 //! force_b and field_b at the mean slot times of the sensors used --------+--kalman--> attitude, bias, covariance
+//! (force: the mean of this and of what was read between cycles) ---------'
 //!                                             faults <--- gyro bias ----'
 //! ```
 //!
@@ -16,24 +17,27 @@
 //! Refuses nothing. A cycle that repeats or goes back in time gives vectors and TRIAD, and the filter leaves it out; see
 //! [`kalman`](crate::kalman) for gaps.
 
+mod force;
+mod sampled;
 mod site;
 #[cfg(test)]
 mod tests;
 mod turn;
 
+use force::Averager;
 use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 
 pub use site::Site;
 
 use crate::{
     attitude::{self, dcm_bn},
-    calibration::{Axis, Ranges, Set, Temperatures},
+    calibration::{Ranges, Set, Temperatures},
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
-    increments::Increments,
-    kalman::{Filter, Outcome, Sampled, Step, seconds},
-    redundancy::{Known, Solution},
-    sample::{Kind, NO_SLOT, Sample},
+    increments::{Force, Increments},
+    kalman::{Filter, Outcome, Step, seconds},
+    redundancy::Known,
+    sample::{Kind, Sample},
     triad,
     unit::Settings,
 };
@@ -98,8 +102,8 @@ impl Estimate {
 /// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.
 const NEAR_ONE_G: f32 = 0.1;
 
-/// Bits of twelve axes.
-const ALL_AXES: u16 = 0xFFF;
+/// [s] a cycle whose increment covers less of it by this much has a gap: more than two fast samples.
+const LARGEST_GAP_S: f32 = 0.03;
 
 /// Everything the step remembers.
 #[derive(Clone, Debug)]
@@ -109,6 +113,7 @@ pub struct Estimator {
     monitor: Monitor,
     filter: Filter,
     turn_solver: turn::Solver,
+    averager: Averager,
     /// White variance of a component of force, in (m/s2)^2, and of field, in uT2, by all axes.
     white: [f32; 2],
     /// The step before completed a window of the filter.
@@ -131,8 +136,9 @@ impl Estimator {
             monitor: Monitor::new(&set),
             filter: Filter::new(site.params(&set)),
             turn_solver: turn::Solver::default(),
+            averager: Averager::EMPTY,
             closed: false,
-            white: whites(&set),
+            white: sampled::whites(&set),
             axes_n: axes_n(site),
             last_us: None,
             settlements: None,
@@ -150,8 +156,9 @@ impl Estimator {
         self.monitor = Monitor::new(set);
         self.filter = Filter::new(site.params(set));
         self.turn_solver = turn::Solver::default();
+        self.averager = Averager::EMPTY;
         self.closed = false;
-        self.white = whites(set);
+        self.white = sampled::whites(set);
         self.axes_n = axes_n(site);
         self.last_us = None;
         self.settlements = None;
@@ -168,6 +175,13 @@ impl Estimator {
     /// The filter as it stands.
     pub fn filter(&self) -> &Filter {
         &self.filter
+    }
+
+    /// Takes a reading of the accelerometers before the packet with this counter, so that the step has less to do. Who has them with the cycle
+    /// only need not: the step takes those that were not.
+    #[inline(never)]
+    pub fn take_force(&mut self, counter: u16, force: &Force) {
+        self.averager.take(counter, force, &self.set);
     }
 
     /// Takes a cycle.
@@ -199,12 +213,28 @@ impl Estimator {
         let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
         let turned = turn::turn(
             &self.set,
-            &self.temperatures,
+            &measured.gyros_above_c,
             increments,
             believed,
             &mut self.turn_solver,
         );
-        let force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
+        let mut force = self.sampled(sample, Kind::Accelerometer, &vectors.force_b);
+        self.averager.complete(reading.counter, &increments.forces, &self.set);
+        if let Some(force) = &mut force {
+            // With a gap the rotation up to a reading is not known. Zero is the gap before the first cycle.
+            let is_whole = dt_s > 0.0 && dt_s < turned.covered_s + LARGEST_GAP_S;
+            if is_whole && !turned.saturated {
+                let lag_us = force.at_us.wrapping_sub(increments.end_us) as i32;
+                let turn = force::Turn {
+                    calibrated_b: turned.angle_b - self.filter.bias_b * turned.covered_s,
+                    nominal_b: increments.angle_b,
+                    since_b: vectors.rate_b.vector_b * (lag_us as f32 * 1e-6),
+                    covered_s: turned.covered_s,
+                };
+                self.averager.average(force, vectors.force_b.used, &turn);
+            }
+        }
+        self.averager.begin(&reading.acc_p, &vectors.force_b, &self.set);
         let field = self.sampled(sample, Kind::Magnetometer, &vectors.field_b_ut);
         let step = Step {
             // Without a fast sample since the cycle before, the cycle itself is when the rotation is missing.
@@ -258,38 +288,6 @@ impl Estimator {
         }
     }
 
-    /// A whole vector at the mean of its sensors' slot times, with its white noise: what is systematic is the filter's own
-    /// business.
-    fn sampled(&self, sample: &Sample, kind: Kind, solution: &Solution) -> Option<Sampled> {
-        let whole_white = self.white[usize::from(kind == Kind::Magnetometer)];
-        if solution.known != Known::All {
-            return None;
-        }
-        let (mut slots_us, mut sensors) = (0_u64, 0_u64);
-        let mut used = solution.used;
-        for slot_us in sample.slots_of(kind) {
-            if used & 0b111 != 0 && *slot_us != NO_SLOT {
-                slots_us += u64::from(*slot_us);
-                sensors += 1;
-            }
-            used >>= 3;
-        }
-        let mean_us = match sensors {
-            // A division of 64 bits is a call.
-            4 => slots_us / 4,
-            _ => slots_us.checked_div(sensors).unwrap_or_default(),
-        };
-        Some(Sampled {
-            value_b: solution.vector_b,
-            variance: if solution.used == ALL_AXES {
-                whole_white
-            } else {
-                white(self.set.axes(kind), solution.used)
-            },
-            at_us: sample.start_us.saturating_add(mean_us),
-        })
-    }
-
     fn triad(&self, vectors: &Vectors) -> Option<UnitQuaternion<f32>> {
         let Vectors {
             force_b, field_b_ut, ..
@@ -314,25 +312,6 @@ impl Estimator {
 fn axes_n(site: &Site) -> Option<Matrix3<f32>> {
     let (sin, cos) = attitude::sin_cos(site.declination_deg.to_radians());
     triad::known_axes(Vector3::z(), Vector3::new(cos, sin, 0.0)).ok()
-}
-
-/// [`white`] of all axes of force and of field.
-#[inline(never)]
-fn whites(set: &Set) -> [f32; 2] {
-    [white(&set.acc, ALL_AXES), white(&set.mag, ALL_AXES)]
-}
-
-/// White variance of a component of the mean over these axes: plates are rotations, so each tells a third of a component.
-fn white(axes: &[Axis], used: u16) -> f32 {
-    let (mut sum, mut left) = (0.0, used);
-    for axis in axes {
-        if left & 1 == 1 {
-            sum += axis.noise * axis.noise;
-        }
-        left >>= 1;
-    }
-    let count = used.count_ones() as f32;
-    3.0 * sum / (count * count)
 }
 
 /// Scalar first.

@@ -1,7 +1,8 @@
-//! The gyros between two packets: integrated rates with coning correction.
+//! What happened between two packets: the gyros' rates, integrated with coning correction, and specific force.
 //!
-//! In: the four gyros in counts and the instant of each fast sample. Out, once a cycle: the rotation increment of b, when it
-//! ended, and for each gyro the integral, smallest and largest count and how many samples.
+//! In: the four gyros in counts and the instant of each fast sample; the accelerometers in counts at a few instants. Out,
+//! once a cycle: the rotation increment of b, when it ended, for each gyro the integral, smallest and largest count and how
+//! many samples, and each reading of the accelerometers with the rotation up to it ([`forces`]).
 //!
 //! A 5 Hz filter on single rate samples loses what happened between them; on increments it loses nothing. The increment
 //! is a rotation vector: `phi = sum d_k + 1/2 sum (a_{k-1} + d_{k-1}/6) x d_k` with `d_k` the angle of interval `k`
@@ -12,14 +13,18 @@
 //! Refuses intervals that are not later than the one before or longer than [`LONGEST_INTERVAL_S`]: they count as gaps.
 //! With fewer than three gyros there is no rate: the interval is a gap too.
 
+pub mod forces;
+
 use nalgebra::{SMatrix, Vector3, Vector4};
 
 use crate::{geometry::rate_from_gyros, sample::NOT_READ};
 
+pub use forces::{Force, Forces};
+
 /// [s] an interval longer than this is a gap: rates between its ends are not known.
 pub const LONGEST_INTERVAL_S: f32 = 0.1;
 
-/// What the fast samples of one cycle gave.
+/// What came between one cycle and the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Increments {
@@ -31,6 +36,8 @@ pub struct Increments {
     pub end_us: u64,
     /// Each gyro.
     pub gyro: [Channel; 4],
+    /// The accelerometers, oldest reading first.
+    pub forces: Forces,
 }
 
 /// One gyro over a cycle.
@@ -57,6 +64,7 @@ const EMPTY: Increments = Increments {
         most: NOT_READ,
         count: 0,
     }; 4],
+    forces: [Force::NONE; forces::READINGS],
 };
 
 /// The running integration.
@@ -130,6 +138,22 @@ impl Integrator {
         self.coning_b += (before_b + self.last_angle_b / 6.0).cross(&angle_b) / 2.0;
         self.last_angle_b = angle_b;
         self.sum.angle_b = (before_b + angle_b).into();
+    }
+
+    /// Takes a reading of the accelerometers, `at_us` [us] in the mean, and says what it is in the increments; `None` for
+    /// one too many, which is left out.
+    pub fn force(&mut self, at_us: u64, acc_p: [[i16; 3]; 4]) -> Option<Force> {
+        let angle_b = (Vector3::from(self.sum.angle_b) + self.coning_b).into();
+        let after_us = at_us.saturating_sub(self.sum.end_us) as u32;
+        let covered_us = self.sum.covered_us;
+        let free = self.sum.forces.iter_mut().find(|force| force.is_none())?;
+        *free = Force {
+            acc_p,
+            angle_b,
+            covered_us,
+            after_us,
+        };
+        Some(*free)
     }
 
     /// What came since it was last asked; the next interval begins where this one ended.
@@ -238,6 +262,31 @@ mod tests {
         let rounding = 0.5 * RAD_S_PER_COUNT * 10.0;
         assert!(coned(true) < rounding, "{}", coned(true));
         assert!(coned(false) > 10.0 * rounding, "{}", coned(false));
+    }
+
+    #[test]
+    fn a_reading_of_force_has_the_turn_up_to_it_and_the_time_since() {
+        let mut integrator = Integrator::new(RAD_S_PER_COUNT);
+        let omega_b = Vector3::new(0.5, -1.0, 2.0);
+        let add = |integrator: &mut Integrator, at_us: u64| {
+            integrator.add(Fast {
+                at_us,
+                counts: counts(omega_b),
+            });
+        };
+        (0..7).for_each(|sample| add(&mut integrator, 10_000 * sample));
+        for read_us in [64_000, 66_000, 68_000] {
+            integrator.force(read_us, [[1; 3]; 4]);
+        }
+        add(&mut integrator, 70_000);
+        let increments = integrator.take();
+        let [first, second] = increments.forces;
+        assert_eq!(
+            (first.covered_us, first.after_us, second.after_us),
+            (60_000, 4_000, 6_000)
+        );
+        assert!((Vector3::from(first.angle_b) - omega_b * 0.06).norm() < RAD_S_PER_COUNT * 0.06);
+        assert_eq!(integrator.take().forces, [Force::NONE; forces::READINGS]);
     }
 
     #[test]

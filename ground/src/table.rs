@@ -7,6 +7,7 @@ use std::fmt::Write;
 
 use emems::{
     derived::Derived,
+    increments::{Force, forces::READINGS},
     sample::{NO_SLOT, NOT_READ, Reading},
 };
 
@@ -66,6 +67,20 @@ pub fn derived_header() -> String {
             format_args!(",g{plate}_integral_counts_s,g{plate}_least,g{plate}_most,g{plate}_count"),
         );
     }
+    for reading in 1..=READINGS {
+        push(
+            &mut header,
+            format_args!(
+                ",force{reading}_covered_us,force{reading}_after_us,force{reading}_angle_x_rad,\
+                 force{reading}_angle_y_rad,force{reading}_angle_z_rad"
+            ),
+        );
+        for plate in 1..=4 {
+            for axis in ["x", "y", "z"] {
+                push(&mut header, format_args!(",force{reading}_a{plate}{axis}"));
+            }
+        }
+    }
     header.push_str(ESTIMATE_HEADER);
     header
 }
@@ -109,8 +124,29 @@ pub fn derived_row(derived: &Derived) -> String {
         }
         push(&mut row, format_args!(",{}", gyro.count));
     }
+    for force in &increments.forces {
+        push_force(&mut row, force);
+    }
     push_estimate(&mut row, derived);
     row
+}
+
+/// A reading of the accelerometers between two cycles; empty cells where there was none.
+fn push_force(row: &mut String, force: &Force) {
+    if force.is_none() {
+        row.push_str(&",".repeat(5));
+    } else {
+        push(row, format_args!(",{},{}", force.covered_us, force.after_us));
+        for angle in force.angle_b {
+            push(row, format_args!(",{angle}"));
+        }
+    }
+    for counts in force.acc_p.as_flattened() {
+        row.push(',');
+        if *counts != NOT_READ {
+            push(row, format_args!("{counts}"));
+        }
+    }
 }
 
 fn push_estimate(row: &mut String, derived: &Derived) {
@@ -215,6 +251,13 @@ mod tests {
                 covered_us: 0,
                 end_us: 0,
                 gyro: [silent; 4],
+                forces: [
+                    Force {
+                        acc_p: [[7; 3]; 4],
+                        ..Force::NONE
+                    },
+                    Force::NONE,
+                ],
             },
             estimate_us: 0,
             estimate: Estimate::NOTHING,

@@ -49,6 +49,8 @@ pub struct Measured {
     pub present: Channels,
     /// Axes at the end of their range, which have none.
     pub saturated: Channels,
+    /// [degC] each gyro's temperature above the reference, within what the set holds for.
+    pub gyros_above_c: [f32; PLATES],
     /// A temperature is not of this cycle or was never read.
     pub temperature_held: bool,
     /// A temperature is outside what the set holds for; its nearer end was used.
@@ -58,11 +60,12 @@ pub struct Measured {
 impl Set {
     /// What the axes measured.
     pub fn apply(&self, reading: &Reading, temperatures: &Temperatures) -> Measured {
-        let mut beyond_validity = false;
+        let mut beyond_c = 0.0;
         let mut above_c = |at_c: Option<f32>| {
             let at_c = at_c.unwrap_or(self.reference_c);
             let valid_c = at_c.clamp(self.lowest_c, self.highest_c);
-            beyond_validity |= valid_c != at_c;
+            // A sum: eight comparisons cost more.
+            beyond_c += (valid_c - at_c).abs();
             valid_c - self.reference_c
         };
         let plates_c: [f32; PLATES] = core::array::from_fn(|plate| above_c(temperatures.plate_c(plate)));
@@ -73,8 +76,9 @@ impl Set {
             gyro: [0.0; PLATES],
             present: Channels::default(),
             saturated: Channels::default(),
+            gyros_above_c: gyros_c,
             temperature_held: temperatures.held(),
-            beyond_validity,
+            beyond_validity: beyond_c != 0.0,
         };
         let (acc, mag) = (reading.acc_p.as_flattened(), reading.mag_p.as_flattened());
         let found = values(&self.acc, acc, &plates_c, &ACC_ENDS, &mut measured.acc);
@@ -110,7 +114,9 @@ fn values(axes: &[Axis], counts: &[i16], above_c: &[f32; PLATES], ends: &Ends, v
     let plates = axes.chunks_exact(a_plate).zip(counts.chunks_exact(a_plate));
     for (((axes, counts), values), above_c) in plates.zip(values.chunks_exact_mut(a_plate)).zip(above_c) {
         for ((axis, &counts), value) in axes.iter().zip(counts).zip(values) {
-            if counts > ends.least && counts < ends.most {
+            // Between the ends in one comparison.
+            let inside = counts.wrapping_sub(ends.least + 1) as u16;
+            if inside < ends.most.wrapping_sub(ends.least + 1) as u16 {
                 seen.present |= bit;
                 *value = axis.value(counts, *above_c);
             } else if counts == ends.least || counts == ends.most || counts == ends.overflow {

@@ -4,8 +4,9 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    increments::Channel,
-    sample::{NOT_READ, Reading, SENSOR_COUNT},
+    calibration::Axis,
+    increments::{Channel, Force, forces::READINGS},
+    sample::{NO_SLOT, NOT_READ, Reading, SENSOR_COUNT},
 };
 
 /// [us] from cycle to cycle.
@@ -49,6 +50,7 @@ fn resting(counter: u16) -> (Sample, Increments) {
         covered_us: PERIOD_US as u32,
         end_us: start_us - 2_500,
         gyro: [still; 4],
+        forces: [Force::NONE; READINGS],
     };
     (sample, increments)
 }
@@ -109,6 +111,41 @@ fn in_free_fall_triad_has_no_vertical() {
     assert_eq!(estimator.step(&sample, &increments).triad_nb, None);
 }
 
+/// Roll and pitch may be off by this of what readings in between say where those are not to count [rad].
+const NOT_COUNTED: f32 = 1e-6;
+
+#[test]
+fn readings_between_cycles_count_unless_the_gyros_have_a_gap_or_stand_at_their_end() {
+    let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+    let pushed_b = Vector3::new(1.5, 0.0, -9.7864);
+    let pushed = |axis: &Axis| ComplexField::round(axis.axis_b.dot(&pushed_b) / axis.scale) as i16;
+    let reading = Force {
+        acc_p: core::array::from_fn(|plate| core::array::from_fn(|k| pushed(&set.acc[3 * plate + k]))),
+        covered_us: 60_000,
+        ..Force::NONE
+    };
+    let tilt = |spoil: &dyn Fn(&mut Increments), readings: [Force; READINGS]| {
+        let mut estimator = Estimator::of(&Settings::NOMINAL);
+        let cycles = (0..60).map(|counter| {
+            let (sample, mut increments) = resting(counter);
+            increments.forces = readings;
+            spoil(&mut increments);
+            estimator.step(&sample, &increments).q_nb
+        });
+        let [w, x, y, z] = cycles.last().flatten().expect("an attitude");
+        2.0 * (w * y - z * x)
+    };
+    let gap = |increments: &mut Increments| increments.covered_us = 150_000;
+    let at_end = |increments: &mut Increments| increments.gyro.iter_mut().for_each(|gyro| gyro.most = 4368);
+    let whole = |_: &mut Increments| {};
+    let differs = |spoil: &dyn Fn(&mut Increments)| {
+        (tilt(spoil, [reading; READINGS]) - tilt(spoil, [Force::NONE; READINGS])).abs()
+    };
+    assert!(differs(&whole) > 0.03, "{}", differs(&whole));
+    assert!(differs(&gap) < NOT_COUNTED, "{}", differs(&gap));
+    assert!(differs(&at_end) < NOT_COUNTED, "{}", differs(&at_end));
+}
+
 fn is_finite(estimate: &Estimate) -> bool {
     let vectors = [
         estimate.force_b,
@@ -131,16 +168,20 @@ prop_compose! {
         acc_p: [[i16; 3]; 4], mag_p: [[i16; 3]; 4], gyro: [i16; 4], gyro_temperature: [i16; 4], temperature: [i16; 4],
         lift_off: bool, start_us: u64, slots_us: [u32; SENSOR_COUNT], angles: [u32; 3], integrals: [u32; 4],
         ends: [(i16, i16, u8); 4], covered_us: u32, end_us: u64, sane: bool, counter in 10..40_u16,
+        between: [([[i16; 3]; 4], [u32; 3], u32, u32); READINGS],
     ) -> (Sample, Increments) {
         let (resting, still) = resting(counter);
         let reading = Reading { acc_p, mag_p, gyro, gyro_temperature, temperature, lift_off, ..resting.reading };
         let gyro = core::array::from_fn(|k| Channel {
             integral_counts_s: f32::from_bits(integrals[k]), least: ends[k].0, most: ends[k].1, count: ends[k].2,
         });
-        let increments = Increments { angle_b: angles.map(f32::from_bits), covered_us, end_us, gyro };
+        let forces = between.map(|(acc_p, angles, covered_us, after_us)| Force {
+            acc_p, angle_b: angles.map(f32::from_bits), covered_us, after_us,
+        });
+        let increments = Increments { angle_b: angles.map(f32::from_bits), covered_us, end_us, gyro, forces };
         // Half of them with sound times, so that they get as far as the filter.
         match sane {
-            true => (Sample { reading, ..resting }, Increments { gyro, ..still }),
+            true => (Sample { reading, ..resting }, Increments { gyro, forces, ..still }),
             false => (Sample { reading, start_us, slots_us }, increments),
         }
     }

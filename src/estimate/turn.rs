@@ -18,7 +18,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector4};
 
 use crate::{
-    calibration::{Set, Temperatures},
+    calibration::Set,
     geometry::{PLATES, rate_from_gyros},
     increments::{Channel, Increments},
     redundancy::matrix,
@@ -58,10 +58,10 @@ impl Solver {
     }
 }
 
-/// The rotation of a cycle by the gyros whose bit in `believed` is set.
+/// The rotation of a cycle by the gyros whose bit in `believed` is set, each so far above the reference temperature [degC].
 pub(super) fn turn(
     set: &Set,
-    temperatures: &Temperatures,
+    above_c: &[f32; PLATES],
     increments: &Increments,
     believed: u16,
     solver: &mut Solver,
@@ -82,7 +82,7 @@ pub(super) fn turn(
         (false, true) => whole,
         (false, false) => whole & !clipped,
     };
-    let angles = calibrated(set, temperatures, increments, covered_s);
+    let angles = calibrated(set, above_c, increments, covered_s);
     let finite = angles.iter().all(|angle| angle.abs() <= f32::MAX);
     let (Some((matrix, covariance_b)), true) = (solver.of(set, used), finite && covered_s > 0.0) else {
         return Turn {
@@ -108,11 +108,9 @@ pub(super) fn turn(
 }
 
 /// [rad] each gyro about its own axis.
-fn calibrated(set: &Set, temperatures: &Temperatures, increments: &Increments, covered_s: f32) -> [f32; PLATES] {
+fn calibrated(set: &Set, above_c: &[f32; PLATES], increments: &Increments, covered_s: f32) -> [f32; PLATES] {
     core::array::from_fn(|k| {
-        let at_c = temperatures.gyro_c(k).unwrap_or(set.reference_c);
-        let above_c = at_c.clamp(set.lowest_c, set.highest_c) - set.reference_c;
-        let axis = &set.gyro[k];
+        let (axis, above_c) = (&set.gyro[k], above_c[k]);
         axis.scale_at(above_c) * (increments.gyro[k].integral_counts_s - axis.bias_counts_at(above_c) * covered_s)
     })
 }
@@ -179,13 +177,7 @@ mod tests {
     }
 
     fn turned(set: &Set, increments: &Increments, believed: u16) -> Turn {
-        turn(
-            set,
-            &Temperatures::default(),
-            increments,
-            believed,
-            &mut Solver::default(),
-        )
+        turn(set, &[0.0; PLATES], increments, believed, &mut Solver::default())
     }
 
     #[test]

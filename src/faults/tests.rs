@@ -37,6 +37,7 @@ fn measured(set: &Set, rate_b: Vector3<f32>, acceleration_b: Vector3<f32>, read:
         present,
         saturated: Channels::default(),
         temperature_held: false,
+        gyros_above_c: [0.0; 4],
         beyond_validity: false,
     }
 }

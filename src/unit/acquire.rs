@@ -5,7 +5,8 @@
 //! out of time has left the bus in the middle of a transfer: the bus is freed at once, since it never frees itself.
 //!
 //! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
-//! as before, but with its power-on settings (fault S12).
+//! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
+//! for the estimation alone ([`forces`]). What fails then is left out and nothing is concluded from it: the next cycle will see.
 
 use core::fmt::Display;
 
@@ -22,9 +23,11 @@ use crate::{
     board::{Board, ResetCause, Retained},
     budget::Budget,
     derived::Health,
+    geometry::PLATES,
+    increments::forces::{self, READINGS},
     packet,
     resume::Resume,
-    sample::{Kind, NO_SLOT, Reading, SENSOR_COUNT, SENSORS, Sample, Sensor},
+    sample::{Kind, NO_SLOT, NOT_READ, Reading, SENSOR_COUNT, SENSORS, Sample, Sensor},
     sensor::tca9548a::Switch,
 };
 
@@ -101,6 +104,17 @@ pub async fn run<B: Board>(
             acquisition.verify(verified, limit_us).await;
             verified = (verified + 1) % SENSOR_COUNT;
         }
+        if period >= Duration::from_millis(forces::SHORTEST_PERIOD_MS) {
+            let apart = period / (READINGS as u32 + 1);
+            for reading in (1..=READINGS as u32).rev() {
+                let at = start - apart * reading;
+                // A cycle with silent sensors may have taken longer.
+                if now() <= at {
+                    votes.waiting(Voter::Acquire, shared.clock.until(at)).await;
+                    acquisition.read_forces(counter, limit_us).await;
+                }
+            }
+        }
     }
 }
 
@@ -175,6 +189,39 @@ impl<B: Board> Acquisition<'_, '_, B> {
         self.health = self.health.with_if(Health::MAGNETOMETER_OVERFLOW, taken.overflow);
         taken.put(sensor, reading);
         true
+    }
+
+    /// Reads the accelerometers that answer before the cycle with this counter, each within `limit_us`.
+    async fn read_forces(&mut self, counter: u16, limit_us: u64) {
+        let limit = Duration::from_micros(limit_us);
+        let mut acc_p = [[NOT_READ; 3]; PLATES];
+        let (mut sum_us, mut sensors) = (0, 0);
+        for (slot, sensor) in SENSORS.into_iter().enumerate() {
+            let is_known = self.standing[slot] == Standing::Reading && self.shared.testing.get() != Some(slot);
+            if sensor.kind != Kind::Accelerometer || !is_known {
+                continue;
+            }
+            let asked = now();
+            match self.shared.clock.within(limit, self.plates.read(sensor)).await {
+                Ok(Ok(taken)) if taken.fresh => {
+                    acc_p[sensor.plate] = taken.counts;
+                    sum_us += asked.as_micros();
+                    sensors += 1;
+                }
+                Ok(_) => {}
+                Err(TimedOut) => {
+                    self.health = self.health.with(Health::BUS_RECOVERED);
+                    self.switch.recover().await;
+                    break;
+                }
+            }
+        }
+        if let Some(at_us) = u64::checked_div(sum_us, sensors) {
+            let force = self.shared.integrator.borrow_mut().force(at_us, acc_p);
+            force
+                .into_iter()
+                .for_each(|force| self.shared.force.signal((counter, force)));
+        }
     }
 
     /// Identifies and configures a sensor that is lost.

@@ -1,9 +1,13 @@
 //! What is derived from a cycle: the whole estimation, once its packet is on the line.
 //!
 //! The step holds the processor for as long as it takes. So it comes after everybody else has had the cycle: telemetry has
-//! handed its packet to the DMA, and half an interval lies between the closing of a cycle and the next fast sample.
+//! handed its packet to the DMA, and half an interval lies between the closing of a cycle and the next fast sample. What can be
+//! done before, for the readings of the accelerometers between two cycles, is.
 
-use embassy_futures::yield_now;
+use embassy_futures::{
+    select::{Either, select},
+    yield_now,
+};
 
 use super::{
     clock::now,
@@ -23,7 +27,14 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator) {
         return;
     };
     loop {
-        let cycle = votes.waiting(Voter::Estimate, cycles.next_message_pure()).await;
+        let next = select(cycles.next_message_pure(), shared.force.wait());
+        let cycle = match votes.waiting(Voter::Estimate, next).await {
+            Either::First(cycle) => cycle,
+            Either::Second((counter, force)) => {
+                estimator.take_force(counter, &force);
+                continue;
+            }
+        };
         votes.waiting(Voter::Estimate, yield_now()).await;
         let state = *shared.state.borrow();
         let health = cycle

@@ -20,7 +20,7 @@ use crate::{
         self, LogError,
         record::{Name, RecordBytes},
     },
-    increments::{Increments, Integrator},
+    increments::{Force, Increments, Integrator},
     mode::State,
     packet::PACKET_BYTES,
     resume::Resume,
@@ -42,20 +42,22 @@ pub struct Cycle {
     pub cycle_us: u32,
 }
 
-/// Two: a reader may be busy with one while the next arrives. A reader that is later than that loses the oldest.
-const QUEUED: usize = 2;
+/// A reader may be busy with one while the next arrives, and a derived frame keeps a line busy for 57 ms, in which three
+/// cycles of a unit at 50 Hz come. A reader that is later than that loses the oldest.
+const CYCLES: usize = 3;
+const FRAMES: usize = 2;
 
 /// Of both lines, 8N1.
 const LINE_BAUD: u64 = 115_200;
 const BITS_PER_BYTE: u64 = 10;
 
-type Cycles = PubSubChannel<NoopRawMutex, Cycle, QUEUED, 4, 0>;
-type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, QUEUED, 3, 0>;
+type Cycles = PubSubChannel<NoopRawMutex, Cycle, CYCLES, 4, 0>;
+type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, FRAMES, 3, 0>;
 
 /// A reader of the cycles.
-pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, QUEUED, 4, 0>;
+pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, CYCLES, 4, 0>;
 /// A reader of the derived frames.
-pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, QUEUED, 3, 0>;
+pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, FRAMES, 3, 0>;
 
 /// A line for the console, without its end.
 pub type Line = String<128>;
@@ -122,6 +124,8 @@ pub struct Shared {
     pub set_loaded: Cell<bool>,
     /// The one that is being sent.
     pub arriving: RefCell<Arriving>,
+    /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
+    pub force: Signal<NoopRawMutex, (u16, Force)>,
     cycles: Cycles,
     derived: DerivedFrames,
     /// Lines for the console.
@@ -152,6 +156,7 @@ impl Shared {
             set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
             set_loaded: Cell::default(),
             arriving: RefCell::default(),
+            force: Signal::new(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
             replies: Channel::new(),

@@ -2,7 +2,7 @@
 //!
 //! In: nothing; a tumble and a rest of a unit with nominal parameters are computed here, in counts that flicker as those
 //! of real parts do. Out: the static `CYCLES`: for each motion, ticks of calibration, of fault detection with the three
-//! vectors, and of the whole step, for every cycle.
+//! vectors, of the two readings of force before a cycle, and of the whole step, for every cycle.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -20,14 +20,16 @@ use super::counted::{motion, ticks};
 
 /// Motions: tumble, rest.
 const MOTIONS: usize = 2;
-/// Calibration, faults, whole.
-const PARTS: usize = 3;
+/// Calibration, faults, readings of force, whole.
+const PARTS: usize = 4;
 /// Cycles of each: thirty seconds, after twenty in which the field is learnt.
 const CYCLES_COUNTED: usize = 150;
 const SETTLING: usize = 100;
 /// Fast samples of the gyros in a cycle, and microseconds between them.
 const FAST: usize = 20;
 const FAST_US: u64 = 10_000;
+/// After which of them the accelerometers are read between two cycles.
+const READ_AT: [usize; 2] = [5, 12];
 
 #[unsafe(no_mangle)]
 static CYCLES: [AtomicU32; MOTIONS * PARTS * CYCLES_COUNTED] =
@@ -71,7 +73,7 @@ impl Unit {
         let place_b = self.set.place_b;
         let (mut force_b, mut field_b) = (Vector3::zeros(), Vector3::zeros());
         let (mut rate_b, mut before_b) = (Vector3::zeros(), Vector3::zeros());
-        for _ in 0..FAST {
+        for fast in 0..FAST {
             if self.turns {
                 // A step of the motion is 20 ms; taken for 10, it tumbles twice as fast.
                 before_b = rate_b;
@@ -81,10 +83,13 @@ impl Unit {
             field_b = self.q_nb.inverse_transform_vector(&super::counted::FIELD_N_UT);
             self.fast += 1;
             let counts = gyro.map(|axis| self.counts(&axis, &rate_b));
-            self.integrator.add(Fast {
-                at_us: FAST_US * self.fast as u64,
-                counts,
-            });
+            let at_us = FAST_US * self.fast as u64;
+            self.integrator.add(Fast { at_us, counts });
+            if READ_AT.contains(&fast) {
+                let acc_p =
+                    core::array::from_fn(|plate| core::array::from_fn(|k| self.counts(&acc[3 * plate + k], &force_b)));
+                self.integrator.force(at_us + 7_000, acc_p);
+            }
         }
         let start_us = FAST_US * self.fast as u64;
         let acceleration_b = (rate_b - before_b) / (FAST_US as f32 * 1e-6);
@@ -134,11 +139,17 @@ fn of(turns: bool, costs: &[AtomicU32]) {
             unit.set.apply(&sample.reading, &temperatures)
         });
         let (_, faults) = ticks(|| monitor.step(&unit.set, &sample.reading, &measured, 0.2));
+        let readings = increments.forces;
+        let ((), forces) = ticks(|| {
+            readings
+                .iter()
+                .for_each(|force| estimator.take_force(sample.reading.counter, force))
+        });
         let (_, whole) = ticks(|| estimator.step(&sample, &increments));
         let Some(counted) = cycle.checked_sub(SETTLING) else {
             continue;
         };
-        for (part, ticks) in [calibration, faults, whole].into_iter().enumerate() {
+        for (part, ticks) in [calibration, faults, forces, whole].into_iter().enumerate() {
             costs[part * CYCLES_COUNTED + counted].store(ticks, Ordering::Relaxed);
         }
     }

@@ -31,12 +31,14 @@ const FILTERS: [Row; 4] = [
 const UPDATES: usize = 600;
 
 /// As in the image, in its order.
-const PARTS: [Row; 6] = [
+const PARTS: [Row; 8] = [
     ("tumble: calibration", None),
     ("tumble: fault detection and the three vectors", None),
+    ("tumble: two readings of force before it", None),
     ("tumble: whole estimation of a cycle", Some(WHOLE_CEILING)),
     ("rest: calibration", None),
     ("rest: fault detection and the three vectors", None),
+    ("rest: two readings of force before it", None),
     ("rest: whole estimation of a cycle", Some(WHOLE_CEILING)),
 ];
 const CYCLES: usize = 150;

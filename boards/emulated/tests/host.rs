@@ -7,8 +7,9 @@ use bench::{MS, Tape, image};
 use emems::{packet::PACKET_BYTES, sample::NO_SLOT, unit::Settings};
 use twin::{host, part::Nanos, plant::Plant};
 
-/// [us] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant.
-const SLOT_TOLERANCE_US: u32 = 6;
+/// [us] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant, and both
+/// wait for whole microseconds, sixteen sensors one after another.
+const SLOT_TOLERANCE_US: u32 = 8;
 /// [ns] how far apart their clocks may start.
 const CLOCK_TOLERANCE_NS: Nanos = 5_000;
 

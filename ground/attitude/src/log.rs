@@ -2,13 +2,14 @@
 //!
 //! In: packets as `ground/packets` reads them, with derived frames or without. Out: one [`Cycle`] a packet, for
 //! `emems::estimate`, which flies. With a derived frame a cycle is bit for bit what the unit had. Without, its time is the
-//! packet's number times the period, slot times are those of a unit whose sensors all answer, and each gyro's integral is
-//! the mean of two samples times the time between them, a period at most: the rest is a gap.
+//! packet's number times the period, slot times are those of a unit whose sensors all answer, specific force is the packet's
+//! reading alone, and each gyro's integral is the mean of two samples times the time between them, a period at most: the
+//! rest is a gap.
 
 use emems::{
     derived::Derived,
     geometry::rate_from_gyros,
-    increments::{Channel, Increments},
+    increments::{Channel, Force, Increments, forces::READINGS},
     sample::{NOT_READ, Reading, SENSOR_COUNT, Sample},
     unit::Settings,
 };
@@ -123,6 +124,7 @@ impl Cycles {
             covered_us: if matrix.is_some() { covered_us } else { 0 },
             end_us,
             gyro,
+            forces: [Force::NONE; READINGS],
         }
     }
 }

@@ -16,7 +16,7 @@ use emems::{
 const REPLY_START: u8 = b'>';
 
 /// Longest reply line or derived frame; the unit's own are shorter.
-const LONGEST_LINE: usize = 512;
+const LONGEST_LINE: usize = 768;
 
 /// Unreadable bytes handed out at most at once, so that endless noise is shown while it lasts.
 const LONGEST_UNREAD: usize = 256;

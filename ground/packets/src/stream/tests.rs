@@ -2,7 +2,7 @@
 
 use emems::{
     estimate::Estimate,
-    increments::{Channel, Increments},
+    increments::{Channel, Force, Increments, forces::READINGS},
     mode::Mode,
     packet::{Expected, encode},
     sample::NOT_READ,
@@ -132,6 +132,7 @@ fn derived_frame() -> [u8; DERIVED_BYTES] {
             covered_us: 0,
             end_us: 0,
             gyro: [silent; 4],
+            forces: [Force::NONE; READINGS],
         },
         estimate_us: 0,
         estimate: Estimate::NOTHING,
@@ -160,10 +161,10 @@ fn a_damaged_derived_frame_costs_itself_only() {
     flipped[30] = b'7';
     check(
         &[flipped.as_slice(), GOLDEN, &derived_frame()[..100], GOLDEN].concat(),
-        &[(486, 1), (742, 1)],
+        &[(652, 1), (908, 1)],
         &[
-            "offset 0, 486 bytes: begins like a derived frame, but checksum 0861 was sent, the fields give 7DF8",
-            "offset 642, 100 bytes: frame cut off after 100 of 486 bytes",
+            "offset 0, 652 bytes: begins like a derived frame, but checksum 4CFF was sent, the fields give ABC1",
+            "offset 808, 100 bytes: frame cut off after 100 of 652 bytes",
         ],
     );
 }
