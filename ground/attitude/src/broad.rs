@@ -6,7 +6,10 @@
 
 use std::path::{Path, PathBuf};
 
-use emems::kalman::{Delays, Params};
+use emems::{
+    increments::forces::READINGS,
+    kalman::{Delays, Params},
+};
 use nalgebra::Vector3;
 
 use crate::{
@@ -29,17 +32,25 @@ const LATITUDE_DEG: f64 = 52.5;
 pub enum Mode {
     /// At every row.
     Full,
-    /// At 5 Hz, on rates integrated within the period.
+    /// At 5 Hz, on rates integrated within the period and force read three times in it, as the unit does.
     FiveHz,
     /// At every row, begun 10 s into the motion.
     FromMotion,
     /// At 5 Hz, the mean over [`FIRST_ROWS`]: at which instants force and field are sampled is chance.
     FiveHzFromAnyRow,
+    /// At 5 Hz on one reading of force a period, which is what packets alone have and what peers are given.
+    FiveHzOneForce,
 }
 
 impl Mode {
     /// All of them.
-    pub const ALL: [Mode; MODES] = [Mode::Full, Mode::FiveHz, Mode::FromMotion, Mode::FiveHzFromAnyRow];
+    pub const ALL: [Mode; MODES] = [
+        Mode::Full,
+        Mode::FiveHz,
+        Mode::FromMotion,
+        Mode::FiveHzFromAnyRow,
+        Mode::FiveHzOneForce,
+    ];
 
     /// As a table's heading has it.
     pub fn name(self) -> &'static str {
@@ -48,6 +59,7 @@ impl Mode {
             Mode::FiveHz => "5 Hz",
             Mode::FromMotion => "start in motion",
             Mode::FiveHzFromAnyRow => "5 Hz, 12 first rows",
+            Mode::FiveHzOneForce => "5 Hz, one force",
         }
     }
 }
@@ -64,7 +76,7 @@ const FIVE_HZ: usize = 57;
 const FIRST_ROWS: [usize; 12] = [0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55];
 
 /// How many modes there are.
-pub const MODES: usize = 4;
+pub const MODES: usize = 5;
 
 /// Parameters and noise for these recordings, one set for all.
 pub fn replay(mode: Mode) -> Replay {
@@ -88,8 +100,12 @@ pub fn replay(mode: Mode) -> Replay {
         },
         cut_step: CUT_STEP_DEG.to_radians(),
         rows_per_step: match mode {
-            Mode::FiveHz | Mode::FiveHzFromAnyRow => FIVE_HZ,
+            Mode::FiveHz | Mode::FiveHzFromAnyRow | Mode::FiveHzOneForce => FIVE_HZ,
             Mode::Full | Mode::FromMotion => 1,
+        },
+        forces: match mode {
+            Mode::FiveHz | Mode::FiveHzFromAnyRow => 1 + READINGS,
+            _ => 1,
         },
     }
 }

@@ -76,6 +76,13 @@ pub fn format(ours: &[Line], others: &Totals) -> String {
         (2, &REPORT[..]),
     ];
     line(
+        "on one force",
+        columns.map(|(mode, numbers)| {
+            let mode = [0, 4, 2][mode];
+            mean_of(ours, numbers, mode).map(|rmse| rmse.total_deg)
+        }),
+    );
+    line(
         "this filter",
         columns.map(|(mode, numbers)| mean_of(ours, numbers, mode).map(|rmse| rmse.total_deg)),
     );
