@@ -3,8 +3,9 @@
 In: a folder of recordings, and the step [rad/s] of their rates' codes, which were cut towards zero: half of it is put
 back, as for ours (ground/attitude/src/replay.rs). Out, on standard output: CSV
 `filter,recording,mode,total,heading,inclination` in degrees, scored as ground/attitude/src/score.rs scores ours. Modes:
-full (285.7 Hz), five (5 Hz, each period's rotation composed of the samples' and given as a rate, single samples of the
-rest: what ours is given) and motion (begun 10 s into the motion).
+full (285.7 Hz), five (5 Hz, each period's rotation composed of the samples' and given as a rate, three samples of force
+turned to its end, one of the field: what ours is given), single (the same with one sample of force) and motion (begun
+10 s into the motion). Mode speed has updates a second in one thread in place of the total error, the most of five runs.
 Packages: `python3 -m venv peers/.venv && peers/.venv/bin/pip install -r peers/requirements.txt`.
 """
 
@@ -13,6 +14,7 @@ import gzip
 import multiprocessing
 import pathlib
 import sys
+import time
 
 try:
     import ahrs
@@ -106,16 +108,33 @@ FILTERS = {
 }
 
 
-def composed(rates, dt):
-    """Rates that turn in one period of `dt * rates.shape[1]` by what these turn in it, sample by sample."""
+def turned(rates, dt):
+    """The rotation of each period, whose rates these are."""
     q = np.tile([1.0, 0.0, 0.0, 0.0], (len(rates), 1))
     for k in range(rates.shape[1]):
         half = rates[:, k] * dt / 2
         norm = np.linalg.norm(half, axis=1, keepdims=True)
         q = multiply(q, np.hstack([np.cos(norm), half * np.sinc(norm / np.pi)]))
+    return q
+
+
+def composed(rates, dt):
+    """Rates that turn in one period of `dt * rates.shape[1]` by what these turn in it, sample by sample."""
+    q = turned(rates, dt)
     norm = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
     angle = 2 * np.arctan2(norm, q[:, :1])
     return q[:, 1:] * angle / np.maximum(norm, 1e-12) / (dt * rates.shape[1])
+
+
+def mean_force(periods, dt):
+    """Of three samples evenly through each period, turned to its end."""
+    last = periods.shape[1] - 1
+    force = periods[:, last, 4:7].copy()
+    for at in (last // 3, last * 2 // 3):
+        q = turned(periods[:, at + 1 :, 1:4], dt)
+        sample = np.hstack([np.zeros((len(q), 1)), periods[:, at, 4:7]])
+        force += multiply(multiply(q * [1, -1, -1, -1], sample), q)[:, 1:]
+    return force / 3
 
 
 def uncut(rates, step):
@@ -130,6 +149,8 @@ def modes(rows):
     five = rows[: count * FIVE_HZ].reshape(count, FIVE_HZ, -1)
     last = five[:, -1].copy()
     last[:, 1:4] = composed(five[:, :, 1:4], dt)
+    yield "single", dt * FIVE_HZ, last.copy()
+    last[:, 4:7] = mean_force(five, dt)
     yield "five", dt * FIVE_HZ, last
     moving = np.argmax(rows[:, 17] > 0)
     yield "motion", dt, rows[np.searchsorted(rows[:, 0], rows[moving, 0] + 10) :]
@@ -160,6 +181,20 @@ def lines_of(cut_step, path):
     return lines
 
 
+def speed(path, runs=5):
+    """Updates a second of VQF, which is C++ and takes the whole recording at once."""
+    with gzip.open(path, "rt") as text:
+        rows = np.genfromtxt(text, delimiter=",", skip_header=1)
+    data = [np.ascontiguousarray(rows[:, first : first + 3]) for first in (1, 4, 7)]
+    least = float("inf")
+    for _ in range(runs):
+        filter_ = vqf.VQF(np.median(np.diff(rows[:, 0])))
+        begun = time.perf_counter()
+        filter_.updateBatch(*data)
+        least = min(least, time.perf_counter() - begun)
+    return f"VQF,{path.name[:2]},speed,{len(rows) / least:.0f},,"
+
+
 def main():
     print("filter,recording,mode,total,heading,inclination")
     paths = sorted(pathlib.Path(sys.argv[1]).glob("[0-9][0-9]*.csv.gz"))
@@ -167,6 +202,8 @@ def main():
         for done, found in enumerate(pool.imap(functools.partial(lines_of, float(sys.argv[2])), paths), start=1):
             print("\n".join(found), flush=True)
             print(f"peers: {done} of {len(paths)} recordings", file=sys.stderr)
+    if paths:
+        print(speed(paths[0]))
 
 
 if __name__ == "__main__":

@@ -4,11 +4,14 @@
 //! Orientation Estimation", Data 6(7), 2021, doi 10.3390/data6070072, CC-BY 4.0), 285.7 rows a second, about three
 //! minutes each. One set of parameters for all; it was chosen on [`TUNE`], and [`REPORT`] says what it is worth.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use emems::{
     increments::forces::READINGS,
-    kalman::{Delays, Params},
+    kalman::{Delays, Filter, Params, Step},
 };
 use nalgebra::Vector3;
 
@@ -175,10 +178,30 @@ pub fn run(folder: &Path, mut done: impl FnMut(&str)) -> Result<Table, Recording
     Ok(table)
 }
 
-/// The mean over those of `numbers` that are in a table, in the mode at `mode`.
-pub fn mean_of(table: &[Line], numbers: &[&str], mode: usize) -> Option<Rmse> {
+/// Updates a second of the filter at every row of the recording of a folder with this number, the most of five runs.
+pub fn updates_a_second(folder: &Path, number: &str) -> Result<Option<f64>, RecordingError> {
+    let Some((_, path)) = files(folder)?.into_iter().find(|(found, _)| found == number) else {
+        return Ok(None);
+    };
+    let (rows, replay) = (recording::read(&path)?, replay(Mode::Full));
+    let steps: Vec<Step> = replay.steps(&rows).map(|(step, _)| step).collect();
+    let least_s = (0..5)
+        .map(|_| {
+            let mut filter = Filter::new(replay.params);
+            let begun = Instant::now();
+            steps.iter().for_each(|step| {
+                std::hint::black_box(filter.step(step));
+            });
+            begun.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    Ok(Some(steps.len() as f64 / least_s))
+}
+
+/// The mean over those of `numbers` that are in a table, in a mode.
+pub fn mean_of(table: &[Line], numbers: &[&str], mode: Mode) -> Option<Rmse> {
     let chosen = table.iter().filter(|(number, _)| numbers.contains(&number.as_str()));
-    let all: Option<Vec<Rmse>> = chosen.map(|(_, modes)| modes[mode]).collect();
+    let all: Option<Vec<Rmse>> = chosen.map(|(_, modes)| modes[mode as usize]).collect();
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
@@ -207,7 +230,7 @@ pub fn format(table: &[Line]) -> String {
         line(number, *modes);
     }
     for (name, numbers) in [("mean of tune", &TUNE[..]), ("mean of report", &REPORT[..])] {
-        line(name, std::array::from_fn(|mode| mean_of(table, numbers, mode)));
+        line(name, Mode::ALL.map(|mode| mean_of(table, numbers, mode)));
     }
     text + "total (heading, inclination)\n"
 }

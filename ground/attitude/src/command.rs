@@ -308,7 +308,10 @@ fn table(folder: &Path, with_peers: bool) -> Result<(), AttitudeError> {
     print!("{}", broad::format(&ours));
     if with_peers {
         match peers::run(Command::new(peers::python()), folder) {
-            Ok(others) => print!("{}", peers::format(&ours, &others)),
+            Ok(others) => {
+                print!("{}", peers::format(&ours, &others));
+                print!("{}", peers::format_speed(folder, &others)?);
+            }
             Err(why) => println!("peers left out: {why}"),
         }
     }

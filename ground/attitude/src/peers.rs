@@ -9,7 +9,10 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::broad::{CUT_STEP_DEG, Line, REPORT, TUNE, mean_of};
+use crate::{
+    broad::{self, CUT_STEP_DEG, Line, Mode, REPORT, TUNE, mean_of},
+    recording::RecordingError,
+};
 
 /// The script, from the project's root.
 const SCRIPT: &str = "peers/broad.py";
@@ -53,53 +56,62 @@ pub fn parse(csv: &str) -> Totals {
     totals
 }
 
+/// What a column of the table is called, the script's name of its mode, and ours.
+const COLUMNS: [(&str, &str, Mode); 4] = [
+    ("285 Hz", "full", Mode::Full),
+    ("5 Hz", "five", Mode::FiveHz),
+    ("one force", "single", Mode::FiveHzOneForce),
+    ("motion", "motion", Mode::FromMotion),
+];
+
 /// Mean total errors: each mode over the recordings of tune and of report.
 pub fn format(ours: &[Line], others: &Totals) -> String {
     let mut text = format!("\n{:<14}", "mean [deg]");
-    for column in ["tune 285 Hz", "report", "tune 5 Hz", "report", "tune motion", "report"] {
-        text += &format!("{column:>13}");
+    for (column, ..) in COLUMNS {
+        text += &format!("{:>15}{:>10}", format!("tune {column}"), "report");
     }
     text += "\n";
-    let mut line = |name: &str, values: [Option<f64>; 6]| {
+    let mut line = |name: &str, values: Vec<Option<f64>>| {
         text += &format!("{name:<14}");
-        for value in values {
-            text += &value.map_or(format!("{:>13}", "-"), |value| format!("{value:>13.2}"));
+        for (value, width) in values.into_iter().zip([15, 10].into_iter().cycle()) {
+            let value = value.map_or("-".to_string(), |value| format!("{value:.2}"));
+            text += &format!("{value:>width$}");
         }
         text += "\n";
     };
-    let columns = [
-        (0, &TUNE[..]),
-        (0, &REPORT[..]),
-        (1, &TUNE[..]),
-        (1, &REPORT[..]),
-        (2, &TUNE[..]),
-        (2, &REPORT[..]),
-    ];
-    line(
-        "on one force",
-        columns.map(|(mode, numbers)| {
-            let mode = [0, 4, 2][mode];
-            mean_of(ours, numbers, mode).map(|rmse| rmse.total_deg)
-        }),
-    );
-    line(
-        "this filter",
-        columns.map(|(mode, numbers)| mean_of(ours, numbers, mode).map(|rmse| rmse.total_deg)),
-    );
+    let cells = || {
+        COLUMNS
+            .iter()
+            .flat_map(|column| [(column, &TUNE[..]), (column, &REPORT[..])])
+    };
+    let own = cells().map(|((.., mode), numbers)| mean_of(ours, numbers, *mode).map(|rmse| rmse.total_deg));
+    line("this filter", own.collect());
     for (filter, totals) in others {
-        line(
-            filter,
-            columns.map(|(mode, numbers)| {
-                let mode = ["full", "five", "motion"][mode];
-                let found = numbers
-                    .iter()
-                    .map(|number| totals.get(&(mode.to_string(), number.to_string())).copied());
-                let found: Option<Vec<f64>> = found.collect();
-                found.map(|found| found.iter().sum::<f64>() / found.len() as f64)
-            }),
-        );
+        let theirs = cells().map(|((_, script, _), numbers)| {
+            let total = |number: &&str| totals.get(&(script.to_string(), number.to_string())).copied();
+            let found: Option<Vec<f64>> = numbers.iter().map(total).collect();
+            found.map(|found| found.iter().sum::<f64>() / found.len() as f64)
+        });
+        line(filter, theirs.collect());
     }
     text
+}
+
+/// Updates a second in one thread beside those of the peers whose speed the script measured, on the same recording.
+pub fn format_speed(folder: &Path, others: &Totals) -> Result<String, RecordingError> {
+    let mut text = String::new();
+    for (filter, totals) in others {
+        for ((_, number), theirs) in totals.iter().filter(|((mode, _), _)| mode == "speed") {
+            if let Some(own) = broad::updates_a_second(folder, number)? {
+                text += &format!(
+                    "updates a second on recording {number}, one thread: this filter {own:.3e}, {filter} {theirs:.3e}, \
+                     {:.2} times\n",
+                    own / theirs
+                );
+            }
+        }
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -117,7 +129,7 @@ mod tests {
         let line = text.lines().find(|line| line.starts_with("VQF")).expect("a line");
         assert_eq!(
             line.split_whitespace().collect::<Vec<_>>(),
-            ["VQF", "2.00", "-", "-", "-", "-", "-"]
+            ["VQF", "2.00", "-", "-", "-", "-", "-", "-", "-"]
         );
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use attitude::broad::{self, REPORT, TUNE, mean_of};
+use attitude::broad::{self, Mode, REPORT, TUNE, mean_of};
 
 /// The recordings stand beside the project.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/broad");
@@ -22,7 +22,12 @@ fn it_is_ahead_of_the_best_peer_on_real_recordings() {
     }
     let table = broad::run(FOLDER.as_ref(), |_| {}).expect("recordings");
     let total = |numbers: &[&str], mode| mean_of(&table, numbers, mode).expect("an attitude in each").total_deg;
-    let found = [total(&TUNE, 0), total(&REPORT, 0), total(&REPORT, 4), total(&REPORT, 2)];
+    let found = [
+        total(&TUNE, Mode::Full),
+        total(&REPORT, Mode::Full),
+        total(&REPORT, Mode::FiveHzOneForce),
+        total(&REPORT, Mode::FromMotion),
+    ];
     println!(
         "tune {:.2}, report {:.2}, at 5 Hz on one force {:.2}, from motion {:.2}",
         found[0], found[1], found[2], found[3]
@@ -30,7 +35,7 @@ fn it_is_ahead_of_the_best_peer_on_real_recordings() {
     for (found, peer) in found.into_iter().zip(VQF) {
         assert!(found < peer, "{found} is not below {peer}");
     }
-    let as_read = [total(&REPORT, 1), total(&REPORT, 3)];
+    let as_read = [total(&REPORT, Mode::FiveHz), total(&REPORT, Mode::FiveHzFromAnyRow)];
     println!(
         "at 5 Hz as the unit reads {:.2}, begun at any row {:.2}",
         as_read[0], as_read[1]
