@@ -26,6 +26,18 @@ pub const TUNE: [&str; 7] = ["02", "07", "11", "15", "24", "28", "32"];
 /// Recordings that played no part in it.
 pub const REPORT: [&str; 9] = ["01", "03", "05", "09", "18", "26", "30", "34", "36"];
 
+/// All of them by what was done, as the data set names it.
+pub const GROUPS: [(&str, &[&str]); 8] = [
+    ("slow rotation", &["01", "02", "03", "05"]),
+    ("fast rotation", &["07", "09"]),
+    ("slow translation", &["11"]),
+    ("fast translation", &["15", "18"]),
+    ("tapping", &["24"]),
+    ("vibrating phone", &["26"]),
+    ("stationary magnet", &["28", "30"]),
+    ("attached magnet", &["32", "34", "36"]),
+];
+
 /// [rad/s] the Earth's rate and [rad] the latitude of Berlin, where the recordings were made.
 const EARTH_RATE: f64 = 7.292_115e-5;
 const LATITUDE_DEG: f64 = 52.5;

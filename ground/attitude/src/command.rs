@@ -310,6 +310,7 @@ fn table(folder: &Path, with_peers: bool) -> Result<(), AttitudeError> {
         match peers::run(Command::new(peers::python()), folder) {
             Ok(others) => {
                 print!("{}", peers::format(&ours, &others));
+                print!("{}", peers::format_groups(&ours, &others));
                 print!("{}", peers::format_speed(folder, &others)?);
             }
             Err(why) => println!("peers left out: {why}"),

@@ -10,7 +10,7 @@ use std::{
 };
 
 use crate::{
-    broad::{self, CUT_STEP_DEG, Line, Mode, REPORT, TUNE, mean_of},
+    broad::{self, CUT_STEP_DEG, GROUPS, Line, Mode, REPORT, TUNE, mean_of},
     recording::RecordingError,
 };
 
@@ -97,6 +97,34 @@ pub fn format(ours: &[Line], others: &Totals) -> String {
     text
 }
 
+/// The mean total errors of each group of recordings beside those of the peer that is best in it.
+pub fn format_groups(ours: &[Line], others: &Totals) -> String {
+    let mut text = format!("\n{:<18}", "mean [deg]");
+    for (column, ..) in COLUMNS {
+        text += &format!("{column:>9} {:<16}", "best peer");
+    }
+    text = text.trim_end().to_string() + "\n";
+    for (group, numbers) in GROUPS {
+        let mut line = format!("{group:<18}");
+        for (_, script, mode) in COLUMNS {
+            let Some(own) = mean_of(ours, numbers, mode) else {
+                continue;
+            };
+            let theirs = others.iter().filter_map(|(filter, totals)| {
+                let total = |number: &&str| totals.get(&(script.to_string(), number.to_string())).copied();
+                let found: Option<Vec<f64>> = numbers.iter().map(total).collect();
+                Some((found?.iter().sum::<f64>() / numbers.len() as f64, filter))
+            });
+            let best = theirs.min_by(|one, other| one.0.total_cmp(&other.0));
+            let best = best.map_or(String::new(), |(total, filter)| format!("{total:.2} {filter}"));
+            line += &format!("{:>9.2} {best:<16}", own.total_deg);
+        }
+        text += line.trim_end();
+        text += "\n";
+    }
+    text
+}
+
 /// Updates a second in one thread beside those of the peers whose speed the script measured, on the same recording.
 pub fn format_speed(folder: &Path, others: &Totals) -> Result<String, RecordingError> {
     let mut text = String::new();
@@ -117,6 +145,7 @@ pub fn format_speed(folder: &Path, others: &Totals) -> Result<String, RecordingE
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{broad::MODES, score::Rmse};
 
     #[test]
     fn means_are_given_only_where_every_recording_was_run() {
@@ -131,6 +160,26 @@ mod tests {
             line.split_whitespace().collect::<Vec<_>>(),
             ["VQF", "2.00", "-", "-", "-", "-", "-", "-", "-"]
         );
+    }
+
+    #[test]
+    fn a_group_has_the_peer_that_is_best_in_it_beside_it() {
+        let rmse = |total_deg| {
+            Some(Rmse {
+                total_deg,
+                heading_deg: 0.0,
+                inclination_deg: 0.0,
+            })
+        };
+        let ours = vec![("24".to_string(), [rmse(1.5); MODES])];
+        let csv = "filter,recording,mode,total,heading,inclination\nVQF,24,full,2.0,,\nMadgwick,24,full,1.25,,\nVQF,26,full,1,,\n";
+        let text = format_groups(&ours, &parse(csv));
+        let line = text.lines().find(|line| line.starts_with("tapping")).expect("a line");
+        assert_eq!(
+            line.split_whitespace().collect::<Vec<_>>(),
+            ["tapping", "1.50", "1.25", "Madgwick", "1.50", "1.50", "1.50"]
+        );
+        assert!(text.lines().any(|line| line == "vibrating phone"), "{text}");
     }
 
     #[test]
