@@ -6,7 +6,7 @@
 
 use crate::{
     attribute::attribute,
-    belief::{Promised, UNKNOWN_PRIOR},
+    belief::{Promised, UNKNOWN_ALONE},
     believed::Believed,
     case::Subject,
     cause::{Cause, alone, share_out},
@@ -164,10 +164,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     );
     let alternatives = believed.alternatives(&library, &explanation);
     let mut none_of_these = believed.unknown;
-    if believed.causes.is_empty() && !believed.unnamed.is_empty() {
-        // What is not likely enough to be said may be there, or something else.
-        (left, shrink) = all_there_was();
-        none_of_these = none_of_these.max(left.unknown(UNKNOWN_PRIOR) * believed.none_is_there());
+    if believed.causes.is_empty() {
+        if !believed.unnamed.is_empty() {
+            // What is not likely enough to be said may be there, or something else.
+            (left, shrink) = all_there_was();
+        }
+        none_of_these = none_of_these.max(left.unknown(UNKNOWN_ALONE) * believed.none_is_there());
     }
     let Believed {
         mut causes,

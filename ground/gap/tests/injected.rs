@@ -52,7 +52,8 @@ fn a_scale_error_is_found_sized_and_shrunk() {
 fn a_healthy_unit_needs_nothing() {
     let (subject, diagnosis) = diagnosed(0.0);
     assert!(diagnosis.causes.is_empty() && diagnosis.withdrawn.is_empty());
-    assert!(diagnosis.none_of_these < 0.1, "{}", diagnosis.none_of_these);
+    // Its prior is 0.15.
+    assert!(diagnosis.none_of_these < 0.2, "{}", diagnosis.none_of_these);
     let screen = terminal::screen(&subject, &diagnosis, "none");
     assert!(screen.contains("NO EFFECT") && screen.lines().count() < 40, "{screen}");
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::{belief::UNKNOWN_PRIOR, case::Subject, diagnose::Diagnosis, explain::SAID};
+use crate::{belief::UNKNOWN_ALONE, case::Subject, diagnose::Diagnosis, explain::SAID};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
@@ -12,7 +12,7 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
     if diagnosis.causes.is_empty() {
         let said = if diagnosis.none_of_these > 0.5 {
             "NONE OF THESE: nothing in the library explains what is there"
-        } else if diagnosis.gate.unknown(UNKNOWN_PRIOR) > 0.5 {
+        } else if diagnosis.gate.unknown(UNKNOWN_ALONE) > 0.5 {
             "UNDECIDED: there is a gap, but no cause of it is likelier than not"
         } else {
             "NO EFFECT beyond calibration and noise"
