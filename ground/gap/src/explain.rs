@@ -18,6 +18,7 @@ use crate::{
     problem::{Frame, Problem},
     scatter::{Scatter, scatters},
     temper,
+    wander::{self, Walk},
 };
 
 /// [nats] an effect on the scatter must gain.
@@ -38,8 +39,8 @@ const LEAST_PART: f64 = 0.02;
 /// The effect on the scatter that changes nothing but its size.
 const LOUDER: &str = "noise-level";
 
-/// The effect on the scatter that is slow, and that effects of time and temperature imitate piece by piece.
-const WANDERING: &str = "gyro-bias-walk";
+/// Searches beside a walk until it stays what it is.
+const WALKS: usize = 4;
 
 /// Steps from which a walk is told from anything else: the rows of a table are fewer, and no walk.
 const STEPS: usize = 100;
@@ -82,15 +83,24 @@ impl Explanation {
         let explained = gains(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
+        let beside = walked(problem, library, &first, withheld, progress)
+            .filter(|(walk, found, _)| walk.gain + gains(&found.chosen) > explained + SCATTER_MARGIN);
         let is_alone = alone.is_some();
-        let wanders = alone
+        let mut wanders = alone
             .as_ref()
-            .is_some_and(|alone| alone.effect.page().name == WANDERING);
+            .is_some_and(|alone| alone.effect.page().name == wander::NAME);
         if is_alone {
             found.chosen.clear();
             scatter = alone;
         }
-        let first = if is_alone { quiet } else { &first };
+        let mut first = if is_alone { quiet.clone() } else { first };
+        if let Some((walk, besides, own)) = beside {
+            // Searched with the walk open, which is not to be done again with louder white noise in its place.
+            (found, *library, wanders) = (besides, own, true);
+            first = Model::around(problem, found.model(library));
+            scatter = Some(walk.scatter());
+        }
+        let first = &first;
         let louder = scatter.as_ref().map_or_else(
             || vec![1.0; problem.frames.len()],
             |scatter| louder(problem, first, scatter),
@@ -173,7 +183,7 @@ impl Explanation {
         };
         match &self.scatter {
             // Louder noise takes in whatever is there, and a walk whatever is slow: that it does is no sign of its law.
-            Some(scatter) if [LOUDER, WANDERING].contains(&scatter.effect.page().name) => by_readings(scatter),
+            Some(scatter) if [LOUDER, wander::NAME].contains(&scatter.effect.page().name) => by_readings(scatter),
             Some(scatter) => by_readings(scatter) + 2.0 * scatter.gain,
             None => self.energy_without(quiet, &[]),
         }
@@ -264,7 +274,7 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 /// everything.
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-    let is_walk = scatter.effect.page().name == WANDERING;
+    let is_walk = scatter.effect.page().name == wander::NAME;
     !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= STEPS)
 }
 
@@ -281,4 +291,38 @@ fn louder(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
         }
     };
     (0..problem.frames.len()).map(factor).collect()
+}
+
+/// A walk and what else there is once it is open, with the library as that search left it; `None` where there is no walk.
+fn walked(
+    problem: &mut Problem,
+    library: &Library,
+    first: &Model,
+    withheld: &[String],
+    progress: &dyn Fn(f64),
+) -> Option<(Walk, Attribution, Library)> {
+    let mut walk = Walk::beside(problem, &[], withheld)?;
+    let mut library = library.clone();
+    let described = problem.frames.clone();
+    let misfits = temper::factors(&first.fitted.rest);
+    for _ in 0..WALKS {
+        let is_walking = |channel: usize| walk.channels.iter().any(|(own, _)| *own == channel);
+        let factors = misfits.iter().enumerate();
+        let factors: Vec<f64> = factors
+            .map(|(channel, misfit)| if is_walking(channel) { 1.0 } else { *misfit })
+            .collect();
+        let frames = walk.open(problem, weighed(described.clone(), &factors));
+        reframe(problem, &mut library, frames);
+        let found = attribute(problem, &mut library, progress);
+        reframe(problem, &mut library, described.clone());
+        let again = Walk::beside(problem, &found.model(&library), withheld)?;
+        let is_same = again.is_near(&walk);
+        walk = again;
+        if is_same {
+            return walk
+                .is_one(problem, &found.model(&library))
+                .then_some((walk, found, library));
+        }
+    }
+    None
 }

@@ -60,6 +60,7 @@ pub mod terminal;
 pub mod trace;
 pub mod uncovered;
 pub mod verdict;
+pub mod wander;
 pub mod windows;
 
 pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

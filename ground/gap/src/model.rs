@@ -11,6 +11,7 @@ use crate::{
 const AT_BEST: f64 = 0.5;
 
 /// Effects with everything else refitted around them.
+#[derive(Clone)]
 pub struct Model {
     /// The effects.
     pub components: Vec<Component>,

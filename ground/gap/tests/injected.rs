@@ -253,8 +253,8 @@ fn a_channel_without_samples_leaves_the_verdict_to_the_others() {
     assert!(screen.contains("WHERE   gz 100 %"), "{screen}");
 }
 
-#[test]
-fn a_tone_is_not_called_a_walk_of_the_zero() {
+/// A zero that wanders by a tenth of the noise a sample.
+fn wandering() -> impl Fn(f64) -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
     let mut zero = 0.0;
     let walk: Vec<f64> = (0..SECONDS * RATE_HZ)
@@ -264,7 +264,21 @@ fn a_tone_is_not_called_a_walk_of_the_zero() {
             zero
         })
         .collect();
-    let walked = diagnosed_in(&erring(|t_s| walk[(t_s * RATE_HZ as f64).round() as usize], ""), &[]).1;
+    move |t_s| walk[(t_s * RATE_HZ as f64).round() as usize]
+}
+
+#[test]
+fn a_scale_error_is_found_beside_a_walk() {
+    let walk = wandering();
+    let (_, both) = diagnosed_in(&erring(|t_s| walk(t_s) + 0.02 * rate(t_s), ""), &[]);
+    let names: Vec<&str> = both.causes.iter().map(|cause| cause.effect).collect();
+    assert!(names.contains(&"gyro-bias-walk") && names.len() == 2, "{names:?}");
+    assert!(both.none_of_these < 0.5, "{}", both.none_of_these);
+}
+
+#[test]
+fn a_tone_is_not_called_a_walk_of_the_zero() {
+    let walked = diagnosed_in(&erring(wandering(), ""), &[]).1;
     assert_eq!(walked.causes.first().expect("a cause").effect, "gyro-bias-walk");
     assert!(walked.none_of_these < 0.1, "{}", walked.none_of_these);
     let tone = |t_s: f64| 2.0 * NOISE * (std::f64::consts::TAU * t_s / 17.0).sin();

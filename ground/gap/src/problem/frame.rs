@@ -65,6 +65,16 @@ impl Frame {
         self.factorise();
     }
 
+    /// Opens further columns of its calibration, in units of noise for one prior sigma.
+    pub fn widen(&mut self, columns: &DMatrix<f64>) {
+        let open = self.nuisance.ncols();
+        let mut wider = std::mem::replace(&mut self.nuisance, DMatrix::zeros(0, 0))
+            .resize_horizontally(open + columns.ncols(), 0.0);
+        wider.columns_mut(open, columns.ncols()).copy_from(columns);
+        self.nuisance = wider;
+        self.factorise();
+    }
+
     /// After its columns have changed.
     pub(super) fn factorise(&mut self) {
         let open = self.nuisance.ncols();

@@ -1,0 +1,203 @@
+//! A walk of gyros' zeros, found beside effects on readings, with what it leaves of these.
+//!
+//! In: the problem and effects. Out: the [`Walk`] that makes the log likeliest beside them, and frames in which it is open, so
+//! that a search finds what is there besides. A calibration that is fitted first has taken up half of a walk, and effects of
+//! time and temperature the rest piece by piece; here calibration and walk are marginalised together.
+//!
+//! A walk of `s` per sqrt(s) over T seconds is its first Karhunen-Loeve terms, `sqrt 2 sin(x_k t/T)` of variance `s^2 T/x_k^2`
+//! with `x_k = (k - 1/2) pi`. With these as further columns `S D` of the calibration, D their sigmas, the log gains
+//! `1/2 b'D (I + D A D)^-1 D b - 1/2 ln |I + D A D|` nats, where `A = S'P S` and `b = S'P r` (Rasmussen and Williams 2006, 5.8 and
+//! A.9), so a size costs one small factorisation.
+
+use std::f64::consts::{PI, SQRT_2};
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use twin::{
+    effect::{Effect, LIBRARY},
+    predict::Kind,
+};
+
+use crate::{
+    gram::log_determinant,
+    problem::{Component, Frame, Problem},
+    scatter::Scatter,
+};
+
+/// The effect's name.
+pub const NAME: &str = "gyro-bias-walk";
+
+/// Terms of a walk; what they leave is a hundredth of its power and faster than ten seconds in five minutes.
+const TERMS: usize = 32;
+
+/// Samples from which a walk is told from anything else: the rows of a table are fewer, and no walk.
+const FEWEST: usize = 100;
+
+/// Sum of squares over the six octaves beyond which it is none: one walk in a thousand.
+const OFF: f64 = 22.5;
+
+/// Sizes tried, in prior sigmas, and the factor between them.
+const SIZES: (f64, f64) = (0.05, 200.0);
+const STEP: f64 = 1.25;
+
+/// Logarithm of the ratio of sizes that are one: a search is the same with either.
+const NEAR: f64 = 0.4;
+
+/// Walks of some gyros.
+#[derive(Clone)]
+pub struct Walk {
+    /// Channels, and in each of them the walk [rad/s per sqrt(s)].
+    pub channels: Vec<(usize, f64)>,
+    /// [nats] over no walk, prices paid.
+    pub gain: f64,
+    effect: &'static dyn Effect,
+}
+
+impl Walk {
+    /// The likeliest beside these effects as they are; `None` where none is, or where it is withheld.
+    pub fn beside(problem: &Problem, components: &[Component], withheld: &[String]) -> Option<Self> {
+        let effect = LIBRARY.iter().find(|effect| effect.page().name == NAME)?;
+        if withheld.iter().any(|name| name == NAME) {
+            return None;
+        }
+        let unit = problem.twin.unit();
+        let is_gyro = |index: &usize| unit.channels[*index].sensor == Kind::Gyro;
+        let gyros: Vec<usize> = (0..unit.channels.len()).filter(is_gyro).collect();
+        let mut walk = Walk {
+            channels: Vec::new(),
+            gain: -(LIBRARY.len() as f64).ln(),
+            effect: *effect,
+        };
+        for channel in &gyros {
+            let frame = &problem.frames[*channel];
+            let samples = frame.series.rows.len();
+            if samples < FEWEST {
+                continue;
+            }
+            let shapes = shapes(problem, *channel);
+            let residual = problem.residual(*channel, components);
+            let normal = frame.normal(&shapes, &residual);
+            let typical = effect
+                .page()
+                .parameters
+                .first()
+                .map_or(0.0, |symbol| symbol.prior_sigma);
+            let sizes =
+                std::iter::successors(Some(SIZES.0), |size| Some(size * STEP)).take_while(|size| *size < SIZES.1);
+            let gains = sizes.map(|size| (size * typical, gain(&normal.information, &normal.score, size * typical)));
+            let best = gains.max_by(|one, other| one.1.total_cmp(&other.1));
+            let price = 0.5 * (samples as f64).ln() + 1.0 + (gyros.len() as f64).ln();
+            if let Some((size, gain)) = best.filter(|(_, gain)| *gain > price) {
+                walk.gain += gain - price;
+                walk.channels.push((*channel, size));
+            }
+        }
+        Some(walk).filter(|walk| walk.gain > 0.0)
+    }
+
+    /// Whether what is there beside these effects has the spectrum of a walk, not only its slowness: the pull of its terms, made
+    /// white from the slowest term on, has squares of one on the mean in every octave, all channels together.
+    pub fn is_one(&self, problem: &Problem, components: &[Component]) -> bool {
+        let mut whites = Vec::new();
+        for (channel, size) in &self.channels {
+            let residual = problem.residual(*channel, components);
+            let normal = problem.frames[*channel].normal(&shapes(problem, *channel), &residual);
+            match white(&normal.information, &normal.score, *size) {
+                Some(white) => whites.push(white),
+                None => return false,
+            }
+        }
+        let octaves = std::iter::successors(Some(1), |first| Some(2 * first)).take_while(|first| *first <= TERMS);
+        let off = |first: usize| {
+            let terms = first - 1..(2 * first - 1).min(TERMS);
+            let count = (terms.len() * whites.len()) as f64;
+            let energy: f64 = whites
+                .iter()
+                .flat_map(|white| &white.as_slice()[terms.clone()])
+                .map(|term| term * term)
+                .sum();
+            // Near Gaussian (Wilson and Hilferty 1931).
+            let spread = 2.0 / (9.0 * count);
+            ((energy / count).cbrt() - (1.0 - spread)) / spread.sqrt()
+        };
+        let off: Vec<f64> = octaves.map(off).collect();
+        off.iter().map(|off| off * off).sum::<f64>() < OFF
+    }
+
+    /// The problem's frames with it open.
+    pub fn open(&self, problem: &Problem, mut frames: Vec<Frame>) -> Vec<Frame> {
+        for (channel, size) in &self.channels {
+            let mut shapes = shapes(problem, *channel);
+            let before = &problem.frames[*channel].weights;
+            // In units of the noise that the frame has now.
+            let ratio = before.component_div(&frames[*channel].weights);
+            for (mut shape, sigma) in shapes.column_iter_mut().zip(sigmas(*size)) {
+                shape.component_mul_assign(&ratio);
+                shape *= sigma;
+            }
+            frames[*channel].widen(&shapes);
+        }
+        frames
+    }
+
+    /// Whether it is in the same channels as another, and much as large.
+    pub fn is_near(&self, other: &Walk) -> bool {
+        self.channels.len() == other.channels.len()
+            && (self.channels.iter().zip(&other.channels))
+                .all(|((own, size), (its, at))| own == its && (size / at).ln().abs() < NEAR)
+    }
+
+    /// It as an effect on the scatter.
+    pub fn scatter(&self) -> Scatter {
+        Scatter {
+            effect: self.effect,
+            variant: 0.0,
+            channels: self.channels.iter().map(|(channel, _)| *channel).collect(),
+            thetas: self.channels.iter().map(|(_, size)| vec![*size]).collect(),
+            gain: self.gain,
+            beneath: Vec::new(),
+        }
+    }
+}
+
+/// `T^1/2 sqrt 2 sin(x_k t/T)` at the fitted samples of a channel, in units of noise for one unit of `s/x_k`.
+fn shapes(problem: &Problem, channel: usize) -> DMatrix<f64> {
+    let (frame, t_s) = (&problem.frames[channel], problem.twin.instants_s(channel));
+    let t_s: Vec<f64> = frame.series.rows.iter().map(|row| t_s[*row as usize]).collect();
+    let (first, last) = (t_s.first().copied().unwrap_or(0.0), t_s.last().copied().unwrap_or(0.0));
+    let span_s = (last - first).max(f64::MIN_POSITIVE);
+    DMatrix::from_fn(t_s.len(), TERMS, |sample, term| {
+        let phase = place(term) * (t_s[sample] - first) / span_s;
+        span_s.sqrt() * SQRT_2 * phase.sin() / frame.weights[sample]
+    })
+}
+
+/// `x_k` of the term at an index.
+fn place(index: usize) -> f64 {
+    (index as f64 + 0.5) * PI
+}
+
+/// Of the terms of a walk, over the square root of its seconds.
+fn sigmas(size: f64) -> impl Iterator<Item = f64> {
+    (0..TERMS).map(move |term| size / place(term))
+}
+
+/// [nats] by which a walk of this size makes a log likelier.
+fn gain(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> f64 {
+    let sigmas = DVector::from_iterator(TERMS, sigmas(size));
+    let own = DMatrix::from_fn(TERMS, TERMS, |row, column| {
+        sigmas[row] * information[(row, column)] * sigmas[column] + f64::from(u8::from(row == column))
+    });
+    let pull = score.component_mul(&sigmas);
+    Cholesky::new(own).map_or(f64::NEG_INFINITY, |factor| {
+        0.5 * (pull.dot(&factor.solve(&pull)) - log_determinant(&factor))
+    })
+}
+
+/// What pulls at the terms of a walk of this size, of variance one each if it is one, from the slowest on.
+fn white(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> Option<DVector<f64>> {
+    let squares = DMatrix::from_diagonal(&DVector::from_iterator(TERMS, sigmas(size).map(|sigma| sigma * sigma)));
+    let factor = Cholesky::new(information + information * squares * information)?;
+    let mut white = score.clone();
+    factor.l_dirty().solve_lower_triangular_mut(&mut white);
+    Some(white)
+}
