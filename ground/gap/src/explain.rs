@@ -4,7 +4,8 @@
 //! was asked.
 //!
 //! An effect on the scatter is judged on what the others leave. With the noise as found, everything else is searched anew;
-//! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged.
+//! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged. Beside
+//! a gyro's walk everything else is searched with the walk open, until both stay what they are.
 
 use nalgebra::DVector;
 use twin::part::signal::Noise;
@@ -41,9 +42,6 @@ const LOUDER: &str = "noise-level";
 
 /// Searches beside a walk until it stays what it is.
 const WALKS: usize = 4;
-
-/// Steps from which a walk is told from anything else: the rows of a table are fewer, and no walk.
-const STEPS: usize = 100;
 
 /// The effects that a log speaks for.
 pub struct Explanation {
@@ -275,7 +273,7 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
     let is_walk = scatter.effect.page().name == wander::NAME;
-    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= STEPS)
+    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= wander::FEWEST)
 }
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.

@@ -26,11 +26,11 @@ use crate::{
 /// The effect's name.
 pub const NAME: &str = "gyro-bias-walk";
 
-/// Terms of a walk; what they leave is a hundredth of its power and faster than ten seconds in five minutes.
+/// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods under 19 s.
 const TERMS: usize = 32;
 
 /// Samples from which a walk is told from anything else: the rows of a table are fewer, and no walk.
-const FEWEST: usize = 100;
+pub const FEWEST: usize = 100;
 
 /// Sum of squares over the six octaves beyond which it is none: one walk in a thousand.
 const OFF: f64 = 22.5;
