@@ -220,6 +220,11 @@ impl Twin {
             // A high-pass takes the bias with it.
             *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
         }
+        for (tau_s, per_rate) in chain.thermal() {
+            let seen_s = t_s.iter().map(|t_s| chain.instant(*t_s) - channel.tau_s()).collect();
+            let rates = self.temperature_rates(*tau_s, seen_s, memory);
+            (readings.iter_mut().zip(rates)).for_each(|(reading, rate)| *reading += per_rate * rate);
+        }
         chain.finish(&t_s, &mut readings);
         for reading in &mut readings {
             *reading = reading.clamp(channel.range[0], channel.range[1]);

@@ -32,7 +32,7 @@ impl Effect for TemperatureHysteresis {
     fn act<'a>(&self, theta: &'a [f64], variant: f64, _site: &Site<'a>, chain: &mut Chain<'a>) {
         let k = theta[0];
         if variant > 0.0 {
-            chain.add_lagging(variant, move |feel| k * feel.temperature_rate);
+            chain.add_thermal(variant, k);
         } else {
             chain.add(move |feel, _| k * feel.temperature_rate);
         }

@@ -33,7 +33,9 @@ pub struct Chain<'a> {
     pub high_pass_s: Option<f64>,
     delays: Vec<Delay<'a>>,
     terms: Vec<Term<'a>>,
-    gross: Vec<(f64, Felt<'a>)>,
+    gross: Vec<Felt<'a>>,
+    /// Time constants [s], and [physical unit] per degC/s behind them.
+    thermal: Vec<(f64, f64)>,
     stages: Vec<Stage<'a>>,
 }
 
@@ -48,6 +50,7 @@ impl<'a> Chain<'a> {
             delays: Vec::new(),
             terms: Vec::new(),
             gross: Vec::new(),
+            thermal: Vec::new(),
             stages: Vec::new(),
         }
     }
@@ -65,12 +68,13 @@ impl<'a> Chain<'a> {
 
     /// Adds what may be as large as the reading itself: it is taken through the channel's low-pass to third order.
     pub fn add_gross(&mut self, term: impl Fn(&Feel) -> f64 + 'a) {
-        self.add_lagging(0.0, term);
+        self.gross.push(Box::new(term));
     }
 
-    /// Adds what follows what is felt with a time constant of its own, of `tau_s`: to third order of what changes in that time.
-    pub fn add_lagging(&mut self, tau_s: f64, term: impl Fn(&Feel) -> f64 + 'a) {
-        self.gross.push((tau_s, Box::new(term)));
+    /// Adds `per_rate` of the temperature's rate of change through a low-pass of `tau_s` > 0, of which the channel's own sees what it
+    /// lets through to first order.
+    pub fn add_thermal(&mut self, tau_s: f64, per_rate: f64) {
+        self.thermal.push((tau_s, per_rate));
     }
 
     /// Changes the finished readings, given the nominal instants.
@@ -97,16 +101,20 @@ impl<'a> Chain<'a> {
         !self.terms.is_empty()
     }
 
-    /// What is gross of a reading, or lags, through a low-pass of `tau_s`, given what is felt so long [s] before. Low-passes in a
-    /// row are one of the sum of their time constants to first order. The exponential's mean by two of its instants is exact
-    /// for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
+    /// What is gross of a reading, through a low-pass of `tau_s`, given what is felt so long [s] before. The exponential's mean by
+    /// two of its instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
     pub(super) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
         let root = core::f64::consts::SQRT_2;
-        let mean = |(own_s, term): &(f64, Felt)| {
-            let at = |part: f64| term(&felt(part * (tau_s + own_s)));
+        let mean = |term: &Felt| {
+            let at = |part: f64| term(&felt(part * tau_s));
             0.25 * ((2.0 + root) * at(2.0 - root) + (2.0 - root) * at(2.0 + root))
         };
         self.gross.iter().map(mean).sum()
+    }
+
+    /// Time constants [s] and gains [physical unit per degC/s] of what follows the temperature.
+    pub(super) fn thermal(&self) -> &[(f64, f64)] {
+        &self.thermal
     }
 
     pub(super) fn added(&self, feel: &Feel, input: f64) -> f64 {

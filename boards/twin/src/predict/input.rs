@@ -4,6 +4,8 @@
 //! whole motion and is the same for all sensors of a kind; an input is the same for all effects that are added to it. A
 //! [`Memory`] keeps both from one question to the next, as of a derivative by one parameter after another.
 
+use nalgebra::Vector3;
+
 use super::{Aim, Chain, Feel, Filter, Kind, Twin};
 
 /// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
@@ -69,6 +71,25 @@ impl Twin {
             latest.felt = instants_s.map(|t_s| self.scene.feel(t_s - tau_s)).collect();
         }
         &latest.felt
+    }
+
+    /// [degC/s] The temperature's rate of change at these instants through a low-pass of `tau_s` > 0: of a low-pass
+    /// `tau y' + y = T` it is `y' = (T - y)/tau`.
+    pub(super) fn temperature_rates(&self, tau_s: f64, instants_s: Vec<f64>, memory: &mut Memory) -> Vec<f64> {
+        let look = Look {
+            aim: Aim {
+                sensor: Kind::Thermometer,
+                axis_b: Vector3::zeros(),
+                lever_m: Vector3::zeros(),
+            },
+            lag_s: 0.0,
+            high_pass_s: None,
+            instants_s,
+        };
+        let mut rates = self.through(&look, 0.0, &mut memory.filters);
+        let slow = self.through(&look, tau_s, &mut memory.filters);
+        combine(&mut rates, 1.0 / tau_s, &slow, -1.0 / tau_s);
+        rates
     }
 
     fn latest<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a mut Latest {
