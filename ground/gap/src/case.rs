@@ -8,6 +8,7 @@
 //! meets the motion's, channels the packets do not have. Lost, missing and clipped samples are not errors: they are
 //! left out and counted in [`crate::log::Masked`].
 
+mod environment;
 mod measured;
 mod subject;
 mod table;
