@@ -50,7 +50,10 @@ impl Believed {
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
         let belief = Belief::of(left, explanation.energy(quiet), &promises);
         let scatter = explanation.scatter.as_ref();
-        causes.extend(scatter.map(|scatter| cause_of_scatter(subject, scatter)));
+        causes.extend(scatter.map(|scatter| {
+            let sigmas = scatter.sigmas(problem, &explanation.beneath);
+            cause_of_scatter(subject, scatter, &sigmas)
+        }));
         belief.weigh(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.

@@ -127,28 +127,23 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
     found.chosen.iter().enumerate().map(cause).collect()
 }
 
-/// An effect on the scatter as a cause; its share is still an energy.
-pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter) -> Cause {
+/// An effect on the scatter, whose parameters have these sigmas, as a cause; its share is still an energy.
+pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>]) -> Cause {
     let page = scatter.effect.page();
     let unit = subject.twin.unit();
     let mut parameters = Vec::new();
-    for (channel, theta) in scatter.channels.iter().zip(&scatter.thetas) {
-        for (symbol, value) in page.parameters.iter().zip(theta) {
+    for (channel, (theta, sigmas)) in (scatter.channels.iter()).zip(scatter.thetas.iter().zip(sigmas)) {
+        for (symbol, (value, sigma)) in page.parameters.iter().zip(theta.iter().zip(sigmas)) {
             let parameter = Parameter {
                 name: format!("{}_{}", symbol.name, unit.channels[*channel].name),
                 unit: symbol.unit,
                 prior_sigma: symbol.prior_sigma,
                 signed: symbol.signed,
             };
-            // A scale of scatter fitted to n samples is known to one part in the root of 2n, a line's amplitude to the noise
-            // over the root of n/2.
-            let samples = subject.fit.channels[*channel].rows.len().max(1) as f64;
-            let relative = value.abs() / (2.0 * samples).sqrt();
-            let is_line = scatter.is_line();
             parameters.push(Sized {
                 parameter,
                 value: *value,
-                sigma: if is_line { (2.0 / samples).sqrt() } else { relative },
+                sigma: *sigma,
             });
         }
     }

@@ -18,7 +18,7 @@ mod search;
 
 use nalgebra::DVector;
 use twin::{
-    effect::{Beneath, Effect, Scope, View, logged_step},
+    effect::{Beneath, Effect, Scope, View, logged_step, sigma_of},
     part::signal::Noise,
 };
 
@@ -108,8 +108,37 @@ impl Scatter {
         }
     }
 
+    /// Sigmas of the parameters, for readings that are `predicted` without it, at every row. Channels of one value tell of it
+    /// together; of a line each has an amplitude, known in n samples to the noise over the root of n/2.
+    pub fn sigmas(&self, problem: &Problem, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        if self.is_line() {
+            let samples = |channel: &usize| problem.frames[*channel].series.rows.len().max(1) as f64;
+            let sigmas = self.channels.iter().zip(&self.thetas);
+            return sigmas
+                .map(|(channel, thetas)| vec![(2.0 / samples(channel)).sqrt(); thetas.len()])
+                .collect();
+        }
+        let logged = |channel: &usize| (problem.twin.instants_s(*channel), problem.measured(*channel));
+        let logged: Vec<(Vec<f64>, Vec<f64>)> = self.channels.iter().map(logged).collect();
+        let of = |thetas: &Vec<f64>| -> Vec<f64> {
+            let alike = (self.channels.iter().zip(&logged).zip(&self.thetas)).filter(|(_, other)| *other == thetas);
+            let views: Vec<View> = alike
+                .map(|((channel, (t_s, measured)), _)| View {
+                    channel: &problem.twin.unit().channels[*channel],
+                    t_s,
+                    predicted: &predicted[*channel],
+                    measured,
+                    step: logged_step(measured),
+                })
+                .collect();
+            let sigma = |theta: &f64| sigma_of(self.effect, self.variant, &views, *theta);
+            thetas.iter().map(sigma).collect()
+        };
+        self.thetas.iter().map(of).collect()
+    }
+
     /// Whether it is a line of one frequency, of some amplitude in each channel.
-    pub fn is_line(&self) -> bool {
+    fn is_line(&self) -> bool {
         blocks::is_hidden(self.effect) && self.variant > 0.0
     }
 

@@ -81,10 +81,16 @@ impl Walk {
                 .parameters
                 .first()
                 .map_or(0.0, |symbol| symbol.prior_sigma);
-            let sizes =
-                std::iter::successors(Some(SIZES.0), |size| Some(size * STEP)).take_while(|size| *size < SIZES.1);
-            let gains = sizes.map(|size| (size * typical, gain(&normal.information, &normal.score, size * typical)));
-            let best = gains.max_by(|one, other| one.1.total_cmp(&other.1));
+            let at = |size: f64| (size, gain(&normal.information, &normal.score, size));
+            let sizes = std::iter::successors(Some(SIZES.0 * typical), |size| Some(size * STEP));
+            let gains = sizes.take_while(|size| *size < SIZES.1 * typical).map(at);
+            let best = gains.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(size, _)| {
+                // The top of the parabola through it and its neighbours.
+                let [below, here, above] = [size / STEP, size, size * STEP].map(|size| at(size).1);
+                let bend = below - 2.0 * here + above;
+                let part = if bend < 0.0 { 0.5 * (below - above) / bend } else { 0.0 };
+                at(size * STEP.powf(part.clamp(-0.5, 0.5)))
+            });
             let price = 0.5 * (samples as f64).ln() + 1.0 + (gyros.len() as f64).ln();
             if let Some((size, gain)) = best.filter(|(_, gain)| *gain > price) {
                 walk.gain += gain - price;

@@ -84,7 +84,7 @@ mod warm_up;
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{Nature, Page, Scope, Symbol};
 pub use site::Site;
-pub use spread::{Beneath, View, logged_step, most_likely};
+pub use spread::{Beneath, View, logged_step, most_likely, sigma_of};
 
 use crate::environment::Environment;
 use crate::part::signal::Noise;

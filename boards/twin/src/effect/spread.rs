@@ -227,3 +227,15 @@ pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f6
     }
     (vec![best.0], best.1)
 }
+
+/// Step [ln] by which a parameter is moved to see how sharply the likelihood falls off.
+const SHARPNESS_STEP: f64 = 0.02;
+
+/// Sigma of a parameter of such an effect: by the observed information about the logarithm of its size, in its own unit, and as
+/// large as itself where these channels say nothing of it.
+pub fn sigma_of(effect: &dyn Effect, variant: f64, views: &[View], theta: f64) -> f64 {
+    let of = effect.likelihood(variant, views);
+    let at = |by: f64| of(&[theta * by.exp()]);
+    let bend = at(SHARPNESS_STEP) - 2.0 * at(0.0) + at(-SHARPNESS_STEP);
+    theta.abs() / (-bend / SHARPNESS_STEP.powi(2)).max(1.0).sqrt()
+}

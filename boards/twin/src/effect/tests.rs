@@ -13,6 +13,7 @@ mod pages;
 mod past;
 mod physics;
 mod scatter;
+mod sharpness;
 
 /// A motion that excites everything: all axes up to 130 deg/s, acceleration of the centre, temperature up and down.
 struct Exercise;
