@@ -31,8 +31,10 @@ use twin::part::nand::{Cells, Tear};
 pub struct Tally {
     /// Runs.
     pub runs: u64,
-    /// Cuts.
+    /// Cuts that struck: the power went while the chip was at an operation.
     pub cuts: u64,
+    /// Operations that a cut left neither undone nor done.
+    pub torn: u64,
     /// Records acknowledged.
     pub acknowledged: u64,
     /// Of those, how many are not there.
@@ -46,6 +48,20 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// What a campaign of cuts has to show: nothing amiss in so many runs, so many cuts that struck, and operations torn by so
+    /// many of them. Of the nine ways to tear two leave an operation undone or done, and an erase of a blank block leaves
+    /// nothing to tear.
+    ///
+    /// # Panics
+    /// When it does not: a campaign that injects nothing proves nothing.
+    pub fn check(&self, runs: u64, cuts: u64, torn: u64) {
+        assert!(self.runs >= runs, "fewer than {runs} runs: {self:?}");
+        assert!(self.cuts >= cuts, "fewer than {cuts} cuts struck: {self:?}");
+        assert!(self.torn >= torn, "cuts that tear nothing: {self:?}");
+        assert!(self.acknowledged > self.runs, "nothing was at stake: {self:?}");
+        assert!(self.is_clean(), "{self:?}");
+    }
+
     /// Nothing lost, wrong, broken or refused.
     pub fn is_clean(&self) -> bool {
         (self.lost, self.wrong, self.breaks, self.refused) == (0, 0, 0, 0)
@@ -56,6 +72,7 @@ impl AddAssign for Tally {
     fn add_assign(&mut self, other: Tally) {
         self.runs += other.runs;
         self.cuts += other.cuts;
+        self.torn += other.torn;
         self.acknowledged += other.acknowledged;
         self.lost += other.lost;
         self.wrong += other.wrong;
@@ -155,6 +172,7 @@ impl Flown {
         Tally {
             runs: 1,
             cuts: self.cuts,
+            torn: self.chip.torn,
             acknowledged: self.acknowledged.len() as u64,
             lost: self.acknowledged.iter().filter(gone).count() as u64,
             wrong,

@@ -83,6 +83,12 @@ pub struct Cells {
     pub time: Nanos,
     /// Rules that were broken.
     pub breaks: Vec<Break>,
+    /// Operations that a cut left neither undone nor done: what a campaign of cuts must have seen.
+    pub torn: u64,
+    /// Programs that went astray.
+    pub strayed: u64,
+    /// Blocks whose wear has struck, in the order of its first strikes.
+    pub worn: Vec<u16>,
     /// The power is off: nothing answers.
     pub off: bool,
     random: Xoshiro256PlusPlus,
@@ -116,6 +122,9 @@ impl Cells {
             operations: 0,
             time: 0,
             breaks: Vec::new(),
+            torn: 0,
+            strayed: 0,
+            worn: Vec::new(),
             off: false,
             random: Xoshiro256PlusPlus::seed_from_u64(seed),
         };
@@ -236,7 +245,9 @@ impl Cells {
     pub fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Outcome {
         self.time += PROGRAM + (PAGE_BYTES as Nanos + OVERHEAD_CYCLES) * CYCLE;
         let tear = self.begin();
-        let at = self.befalls.astray(self.operations, self.befalls.decoded(at));
+        let meant = self.befalls.decoded(at);
+        let at = self.befalls.astray(self.operations, meant);
+        self.strayed += u64::from(at != meant);
         self.keep_program_rules(at, bytes);
         let wear = self.wear(at.block, true);
         let block = &mut self.blocks[usize::from(at.block)];
@@ -251,7 +262,13 @@ impl Cells {
         let page = &mut cells[from..from + PAGE_BYTES];
         match tear {
             None => page.iter_mut().zip(bytes).for_each(|(cell, byte)| *cell &= byte),
-            Some(tear) => tear.program(page, bytes, (from * 8) as u32, &mut block.unstable, &mut self.random),
+            Some(tear) => {
+                let (before, unstable) = (page.to_vec(), block.unstable.len());
+                tear.program(page, bytes, (from * 8) as u32, &mut block.unstable, &mut self.random);
+                let done = before.iter().zip(bytes).map(|(cell, byte)| cell & byte);
+                let is_between = *page != before[..] && !page.iter().copied().eq(done);
+                self.torn += u64::from(!failed && (is_between || block.unstable.len() > unstable));
+            }
         }
         self.end(at.block, tear.is_some() && !failed, failed)
     }
@@ -279,7 +296,10 @@ impl Cells {
             }
             Some(tear) => {
                 if let Some(bytes) = &mut cells.bytes {
+                    let (before, unstable) = (bytes.clone(), cells.unstable.len());
                     tear.erase(&mut bytes[..], &mut cells.unstable, &mut self.random);
+                    let is_between = *bytes != before && bytes.iter().any(|cell| *cell != 0xFF);
+                    self.torn += u64::from(!failed && (is_between || cells.unstable.len() > unstable));
                 }
             }
         }
@@ -310,7 +330,11 @@ impl Cells {
     fn wear(&mut self, block: u16, program: bool) -> Option<Wear> {
         let count = &mut self.blocks[usize::from(block)].operations;
         *count += 1;
-        self.befalls.wear(block, *count, program)
+        let wear = self.befalls.wear(block, *count, program);
+        if wear.is_some() && !self.worn.contains(&block) {
+            self.worn.push(block);
+        }
+        wear
     }
 
     fn keep_program_rules(&mut self, at: PageAddress, bytes: &PageBytes) {
