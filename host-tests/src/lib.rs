@@ -18,7 +18,7 @@ use twin::{
     part::{Nanos, nand::Cells},
     plant::Plant,
     run::{Bench, Fault, Flow, Scheduled},
-    truth::TruthSource,
+    truth::{Truth, TruthSource},
 };
 
 /// [ns] a millisecond.
@@ -151,6 +151,32 @@ impl Bench for Flown {
     fn advanced(&mut self, _now: Nanos) -> Flow {
         Flow::Continue
     }
+}
+
+/// A world that is another one, changed.
+pub struct Changed {
+    world: Arc<dyn TruthSource>,
+    change: fn(f64, &mut Truth),
+}
+
+impl TruthSource for Changed {
+    fn at(&self, t_s: f64) -> Truth {
+        let mut truth = self.world.at(t_s);
+        (self.change)(t_s, &mut truth);
+        truth
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        self.world.duration_s()
+    }
+}
+
+/// A motion of the twin in which `change` alters what is true at a time [s].
+pub fn changed(name: &str, change: fn(f64, &mut Truth)) -> Arc<dyn TruthSource> {
+    Arc::new(Changed {
+        world: world(name),
+        change,
+    })
 }
 
 /// A motion of the twin at its default site.

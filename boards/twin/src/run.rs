@@ -57,6 +57,8 @@ pub enum Fault {
     /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
     /// never comes round. A reset frees it.
     DmaHung,
+    /// The processor is kept from the unit for so long [ns], as by a storm of interrupts. Host board only.
+    Busy(Nanos),
     /// The reset pin.
     Reset,
 }

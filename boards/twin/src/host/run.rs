@@ -79,6 +79,7 @@ pub fn fly_around(
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
                     Some(Fault::DmaHung) => ends.dma_hung.set(true),
+                    Some(Fault::Busy(duration)) => clock::spend(duration),
                     Some(cut @ Fault::PowerCut(_)) => {
                         plant.borrow_mut().apply(cut, now);
                         ends.kept.0.set(None);

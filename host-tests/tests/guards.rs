@@ -1,0 +1,153 @@
+//! Guards that no other test would miss: each test here fails without the one line that it names.
+
+use emems::{
+    derived::{Derived, Health},
+    sample::SENSOR_COUNT,
+};
+use host_tests::{Flight, Flown, MS, S, changed, world};
+use twin::run::Fault;
+
+/// Slots of the gyros in the reading order.
+const GYROS: std::ops::Range<usize> = 8..12;
+
+fn still() -> Flight {
+    Flight::ideal(world("still")).say(1, b"G_DL")
+}
+
+fn ever(flown: &Flown, health: Health) -> bool {
+    flown.derived.iter().any(|frame| frame.health.contains(health))
+}
+
+/// S12: `Acquisition::verify` after each cycle. A part that browned out by itself answers as before, with other settings.
+#[test]
+fn s12_a_part_that_restarts_by_itself_is_found_by_the_verification_in_turn() {
+    for slot in (0..SENSOR_COUNT).filter(|slot| !GYROS.contains(slot)) {
+        let restarts = 3 * S + 50 * MS;
+        let flown = still().fault(restarts, Fault::Restored(slot)).fly(restarts + 5 * S);
+        // One sensor is verified a cycle, so each is within 3.2 s.
+        assert!(ever(&flown, Health::RECONFIGURED), "slot {slot}");
+        let (before, after) = (flown.second(2)[4], flown.second(7)[4]);
+        assert_eq!((after.errors.0, before.errors.0), (0, 0), "slot {slot}");
+        assert_eq!(
+            (before.acc_p, before.mag_p, before.temperature),
+            (after.acc_p, after.mag_p, after.temperature),
+            "slot {slot}"
+        );
+    }
+    assert!(!ever(&still().fly(5 * S), Health::RECONFIGURED));
+}
+
+/// S11: `Gyros::note`.
+#[test]
+fn s11_a_gyro_at_the_end_of_its_range_is_said_to_be_saturated() {
+    // 400 deg/s about z: the gyro of plate 4 senses about -z, the others a third of it.
+    let spin = changed("still", |t_s, truth| {
+        if t_s > 3.0 {
+            truth.rate_b.z = 400_f64.to_radians();
+        }
+    });
+    let flown = Flight::ideal(spin).say(1, b"G_DL").fly(5 * S);
+    let saturated = |from_us: u64, to_us: u64| -> Vec<bool> {
+        let frames = flown.derived.iter();
+        let within = frames.filter(|frame| (from_us..to_us).contains(&frame.start_us));
+        within
+            .map(|frame| frame.health.contains(Health::GYRO_SATURATED))
+            .collect()
+    };
+    assert!(!saturated(0, 2_900_000).contains(&true));
+    let after = saturated(3_300_000, 5_000_000);
+    assert!(after.len() >= 6 && !after.contains(&false), "{after:?}");
+}
+
+/// S10: the overflow flag of a magnetometer's reading.
+#[test]
+fn s10_a_magnetometer_beyond_its_range_says_so() {
+    // The range is 2047 counts of a 1090th of a gauss: 188 uT.
+    let beside_a_magnet = changed("still", |t_s, truth| {
+        if t_s > 3.0 {
+            truth.field_b_ut *= 300.0 / truth.field_b_ut.norm();
+        }
+    });
+    let flown = Flight::ideal(beside_a_magnet).say(1, b"G_DL").fly(5 * S);
+    let overflows = |frame: &Derived| frame.health.contains(Health::MAGNETOMETER_OVERFLOW);
+    let (early, late): (Vec<_>, Vec<_>) = flown.derived.iter().partition(|frame| frame.start_us < 2_900_000);
+    assert!(!early.into_iter().any(overflows));
+    assert!(late.into_iter().filter(|frame| overflows(frame)).count() >= 8);
+    let flagged = flown.second(4)[2];
+    assert!(flagged.mag_p.as_flattened().contains(&-4096), "{:?}", flagged.mag_p);
+}
+
+/// S2: `Budget`. Up to all twelve parts of the I2C bus hold the clock at once, each until it is cut off.
+#[test]
+fn s2_parts_that_run_out_of_time_at_once_leave_the_packet_its_deadline() {
+    for k in 1..=12 {
+        let slots = (0..SENSOR_COUNT).filter(|slot| !GYROS.contains(slot)).take(k);
+        let flight = slots.fold(still(), |flight, slot| {
+            flight.fault(3 * S, Fault::Stretching(slot, 60 * S))
+        });
+        let flown = flight.fly(6 * S);
+        let cycle_us = flown.derived.iter().map(|frame| frame.cycle_us).max().unwrap_or(0);
+        // A part that holds on takes its plate with it, so from the fourth on all plates are gone.
+        assert!(cycle_us > 50_000 && cycle_us <= 190_000, "{k}: {cycle_us} us");
+        let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
+        assert!(counters.is_sorted() && counters.len() >= 26, "{k}: {counters:?}");
+        assert!(
+            flown.second(5).iter().all(|reading| reading.errors.0 & 0x0F00 == 0),
+            "{k}: the gyros are read"
+        );
+        let late = flown.second(4).len() + flown.second(5).len();
+        assert_eq!(late, 10, "{k}: one packet every 200 ms");
+    }
+}
+
+/// S2, U2: what is left when the time is up is not read, and the flag DEADLINE says so.
+#[test]
+fn u2_a_processor_that_is_kept_busy_through_a_cycle_closes_the_packet_and_says_so() {
+    // Cycles begin 150 ms into the second and every 200 ms.
+    let flown = still().fault(3 * S + 151 * MS, Fault::Busy(195 * MS)).fly(6 * S);
+    let closed: Vec<&Derived> = (flown.derived.iter())
+        .filter(|frame| frame.health.contains(Health::DEADLINE))
+        .collect();
+    assert_eq!(closed.len(), 1, "one cycle was cut");
+    assert!(closed[0].health.0 as u16 != 0, "what was not read is marked");
+    assert!(flown.second(5).iter().all(|reading| reading.errors.0 == 0));
+    let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
+    assert!(counters.windows(2).all(|pair| pair[1] == pair[0] + 1), "{counters:?}");
+}
+
+/// The self-test looks at the mode before each sensor.
+#[test]
+fn a_self_test_ends_when_flight_begins() {
+    let flown = still().say(2 * S, b"G_AT").say(3 * S, b"G_MVG_MV").fly(8 * S);
+    let done = flown.replies().into_iter().find(|line| line.starts_with("G_AT done"));
+    let done = done.expect("the self-test ends");
+    let passed: usize = done.split(' ').nth(2).and_then(|n| n.parse().ok()).expect("a number");
+    assert!(passed < SENSOR_COUNT, "{done}");
+    // The sensor under test when FLIGHT began has 600 ms at most; then all are read.
+    for second in [4, 5, 6, 7] {
+        let errors: Vec<u16> = flown.second(second).iter().map(|reading| reading.errors.0).collect();
+        assert!(
+            errors.iter().all(|errors| *errors == 0),
+            "second {second}: {errors:04X?}"
+        );
+    }
+}
+
+/// S8: `Gyros::fast` leaves out the word of a dead line, which would be a rate of zero.
+#[test]
+fn s8_a_gyro_that_dies_between_two_cycles_adds_no_zeros_to_its_increments() {
+    for plate in 0..4 {
+        let flight = Flight::ideal(world("tumble")).say(1, b"G_DL");
+        let flown = flight.fault(20 * S + 100 * MS, Fault::Silent(8 + plate)).fly(22 * S);
+        let counts: Vec<_> = (flown.derived.iter())
+            .filter(|frame| (19_700_000..20_700_000).contains(&frame.start_us))
+            .map(|frame| frame.increments.gyro[plate].count)
+            .collect();
+        // Cycles begin 150 ms into the second and every 200 ms: of the third it was alive for 150 ms, then silent.
+        assert!(counts[..2].iter().all(|count| *count >= 19), "{counts:?}");
+        assert!(
+            counts.len() > 3 && counts[2..].iter().all(|count| *count <= 16),
+            "{counts:?}"
+        );
+    }
+}
