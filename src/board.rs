@@ -3,7 +3,7 @@
 use embedded_hal_async::{i2c::I2c, spi::SpiDevice};
 use embedded_io_async::{Read, Write};
 
-use crate::{crash::CrashRecord, nand::k9f1208::NandBus, resume::Resume};
+use crate::nand::k9f1208::NandBus;
 
 /// The set of types a board provides. One implementation per board file; none of them is named in `src/`.
 pub trait Board {
@@ -81,14 +81,13 @@ pub trait Watchdog {
     fn feed(&mut self);
 }
 
-/// Memory that survives a reset. A power cut loses it; the implementation tells by its checksum.
+/// Memory that survives a reset: [`RETAINED_BYTES`](crate::retained::RETAINED_BYTES) bytes, of which nobody knows what they are
+/// after a power cut. What stands where, and how it is checked, is [`crate::retained`]'s business.
 pub trait Retained {
-    /// What the unit was doing before the reset; `None` after a power cut or when the content is damaged.
-    fn resume(&mut self) -> Option<Resume>;
-    /// Replaces it.
-    fn keep(&mut self, resume: &Resume);
-    /// The crash that caused this start, once: taking it clears it.
-    fn take_crash(&mut self) -> Option<CrashRecord>;
+    /// Reads as many bytes as there is room for, from `at` on.
+    fn read(&self, at: usize, bytes: &mut [u8]);
+    /// Writes bytes from `at` on, in this order.
+    fn write(&mut self, at: usize, bytes: &[u8]);
 }
 
 /// Why the unit started.

@@ -1,11 +1,13 @@
 //! The crash record: what a panic or fault leaves behind in memory that survives the reset.
 //!
-//! In: what the handler knows. Out: 64 bytes with a CRC-32 (ISO-HDLC) over the first 60, little endian:
+//! In: what the handler knows. Out: 64 bytes, which the retained memory keeps twice, with a CRC-32 (ISO-HDLC) over the first 60, little endian:
 //! `0-3` magic, `4` cause, `5` length of the place, `6-7` spare, `8-11` pc or line, `12-15` lr, `16-19` CFSR,
 //! `20-27` uptime [us], `28-59` last characters of the place (source file). Anything whose checksum is wrong is refused.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use heapless::String;
+
+use crate::{board::Retained, retained::CRASH};
 
 /// Bytes of an encoded record.
 pub const CRASH_BYTES: usize = 64;
@@ -62,6 +64,18 @@ impl CrashRecord {
             uptime_us,
             place,
         }
+    }
+
+    /// Keeps it for the next start.
+    pub fn keep(&self, memory: &mut impl Retained) {
+        CRASH.keep(memory, &self.encode());
+    }
+
+    /// The crash before this start.
+    pub fn recall(memory: &impl Retained) -> Option<Self> {
+        let mut bytes = [0; CRASH_BYTES];
+        CRASH.recall(memory, &mut bytes)?;
+        CrashRecord::decode(&bytes)
     }
 
     /// The 64 bytes that are kept.

@@ -43,6 +43,7 @@ pub mod packet;
 pub mod quest;
 pub mod redundancy;
 pub mod resume;
+pub mod retained;
 pub mod sample;
 pub mod sensor;
 pub mod triad;

@@ -1,20 +1,24 @@
-//! What the unit was doing, in the sixteen bytes that survive a reset.
+//! What the unit knows of itself after a reset: what it was doing, how often it started, when it was last alive.
 //!
-//! In: mode, recording, counter and resets. Out: 16 bytes with a CRC-32 (ISO-HDLC) over the first 12, little endian:
-//! `0-3` magic, `4` mode, `5` recording, `6-7` counter of the next packet, `8-9` resets, `10-11` zero. What power-on
-//! leaves in RAM, or what a reset tore in mid-write, is refused by its checksum.
+//! In and out: small contents of the retained memory ([`crate::retained`], which checks them), little endian.
+//!
+//! | content | bytes |
+//! |---|---|
+//! | [`Resume`] | 0 mode (1 WAIT, 2 FLIGHT), 1 flags (1 recording, 2 derived frames, 4 the log was not heard yet), 2-3 counter of the next packet |
+//! | [`Starts`] | 0-1 since power-on, 2-3 without health between them |
+//! | [`Pulse`] | 0-7 last alive, 8-15 watchdog last fed \[us since the unit's clock started\] |
+//!
+//! Refuses a mode or a flag that does not exist: what a checksum lets through is still looked at.
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use crate::{
+    board::Retained,
+    mode::Mode,
+    retained::{PULSE, Place, STARTS, STATE},
+};
 
-use crate::mode::Mode;
-
-/// Bytes of an encoded [`Resume`].
-pub const RESUME_BYTES: usize = 16;
-
-const MAGIC: [u8; 4] = *b"EMRS";
-const CHECKED: usize = RESUME_BYTES - 4;
-/// Without a table, which would take a kilobyte of flash.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+const RECORDING: u8 = 1 << 0;
+const DERIVED: u8 = 1 << 1;
+const AWAITS_LOG: u8 = 1 << 2;
 
 /// What the unit was doing when a reset struck.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,109 +28,185 @@ pub struct Resume {
     pub mode: Mode,
     /// Whether packets were being recorded.
     pub recording: bool,
+    /// Whether derived frames were on.
+    pub derived: bool,
+    /// The mode is that of a unit just switched on: the log, which may know better, has not been heard yet.
+    pub awaits_log: bool,
     /// Counter of the next packet.
     pub next_counter: u16,
-    /// Resets since power-on.
-    pub resets: u16,
 }
 
 impl Resume {
-    /// The 16 bytes that are kept.
-    pub fn encode(&self) -> [u8; RESUME_BYTES] {
-        let mut bytes = [0; RESUME_BYTES];
-        bytes[0..4].copy_from_slice(&MAGIC);
-        bytes[4] = match self.mode {
+    /// Keeps it.
+    pub fn keep(&self, memory: &mut impl Retained) {
+        let mode = match self.mode {
             Mode::Wait => 1,
             Mode::Flight => 2,
         };
-        bytes[5] = self.recording.into();
-        bytes[6..8].copy_from_slice(&self.next_counter.to_le_bytes());
-        bytes[8..10].copy_from_slice(&self.resets.to_le_bytes());
-        let crc = CRC.checksum(&bytes[..CHECKED]);
-        bytes[CHECKED..].copy_from_slice(&crc.to_le_bytes());
-        bytes
+        let flag = |bit: u8, set: bool| if set { bit } else { 0 };
+        let flags = flag(RECORDING, self.recording) | flag(DERIVED, self.derived) | flag(AWAITS_LOG, self.awaits_log);
+        let [low, high] = self.next_counter.to_le_bytes();
+        STATE.keep(memory, &[mode, flags, low, high]);
     }
 
-    /// The state, or `None` if the bytes are not one.
-    pub fn decode(bytes: &[u8; RESUME_BYTES]) -> Option<Self> {
-        let crc = CRC.checksum(&bytes[..CHECKED]).to_le_bytes();
-        if bytes[0..4] != MAGIC || bytes[CHECKED..] != crc || bytes[10..12] != [0, 0] {
+    /// What was kept.
+    pub fn recall(memory: &impl Retained) -> Option<Self> {
+        let [mode, flags, low, high] = recall(STATE, memory)?;
+        if flags & !(RECORDING | DERIVED | AWAITS_LOG) != 0 {
             return None;
         }
         Some(Resume {
-            mode: match bytes[4] {
+            mode: match mode {
                 1 => Mode::Wait,
                 2 => Mode::Flight,
                 _ => return None,
             },
-            recording: match bytes[5] {
-                0 => false,
-                1 => true,
-                _ => return None,
-            },
-            next_counter: u16::from_le_bytes([bytes[6], bytes[7]]),
-            resets: u16::from_le_bytes([bytes[8], bytes[9]]),
+            recording: flags & RECORDING != 0,
+            derived: flags & DERIVED != 0,
+            awaits_log: flags & AWAITS_LOG != 0,
+            next_counter: u16::from_le_bytes([low, high]),
         })
     }
 }
 
+/// How often the unit started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Starts {
+    /// Since power-on, this one among them.
+    pub since_power_on: u16,
+    /// Since the unit was last healthy for a minute, this one among them. Whoever watches the health sets it to zero.
+    pub without_health: u16,
+}
+
+impl Starts {
+    /// One more start; keeps and returns it. The first thing a unit does: whatever it does next may end in a reset.
+    pub fn count(memory: &mut impl Retained) -> Self {
+        let before = Starts::recall(memory).unwrap_or_default();
+        let starts = Starts {
+            since_power_on: before.since_power_on.saturating_add(1),
+            without_health: before.without_health.saturating_add(1),
+        };
+        starts.keep(memory);
+        starts
+    }
+
+    /// Keeps it.
+    pub fn keep(&self, memory: &mut impl Retained) {
+        let [a, b] = self.since_power_on.to_le_bytes();
+        let [c, d] = self.without_health.to_le_bytes();
+        STARTS.keep(memory, &[a, b, c, d]);
+    }
+
+    /// What was kept.
+    pub fn recall(memory: &impl Retained) -> Option<Self> {
+        let [a, b, c, d] = recall(STARTS, memory)?;
+        Some(Starts {
+            since_power_on: u16::from_le_bytes([a, b]),
+            without_health: u16::from_le_bytes([c, d]),
+        })
+    }
+}
+
+/// When the unit was last alive: a reset struck after it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pulse {
+    /// [us] the latest fast sample of the gyros, since that run's clock started.
+    pub at_us: u64,
+    /// [us] the latest feeding of the watchdog.
+    pub fed_us: u64,
+}
+
+impl Pulse {
+    /// Keeps it.
+    pub fn keep(&self, memory: &mut impl Retained) {
+        let mut bytes = [0; 16];
+        bytes[..8].copy_from_slice(&self.at_us.to_le_bytes());
+        bytes[8..].copy_from_slice(&self.fed_us.to_le_bytes());
+        PULSE.keep(memory, &bytes);
+    }
+
+    /// What was kept.
+    pub fn recall(memory: &impl Retained) -> Option<Self> {
+        let bytes: [u8; 16] = recall(PULSE, memory)?;
+        let (at, fed) = bytes.split_first_chunk()?;
+        Some(Pulse {
+            at_us: u64::from_le_bytes(*at),
+            fed_us: u64::from_le_bytes(*fed.first_chunk()?),
+        })
+    }
+}
+
+fn recall<const N: usize>(place: Place, memory: &impl Retained) -> Option<[u8; N]> {
+    let mut bytes = [0; N];
+    (place.recall(memory, &mut bytes)?.len() == N).then_some(bytes)
+}
+
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::{vec, vec::Vec};
+
     use super::*;
+    use crate::retained::RETAINED_BYTES;
 
-    const IN_FLIGHT: Resume = Resume {
-        mode: Mode::Flight,
-        recording: true,
-        next_counter: 0x1234,
-        resets: 7,
-    };
-    const IN_FLIGHT_BYTES: [u8; RESUME_BYTES] = [
-        b'E', b'M', b'R', b'S', 2, 1, 0x34, 0x12, 7, 0, 0, 0, 0x88, 0xCC, 0xB9, 0xC4,
-    ];
+    struct Memory(Vec<u8>);
 
-    #[test]
-    fn a_flight_is_kept_in_these_sixteen_bytes() {
-        assert_eq!(IN_FLIGHT.encode(), IN_FLIGHT_BYTES);
-        assert_eq!(Resume::decode(&IN_FLIGHT_BYTES), Some(IN_FLIGHT));
-        assert_eq!(Resume::decode(&Resume::default().encode()), Some(Resume::default()));
-    }
+    impl Retained for Memory {
+        fn read(&self, at: usize, bytes: &mut [u8]) {
+            bytes.copy_from_slice(&self.0[at..at + bytes.len()]);
+        }
 
-    #[test]
-    fn every_one_and_two_bit_error_is_refused() {
-        for first in 0..RESUME_BYTES * 8 {
-            for second in first..RESUME_BYTES * 8 {
-                let mut bytes = IN_FLIGHT_BYTES;
-                bytes[first / 8] ^= 1 << (first % 8);
-                if second != first {
-                    bytes[second / 8] ^= 1 << (second % 8);
-                }
-                assert_eq!(Resume::decode(&bytes), None, "bits {first} and {second}");
-            }
+        fn write(&mut self, at: usize, bytes: &[u8]) {
+            self.0[at..at + bytes.len()].copy_from_slice(bytes);
         }
     }
 
     #[test]
-    fn a_write_torn_by_a_reset_is_refused() {
-        let before = Resume::default().encode();
-        for written in 5..RESUME_BYTES {
-            let mut torn = before;
-            torn[..written].copy_from_slice(&IN_FLIGHT_BYTES[..written]);
-            assert_eq!(Resume::decode(&torn), None, "{written} bytes written");
+    fn what_the_unit_was_doing_is_kept_and_starts_are_counted() {
+        let mut memory = Memory(vec![0; RETAINED_BYTES]);
+        assert_eq!(Resume::recall(&memory), None);
+        let in_flight = Resume {
+            mode: Mode::Flight,
+            recording: true,
+            derived: true,
+            awaits_log: false,
+            next_counter: 0x1234,
+        };
+        let awaiting = Resume {
+            awaits_log: true,
+            ..Resume::default()
+        };
+        for resume in [in_flight, awaiting] {
+            resume.keep(&mut memory);
+            assert_eq!(Resume::recall(&memory), Some(resume));
         }
+        let pulse = Pulse {
+            at_us: 0x0102_0304_0506_0708,
+            fed_us: 9,
+        };
+        pulse.keep(&mut memory);
+        for number in 1..4 {
+            let starts = Starts::count(&mut memory);
+            assert_eq!((starts.since_power_on, starts.without_health), (number, number));
+        }
+        assert_eq!(Pulse::recall(&memory), Some(pulse));
+        let healthy = Starts {
+            without_health: 0,
+            ..Starts::recall(&memory).expect("kept")
+        };
+        healthy.keep(&mut memory);
+        assert_eq!(Starts::count(&mut memory).without_health, 1);
+        assert_eq!(Starts::count(&mut memory).since_power_on, 5);
     }
 
     #[test]
-    fn a_mode_that_does_not_exist_is_refused_whatever_its_checksum() {
-        let mut bytes = IN_FLIGHT_BYTES;
-        bytes[4] = 3;
-        let crc = CRC.checksum(&bytes[..CHECKED]).to_le_bytes();
-        bytes[CHECKED..].copy_from_slice(&crc);
-        assert_eq!(Resume::decode(&bytes), None);
-    }
-
-    #[test]
-    fn memory_after_power_on_resumes_nothing() {
-        assert_eq!(Resume::decode(&[0; RESUME_BYTES]), None);
-        assert_eq!(Resume::decode(&[0xFF; RESUME_BYTES]), None);
+    fn a_mode_a_flag_or_a_length_that_does_not_exist_is_refused_whatever_its_checksum() {
+        let mut memory = Memory(vec![0; RETAINED_BYTES]);
+        for content in [&[3, 0, 0, 0][..], &[1, 8, 0, 0], &[1, 0, 0], &[1, 0, 0, 0, 0]] {
+            STATE.keep(&mut memory, content);
+            assert_eq!(Resume::recall(&memory), None, "{content:?}");
+        }
     }
 }

@@ -24,13 +24,16 @@ mod telemetry;
 mod umbilical;
 mod vote;
 
-use core::pin::pin;
+use core::{cell::RefCell, pin::pin};
 
 use embassy_futures::join;
 
 use crate::{
-    board::{Board, Parts, Retained},
+    board::{Board, Parts},
+    crash::CrashRecord,
     estimate::{Estimator, Site},
+    resume::{Resume, Starts},
+    retained::CRASH,
     sensor::{adis16265, hmc5883l, lis331hh, tca9548a::Switch},
 };
 
@@ -107,15 +110,17 @@ impl Settings {
 
 /// Runs the unit for ever.
 pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
-    let resume = parts.retained.resume();
-    let crash = parts.retained.take_crash();
+    let starts = Starts::count(&mut parts.retained);
     let start = Start {
         reset: parts.reset,
-        resume,
-        crash,
+        starts,
+        resume: Resume::recall(&parts.retained),
+        crash: CrashRecord::recall(&parts.retained),
         oscillator: parts.oscillator,
         stack_use: parts.stack_use,
     };
+    CRASH.forget(&mut parts.retained);
+    let memory = RefCell::new(parts.retained);
     let shared = Shared::new(settings, start);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
@@ -128,7 +133,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
         inputs::run::<B>(&shared, &votes, parts.discretes),
     );
     let data = join::join4(
-        acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.retained),
+        acquire::run::<B>(&shared, &votes, &switch, &gyros, &memory),
         gyros::run::<B>(&shared, &votes, &gyros),
         estimate::run(&shared, &votes, &mut estimator),
         record::run::<B>(&shared, &votes, parts.nand),

@@ -1,49 +1,24 @@
-//! What survives a reset: 256 bytes of SRAM that start-up leaves alone (memory.x), and the reset flags.
+//! What survives a reset: 8 KiB of SRAM that start-up leaves alone (memory.x), and the reset flags.
 //!
-//! In: the state to keep. Out: the state kept before the reset, or `None` after a power cut. The state is kept twice
-//! and the two are written one after the other, so a reset that strikes in mid-write leaves one of them whole.
+//! In: bytes to keep. Out: the bytes kept before the reset, or anything after a power cut: [`emems::retained`] tells.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
 use embassy_stm32::pac::RCC;
 use emems::board::{ResetCause, Retained};
-use emems::crash::{CRASH_BYTES, CrashRecord};
-use emems::resume::{RESUME_BYTES, Resume};
+use emems::crash::CrashRecord;
+use emems::retained::RETAINED_BYTES;
 
 /// Bytes that start-up does not initialise.
-struct Kept<const N: usize>(UnsafeCell<MaybeUninit<[u8; N]>>);
+struct Kept(UnsafeCell<MaybeUninit<[u8; RETAINED_BYTES]>>);
 
-// SAFETY: the resume bytes are used by the one `ResetSafeRam` only. The crash bytes are written by handlers that never
-// return, so nobody reads them in the same run.
-unsafe impl<const N: usize> Sync for Kept<N> {}
+// SAFETY: the bytes are read and written by the one `ResetSafeRam`, and by crash handlers that never return, so that nobody
+// sees in the same run what they wrote. One access is one byte.
+unsafe impl Sync for Kept {}
 
-impl<const N: usize> Kept<N> {
-    const fn new() -> Self {
-        Kept(UnsafeCell::new(MaybeUninit::uninit()))
-    }
-
-    fn read(&self) -> [u8; N] {
-        let first = self.0.get().cast::<u8>();
-        // SAFETY: these N bytes exist, every bit pattern is a byte, and a volatile read takes what is there whether or not
-        // this run has written it. One by one, because a volatile read of them all is N loads and N stores of code.
-        core::array::from_fn(|index| unsafe { first.add(index).read_volatile() })
-    }
-
-    fn write(&self, bytes: [u8; N]) {
-        let first = self.0.get().cast::<u8>();
-        for (index, byte) in bytes.into_iter().enumerate() {
-            // SAFETY: as for `read`; volatile, because nothing in this run may ever read it back.
-            unsafe { first.add(index).write_volatile(byte) }
-        }
-    }
-}
-
-#[unsafe(link_section = ".retained.resume")]
-static RESUME: [Kept<RESUME_BYTES>; 2] = [Kept::new(), Kept::new()];
-
-#[unsafe(link_section = ".retained.crash")]
-static CRASH: Kept<CRASH_BYTES> = Kept::new();
+#[unsafe(link_section = ".retained")]
+static KEPT: Kept = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// The retained memory. There is one.
 pub struct ResetSafeRam(());
@@ -56,25 +31,28 @@ impl ResetSafeRam {
 }
 
 impl Retained for ResetSafeRam {
-    fn resume(&mut self) -> Option<Resume> {
-        RESUME.iter().find_map(|kept| Resume::decode(&kept.read()))
+    fn read(&self, at: usize, bytes: &mut [u8]) {
+        let first = KEPT.0.get().cast::<u8>();
+        for (index, byte) in (at..RETAINED_BYTES).zip(bytes) {
+            // SAFETY: the index is below the length, every bit pattern is a byte, and a volatile read takes what is there
+            // whether or not this run has written it.
+            *byte = unsafe { first.add(index).read_volatile() };
+        }
     }
 
-    fn keep(&mut self, resume: &Resume) {
-        let bytes = resume.encode();
-        RESUME.iter().for_each(|kept| kept.write(bytes));
-    }
-
-    fn take_crash(&mut self) -> Option<CrashRecord> {
-        let crash = CrashRecord::decode(&CRASH.read());
-        CRASH.write([0; CRASH_BYTES]);
-        crash
+    fn write(&mut self, at: usize, bytes: &[u8]) {
+        let first = KEPT.0.get().cast::<u8>();
+        for (index, byte) in (at..RETAINED_BYTES).zip(bytes) {
+            // SAFETY: as for `read`; volatile, because nothing in this run may ever read it back.
+            unsafe { first.add(index).write_volatile(*byte) }
+        }
     }
 }
 
 /// Leaves a crash record for the next start.
 pub fn keep_crash(record: &CrashRecord) {
-    CRASH.write(record.encode());
+    // It never returns to who holds the other one.
+    record.keep(&mut ResetSafeRam(()));
 }
 
 /// Why the chip started (RM0090 section 7.3.21); clears the flags, which add up otherwise.

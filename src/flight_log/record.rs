@@ -49,7 +49,7 @@ const PACKET: u8 = 1;
 const HEADER: u8 = 2;
 const MAGIC: [u8; 2] = [0xE7, 0x4D];
 const CHECKED: usize = RECORD_BYTES - 4;
-pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+pub(crate) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 const SLOT_US: u32 = 4;
 const NO_SLOT_CODE: u16 = u16::MAX;

@@ -8,7 +8,7 @@
 //! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
 //! for the estimation alone ([`forces`]). What fails then is left out and nothing is concluded from it: the next cycle will see.
 
-use core::fmt::Display;
+use core::{cell::RefCell, fmt::Display};
 
 use embassy_time::{Duration, Instant};
 
@@ -20,7 +20,7 @@ use super::{
     vote::{Voter, Votes},
 };
 use crate::{
-    board::{Board, ResetCause, Retained},
+    board::{Board, ResetCause},
     budget::Budget,
     derived::Health,
     geometry::PLATES,
@@ -51,7 +51,7 @@ pub async fn run<B: Board>(
     votes: &Votes,
     switch: &Switch<B::SensorBus>,
     gyros: &Gyros<'_, B::Gyro>,
-    mut retained: B::Retained,
+    memory: &RefCell<B::Retained>,
 ) {
     let mut acquisition = Acquisition::<B> {
         shared,
@@ -73,7 +73,6 @@ pub async fn run<B: Board>(
     }
     let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
-    let resets = shared.start.resets();
     let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
     // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.
@@ -92,12 +91,14 @@ pub async fn run<B: Board>(
             let state = shared.state.borrow();
             (state.mode, state.recording)
         };
-        retained.keep(&Resume {
+        let resume = Resume {
             mode,
             recording,
+            derived: false,
+            awaits_log: false,
             next_counter: counter,
-            resets,
-        });
+        };
+        resume.keep(&mut *memory.borrow_mut());
         start += period;
         let limit_us = acquisition.budget.limit_us(0, 0, true);
         if now() + Duration::from_micros(2 * limit_us) < start {

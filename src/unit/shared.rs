@@ -23,7 +23,7 @@ use crate::{
     increments::{Force, Increments, Integrator},
     mode::State,
     packet::PACKET_BYTES,
-    resume::Resume,
+    resume::{Resume, Starts},
     sample::{Errors, Sample},
 };
 
@@ -69,6 +69,8 @@ pub type Dumped = (u32, RecordBytes);
 pub struct Start {
     /// Why the unit started.
     pub reset: ResetCause,
+    /// How often it started.
+    pub starts: Starts,
     /// What it was doing before.
     pub resume: Option<Resume>,
     /// The crash before this start.
@@ -82,7 +84,7 @@ pub struct Start {
 impl Start {
     /// Resets since power-on, the one before this start among them.
     pub fn resets(&self) -> u16 {
-        self.resume.map_or(0, |resume| resume.resets.saturating_add(1))
+        self.starts.since_power_on.saturating_sub(1)
     }
 }
 

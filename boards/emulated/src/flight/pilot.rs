@@ -21,8 +21,8 @@ use crate::{
 };
 
 /// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
-const RETAINED: u64 = 0x2001_FF00;
-const RETAINED_BYTES: u64 = 256;
+const RETAINED: u64 = 0x2001_E000;
+const RETAINED_BYTES: u64 = 8192;
 
 /// The core's side: what happens at the instants at which the run stops.
 pub(super) struct Pilot {

@@ -13,8 +13,7 @@ use embassy_time::{Duration, Timer};
 use embedded_io_async::{ErrorType, Read, Write};
 use emems::{
     board::{Discretes, Retained, Watchdog},
-    crash::CrashRecord,
-    resume::Resume,
+    retained::RETAINED_BYTES,
 };
 
 use super::{
@@ -99,19 +98,28 @@ impl Watchdog for Fed {
 }
 
 /// Memory that survives a reset of the host board.
-#[derive(Clone, Default)]
-pub struct Kept(pub Rc<Cell<Option<Resume>>>);
+#[derive(Clone)]
+pub struct Kept(Rc<RefCell<[u8; RETAINED_BYTES]>>);
+
+impl Default for Kept {
+    fn default() -> Self {
+        Kept(Rc::new(RefCell::new([0; RETAINED_BYTES])))
+    }
+}
+
+impl Kept {
+    /// What a power cut leaves.
+    pub fn lose(&self) {
+        self.0.borrow_mut().fill(0);
+    }
+}
 
 impl Retained for Kept {
-    fn resume(&mut self) -> Option<Resume> {
-        self.0.get()
+    fn read(&self, at: usize, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.0.borrow()[at..at + bytes.len()]);
     }
 
-    fn keep(&mut self, resume: &Resume) {
-        self.0.set(Some(*resume));
-    }
-
-    fn take_crash(&mut self) -> Option<CrashRecord> {
-        None
+    fn write(&mut self, at: usize, bytes: &[u8]) {
+        self.0.borrow_mut()[at..at + bytes.len()].copy_from_slice(bytes);
     }
 }

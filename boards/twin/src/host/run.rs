@@ -82,7 +82,7 @@ pub fn fly_around(
                     Some(Fault::Busy(duration)) => clock::spend(duration),
                     Some(cut @ Fault::PowerCut(_)) => {
                         plant.borrow_mut().apply(cut, now);
-                        ends.kept.0.set(None);
+                        ends.kept.lose();
                         struck = Some(ResetCause::PowerOn);
                     }
                     Some(fault) => plant.borrow_mut().apply(fault, now),
