@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use crate::{
     evidence::Screen,
-    library::Entries,
+    products::Entries,
     on::{On, phase},
     piece::{Piece, Touched},
     problem::Problem,

@@ -10,6 +10,7 @@
 //! which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of another if it has to be on
 //! throughout.
 
+mod columns;
 mod passing;
 mod rival;
 mod variant;
@@ -20,7 +21,8 @@ use nalgebra::{DMatrix, DVector};
 
 pub use self::rival::Rival;
 use self::{
-    passing::{always, bounded, fitted, stretches, taken},
+    columns::always,
+    passing::{bounded, fitted, stretches, taken},
     rival::compare,
     variant::is_any_same,
 };

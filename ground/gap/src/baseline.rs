@@ -17,7 +17,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::LIBRARY;
 
 use crate::{
-    library::{Entries, Library},
+    library::Library,
+    products::Entries,
     problem::Problem,
 };
 

@@ -74,9 +74,6 @@ impl Hypothesis {
     }
 }
 
-/// A column of the library: for each channel it touches, its values in units of noise.
-pub type Entries = Vec<(usize, DVector<f64>)>;
-
 /// All of them.
 #[derive(Clone, Debug)]
 pub struct Library {

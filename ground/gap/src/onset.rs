@@ -9,7 +9,7 @@
 use nalgebra::DVector;
 
 use crate::{
-    library::Entries,
+    products::Entries,
     piece::{Piece, Touched},
     problem::Problem,
     windows::Span,

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     evidence::Screen,
-    library::Entries,
+    products::Entries,
     problem::{Frame, Problem},
 };
 

@@ -9,9 +9,11 @@ use nalgebra::DVector;
 
 use crate::{
     evidence::Screen,
-    library::Entries,
     problem::{Frame, Problem},
 };
+
+/// A column: for each channel it touches, its values in units of noise.
+pub type Entries = Vec<(usize, DVector<f64>)>;
 
 /// Columns and the products known so far.
 #[derive(Clone, Debug, Default)]

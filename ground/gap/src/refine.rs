@@ -10,7 +10,8 @@ use twin::predict::Memory;
 
 use crate::{
     evidence::{Estimate, Screen},
-    library::{Entries, Library},
+    library::Library,
+    products::Entries,
     problem::{Component, Problem},
 };
 

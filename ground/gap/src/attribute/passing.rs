@@ -5,10 +5,14 @@
 
 use nalgebra::DVector;
 
-use super::variant::sharpened;
+use super::{
+    columns::{always, renew},
+    variant::sharpened,
+};
 use crate::{
     again::again,
-    library::{Entries, Hypothesis, Library},
+    library::{Hypothesis, Library},
+    products::Entries,
     on::On,
     onset,
     problem::Problem,
@@ -139,21 +143,4 @@ pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], b
     library.hypotheses[*last].span = None;
     renew(problem, library, set, &best.thetas);
     best
-}
-
-/// Takes the stretch of time from a hypothesis again.
-pub(super) fn always(problem: &Problem, library: &mut Library, hypothesis: usize) {
-    library.hypotheses[hypothesis].span = None;
-    let zero = DVector::zeros(library.hypotheses[hypothesis].parameters.len());
-    renew(problem, library, &[hypothesis], &[zero]);
-}
-
-/// Makes the columns of the last member of a set anew.
-pub(super) fn renew(problem: &Problem, library: &mut Library, set: &[usize], thetas: &[DVector<f64>]) {
-    let model = model_of(library, set, thetas);
-    let renewed = problem.slopes(&model, set.len() - 1);
-    let places = library.hypotheses[set[set.len() - 1]].places.clone();
-    for (place, column) in places.into_iter().zip(renewed) {
-        library.products.renew(problem, place, column);
-    }
 }

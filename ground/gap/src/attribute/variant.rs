@@ -5,7 +5,7 @@
 
 use nalgebra::DVector;
 
-use super::passing::renew;
+use super::columns::renew;
 use crate::{
     library::{Hypothesis, Library},
     problem::Problem,
