@@ -10,20 +10,21 @@
 //! which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of another if it has to be on
 //! throughout.
 
+mod chosen;
 mod columns;
 mod passing;
 mod rival;
+mod screen;
 mod variant;
-
-use std::{iter::once, ops::Range};
 
 use nalgebra::{DMatrix, DVector};
 
-pub use self::rival::Rival;
+pub use self::chosen::{Chosen, Rival};
 use self::{
     columns::always,
     passing::{bounded, fitted, stretches, taken},
     rival::compare,
+    screen::{CANDIDATES, gains, is_physical, leading},
     variant::is_any_same,
 };
 use crate::{
@@ -35,29 +36,11 @@ use crate::{
 /// [nats] an effect must bring beyond its prior odds: three make a wrong addition one in twenty.
 const MARGIN: f64 = 3.0;
 
-/// Candidates of a screen that are fitted exactly.
-const CANDIDATES: usize = 4;
-
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
 
 /// Effects at once: beyond five no answer was ever right, and shares of the excess cost two to their number.
 const MOST_EFFECTS: usize = 5;
-
-/// A chosen effect.
-#[derive(Clone, Debug)]
-pub struct Chosen {
-    /// Index of its hypothesis.
-    pub hypothesis: usize,
-    /// Its parameters.
-    pub theta: DVector<f64>,
-    /// Their covariance.
-    pub covariance: DMatrix<f64>,
-    /// [nats] over the model without it, prior odds included.
-    pub gain: f64,
-    /// Hypotheses that could stand in its place, itself among them; best first.
-    pub rivals: Vec<Rival>,
-}
 
 /// What a log speaks for.
 #[derive(Clone, Debug)]
@@ -200,68 +183,6 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         }
         gains[index] = 0.5 * fall + hypothesis.log_prior;
     }
-}
-
-/// Indices of the largest values, largest first.
-fn leading(values: &[f64], count: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..values.len()).filter(|index| values[*index].is_finite()).collect();
-    order.sort_by(|one, other| values[*other].total_cmp(&values[*one]));
-    order.truncate(count);
-    order
-}
-
-/// Columns of a set in the library, the reference's first, and no column twice; and which of them are each member's.
-fn places(library: &Library, set: &[usize]) -> (Vec<usize>, Vec<Range<usize>>) {
-    let mut places: Vec<usize> = (0..library.reference).collect();
-    let part = |hypothesis: &usize| {
-        let from = places.len();
-        for place in &library.hypotheses[*hypothesis].places {
-            if !places.contains(place) {
-                places.push(*place);
-            }
-        }
-        from..places.len()
-    };
-    let parts = set.iter().map(part).collect();
-    (places, parts)
-}
-
-/// Gain of adding each hypothesis to a set, prior odds included; one that adds no column, or that the set has with another
-/// value, gains nothing.
-fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &[usize]) -> Vec<f64> {
-    let (known, parts) = places(library, set);
-    let mut base = library.screen(&known, scores);
-    base.settle(parts);
-    let before = base.log_evidence().unwrap_or(f64::NEG_INFINITY);
-    let gain = |(index, hypothesis): (usize, &crate::library::Hypothesis)| {
-        let is_new = !hypothesis.places.is_empty() && hypothesis.places.iter().all(|place| !known.contains(place));
-        if !is_new || set.contains(&index) || is_any_same(problem, library, set, index) {
-            return f64::NEG_INFINITY;
-        }
-        let all: Vec<usize> = known.iter().chain(&hypothesis.places).copied().collect();
-        let mut larger = library.screen(&all, scores);
-        larger.prior_sigmas[..known.len()].copy_from_slice(&base.prior_sigmas);
-        let of_other_sizes = larger.settle(once(known.len()..all.len()));
-        let after = larger.log_evidence().unwrap_or(f64::NEG_INFINITY);
-        after + of_other_sizes - before + hypothesis.log_prior
-    };
-    library.hypotheses.iter().enumerate().map(gain).collect()
-}
-
-/// Whether parameters that cannot be negative are not, beyond twice their sigma.
-fn is_physical(library: &Library, set: &[usize], refined: &Refined) -> bool {
-    let mut at = library.reference;
-    set.iter().zip(&refined.thetas).all(|(hypothesis, theta)| {
-        library.hypotheses[*hypothesis]
-            .parameters
-            .iter()
-            .zip(theta.iter())
-            .all(|(parameter, value)| {
-                let sigma = refined.estimate.covariance[(at, at)].sqrt();
-                at += 1;
-                parameter.signed || *value > -2.0 * sigma
-            })
-    })
 }
 
 /// Scores of every column about a refined set, whose own columns are renewed in place; its parameters count from zero.

@@ -12,10 +12,10 @@ use super::{
 use crate::{
     again::again,
     library::{Hypothesis, Library},
-    products::Entries,
     on::On,
     onset,
     problem::Problem,
+    products::Entries,
     refine::{Refined, model_of, refine},
 };
 

@@ -3,30 +3,19 @@
 //! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
 
 use super::{
-    CANDIDATES, Chosen, fitted, gains, is_any_same, is_physical, leading, stretches, variant::without_its_physics,
+    chosen::{Chosen, Rival},
+    passing::{fitted, stretches},
+    screen::{CANDIDATES, gains, is_physical, leading},
+    variant::{is_any_same, without_its_physics},
 };
 use crate::{
     library::Library,
-    on::On,
     problem::Problem,
     refine::{Refined, refine},
 };
 
 /// [nats] behind the chosen effect from which a rival is not worth an exact fit.
 const FAR: f64 = 50.0;
-
-/// A hypothesis that could stand in the place of a chosen one.
-#[derive(Clone, Copy, Debug)]
-pub struct Rival {
-    /// Its index.
-    pub hypothesis: usize,
-    /// [nats] over the model with neither, prior odds included.
-    pub gain: f64,
-    /// When it would be on; `None` for always.
-    pub span: Option<On>,
-    /// Whether it is the hypothesis, and not the same course without what its physics makes of it, which has no name.
-    pub is_named: bool,
-}
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
 pub(super) fn compare(
