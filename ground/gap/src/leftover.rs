@@ -8,12 +8,13 @@
 //! "anywhere in the range" claims any of many orders of magnitude. The p-value counts how many of the simulated logs have as
 //! large a largest aspect, so it is paid for having looked everywhere.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::DVector;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use crate::joint::{Fitted, Joint};
 
 mod aspects;
+mod clock;
 mod codes;
 mod common;
 mod instrument;
@@ -25,18 +26,18 @@ mod spectrum;
 mod strength;
 mod sums;
 mod together;
+mod view;
 use aspects::{Sights, coded};
+pub use clock::Clock;
 pub use codes::Codes;
 use codes::{Counts, rarities};
 pub use instrument::Instrument;
 use label::Label;
-pub use shared::Open;
+pub use simulated::Disturb;
 pub(crate) use simulated::simulate;
-pub use simulated::{Clock, Disturb};
 pub use strength::Suspect;
-
-/// Stretches of time.
-pub const STRETCHES: usize = 20;
+use view::SEED;
+pub use view::{LEVELS, Open, STRETCHES, View};
 
 /// Simulated logs: fewest (p then has a floor of 1/101) and most.
 const SIMULATIONS: [usize; 2] = [100, 200];
@@ -47,53 +48,6 @@ const FITTED: f64 = 0.3;
 
 /// Normal numbers drawn in all, so that long logs take bounded time.
 const DRAWS: usize = 20_000_000;
-
-/// Fixed, so that one case gives one verdict.
-const SEED: u64 = 0x5eed_0005;
-
-/// What is looked at of one channel.
-#[derive(Clone, Debug)]
-pub struct View {
-    /// Name, for the report.
-    pub name: String,
-    /// Kind of sensor, an index.
-    pub kind: usize,
-    /// The part it is of, an index: channels of one have one.
-    pub part: usize,
-    /// What it is mounted with, an index: channels on one plate have one.
-    pub group: usize,
-    /// Its axis in b.
-    pub axis_b: Vector3<f64>,
-    /// Place of each sample in the fitted time, 0 to 1.
-    pub phase: Vec<f64>,
-    /// What the unit does at each sample (rates, force, field, temperature), each about zero with unit spread.
-    pub motion: DMatrix<f64>,
-    /// What a small rotation of the unit against its reference adds to each sample, in units of noise for 1 rad about the
-    /// axes of b.
-    pub turned: DMatrix<f64>,
-    /// What it feels at each sample, in units of noise.
-    pub felt: DVector<f64>,
-    /// What it is predicted to read at each sample, in units of noise.
-    pub predicted: DVector<f64>,
-    /// Its codes, where it sends such.
-    pub codes: Option<Codes>,
-    /// The clock of its part, where that is its own.
-    pub clock: Option<Clock>,
-    /// What is open of it, in the order of the fit's columns.
-    pub open: Vec<Open>,
-    /// What its reference errs by, where that is not exact.
-    pub instrument: Option<Instrument>,
-    /// Whether that is more than it scatters by itself.
-    pub is_limited: bool,
-    /// For each quantity of [`LEVELLED`], in which of [`LEVELS`] equally filled levels each sample stands.
-    pub levels: Vec<Vec<u8>>,
-}
-
-/// Quantities whose levels a residual is sorted by.
-pub const LEVELLED: [&str; 4] = ["its own reading", "the rate", "the specific force", "the temperature"];
-
-/// Levels of each: the curve of a wrong law shows in eight, and a sum of eight squares is still sharp.
-pub const LEVELS: usize = 8;
 
 /// One aspect of a residual.
 #[derive(Clone, Debug, PartialEq)]

@@ -19,17 +19,17 @@
 use nalgebra::{DMatrix, Vector1};
 
 use super::{
-    Fitted, LEVELLED, STRETCHES, Suspect, View,
     common::Common,
     label::{Label, OF_CALIBRATION, name_of},
     shapes::{BINS, Shapes},
     shared::Shared,
     spectrum::{Spectrum, strongest},
-    strength::Strength,
+    strength::{Strength, Suspect},
     sums::{Bursts, alike, between_levels, mean_logarithm, outliers, squares, tails},
     together,
+    view::{LEVELLED, STRETCHES, View, place},
 };
-use crate::place::octaves;
+use crate::{joint::Fitted, place::octaves};
 
 /// [units of noise] within which a sample is where the one before was: what is sent again is as near as a calibration is right,
 /// and how near that is says nothing.
@@ -321,9 +321,4 @@ fn waves(count: usize) -> Vec<String> {
         shortest => format!("{shortest} to {}", 2 * shortest),
     };
     (0..octaves).map(length).collect()
-}
-
-/// In which of so many equal parts of the log.
-pub fn place(phase: f64, of: usize) -> usize {
-    ((phase * of as f64) as usize).min(of - 1)
 }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use super::{SEED, View};
+use super::view::{SEED, View};
 
 /// Shapes in time, and as many in the motion.
 const SHAPES: usize = 24;

@@ -9,44 +9,17 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    Fitted, View,
     common::inverse_root,
     label::{OF_CALIBRATION, name_of},
+    view::{AXES, Open, View, ZERO},
 };
+use crate::joint::Fitted;
 
 /// What a part has once for all of its channels.
 pub const OF_PART: [&str; 2] = ["instant", "instant_drift"];
 
-/// The zero of a channel.
-const ZERO: &str = "bias";
-
-/// The directions in which its axis is open.
-const AXES: [&str; 2] = ["axis_1", "axis_2"];
-
 /// What may be off alike in all of a kind.
 const ALIKE: [&str; 4] = [ZERO, "scale", "instant", "instant_drift"];
-
-/// What is open in one direction of a channel's calibration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Open {
-    /// What it is, the same word in all channels.
-    pub name: String,
-    /// In its sigmas, what a vector of 1 in b makes of a zero, or a turn of 1 rad about the axes of b of an axis; else zero.
-    pub by_b: Vector3<f64>,
-}
-
-impl Open {
-    /// Of a channel with its axis, and the two directions in which that is open, in b.
-    pub fn new(name: String, sigma: f64, axis_b: Vector3<f64>, across_b: [Vector3<f64>; 2]) -> Self {
-        let by_b = match AXES.iter().position(|own| *own == name) {
-            // The axis n moves by `turn x n`.
-            Some(own) => axis_b.cross(&across_b[own]) / sigma,
-            None if name == ZERO => axis_b / sigma,
-            None => Vector3::zeros(),
-        };
-        Open { name, by_b }
-    }
-}
 
 /// Channels that share something.
 pub struct Shared {

@@ -7,7 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Fitted, LEVELLED, LEVELS, View};
+use super::view::{LEVELLED, LEVELS, View};
+use crate::joint::Fitted;
 
 /// What an effect adds.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! In: residuals in units of noise. Out: numbers that noise alone keeps small, for [`super::aspects`].
 
-use super::{LEVELS, aspects::place};
+use super::view::{LEVELS, place};
 
 /// Lags of the whiteness tests.
 const LAGS: usize = 10;

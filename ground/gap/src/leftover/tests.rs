@@ -6,9 +6,10 @@ mod recurrence;
 mod scatter;
 mod shared;
 
+use nalgebra::{DMatrix, Vector3};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
-use super::*;
+use super::{view::LEVELLED, *};
 use crate::joint::Columns;
 
 const SAMPLES: usize = 600;

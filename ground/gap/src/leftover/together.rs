@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aspects::place;
+use super::view::place;
 
 /// Stretches whose means are a course: of seconds.
 const STRETCHES: usize = 60;
