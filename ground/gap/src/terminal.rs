@@ -3,16 +3,15 @@
 mod causes;
 mod place;
 mod shrink;
+mod wrap;
 
 use std::fmt::Write;
 
 pub use place::{places, when};
 pub use shrink::shrink;
+use wrap::wrapped;
 
 use crate::{case::Subject, diagnose::Diagnosis};
-
-/// Columns of a screen.
-const WIDTH: usize = 118;
 
 /// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
 const REMAINS: f64 = 2.5;
@@ -29,28 +28,6 @@ pub fn screen(subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -
     // Writing to a string cannot fail.
     let _ = write(&mut text, subject, diagnosis, next_experiment);
     wrapped(&text)
-}
-
-/// Longer lines go on in the next, indented.
-fn wrapped(text: &str) -> String {
-    let mut out = String::new();
-    for line in text.lines() {
-        let mut width = 0;
-        for (at, word) in line.split(' ').enumerate() {
-            let length = word.chars().count();
-            if at > 0 && width + 1 + length > WIDTH {
-                out.push_str("\n        ");
-                width = 8;
-            } else if at > 0 {
-                out.push(' ');
-                width += 1;
-            }
-            out.push_str(word);
-            width += length;
-        }
-        out.push('\n');
-    }
-    out
 }
 
 /// How large each effect could be and not be seen.
@@ -233,23 +210,4 @@ fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std:
         writeln!(text, "        worse: {}", worse.join(" "))?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_lines_go_on_indented_and_lose_no_word() {
-        let line = format!("NEXT    {}", "word ".repeat(60));
-        let found = wrapped(&line);
-        assert!(found.lines().all(|line| line.chars().count() <= WIDTH), "{found}");
-        assert_eq!(found.matches("word").count(), 60);
-        assert!(
-            found
-                .lines()
-                .nth(1)
-                .is_some_and(|line| line.starts_with("        word"))
-        );
-    }
 }

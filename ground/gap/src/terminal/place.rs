@@ -2,6 +2,7 @@
 
 use std::fmt::{Result, Write};
 
+use super::wrap::wrapped;
 use crate::{
     case::Subject,
     diagnose::Diagnosis,
@@ -28,7 +29,7 @@ pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, subject, diagnosis);
-    super::wrapped(&text)
+    wrapped(&text)
 }
 
 /// One line of the screen; nothing where there is no gap to be anywhere.
