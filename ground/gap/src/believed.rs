@@ -6,7 +6,7 @@
 use crate::{
     belief::{Belief, Promised, promises, second_keys},
     case::Subject,
-    cause::{Cause, alternatives, cause_of_scatter, causes_of},
+    cause::{Cause, cause_of_scatter, causes_of},
     contribution,
     crossval::Key,
     events::Events,
@@ -14,6 +14,7 @@ use crate::{
     leftover::Leftover,
     library::Library,
     model::Model,
+    odds::alternatives,
     problem::Problem,
 };
 

@@ -4,7 +4,7 @@
 //! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
 
 use crate::{
-    attribute::Attribution,
+    attribute::{Attribution, Chosen},
     cause::Cause,
     library::Library,
     model::Model,
@@ -24,24 +24,18 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         return;
     }
     let left = |set: u32| {
-        let members: Vec<&crate::attribute::Chosen> = (0..chosen.len())
+        let members: Vec<&Chosen> = (0..chosen.len())
             .filter(|at| set >> at & 1 == 1)
             .map(|at| &chosen[at])
             .collect();
         let hypotheses: Vec<usize> = members.iter().map(|chosen| chosen.hypothesis).collect();
         let start: Vec<_> = members.iter().map(|chosen| chosen.theta.clone()).collect();
         let refined = refine(problem, library, &hypotheses, &start);
-        left(&Model::around(problem, model_of(library, &hypotheses, &refined.thetas)))
+        Model::around(problem, model_of(library, &hypotheses, &refined.thetas)).left()
     };
     let energies = shapley::shares(chosen.len(), |set| -left(set));
     causes
         .iter_mut()
         .zip(energies)
         .for_each(|(cause, energy)| cause.share = energy.max(0.0));
-}
-
-/// What a model leaves: residual energy, and how far it strained the calibration.
-pub fn left(model: &Model) -> f64 {
-    let open: f64 = model.fitted.nuisance.iter().map(|values| values.norm_squared()).sum();
-    model.energies().iter().sum::<f64>() + open
 }

@@ -12,10 +12,9 @@ use twin::part::signal::Noise;
 
 use crate::{
     attribute::{Attribution, Chosen, attribute},
-    cause::probability_of_any,
-    contribution,
     library::Library,
     model::Model,
+    odds::probability_of_any,
     problem::{Frame, Problem},
     scatter::{Scatter, scatters},
     temper,
@@ -77,7 +76,7 @@ impl Explanation {
         let first = Model::around(problem, found.model(library));
         let mut scatter = best_scatter(problem, &first, withheld);
         // Of effects that hold each other up each is worth more than its share: together no more than they take off.
-        let together = 0.5 * (contribution::left(quiet) - contribution::left(&first)).max(0.0);
+        let together = 0.5 * (quiet.left() - first.left()).max(0.0);
         let explained = gains(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
@@ -189,9 +188,7 @@ impl Explanation {
 
     /// Square root of the energy that the model takes off the fit windows.
     pub fn signal_to_noise(&self, quiet: &Model) -> f64 {
-        (contribution::left(quiet) - contribution::left(&self.model))
-            .max(0.0)
-            .sqrt()
+        (quiet.left() - self.model.left()).max(0.0).sqrt()
     }
 
     /// Takes every effect back; returns their names.

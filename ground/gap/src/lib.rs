@@ -41,6 +41,7 @@ pub mod library;
 pub mod log;
 pub mod model;
 pub mod next;
+pub mod odds;
 pub mod on;
 pub mod onset;
 pub mod open;

@@ -100,6 +100,12 @@ impl Model {
     pub fn energies(&self) -> Vec<f64> {
         self.fitted.rest.iter().map(|rest| rest.norm_squared()).collect()
     }
+
+    /// What it leaves: residual energy, and how far it strained the calibration.
+    pub fn left(&self) -> f64 {
+        let open: f64 = self.fitted.nuisance.iter().map(|values| values.norm_squared()).sum();
+        self.energies().iter().sum::<f64>() + open
+    }
 }
 
 /// Readings of one channel at every row, with calibration and reference as fitted.
