@@ -17,7 +17,7 @@ use crate::{
     case::{CaseError, Subject},
     diagnose::{Diagnosis, diagnose},
     library::Library,
-    next, page,
+    page,
     problem::Problem,
     terminal,
     verdict::Verdict,
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
         bar.set_position((100.0 * share) as u64);
     });
     bar.set_message("next");
-    let advice = next::advice(&subject, &diagnosis);
+    let advice = diagnosis.advice(&subject);
     bar.finish_and_clear();
     let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice.clone()))?;
     let said = match word {
@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
 pub fn write_verdict(case: &Path) -> Result<(), GapError> {
     let subject = Subject::open(case)?;
     let diagnosis = diagnose(&subject, &[], &|_, _| ());
-    let advice = next::advice(&subject, &diagnosis);
+    let advice = diagnosis.advice(&subject);
     let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice))?;
     put(case, "verdict.json", &verdict)
 }

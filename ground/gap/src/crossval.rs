@@ -11,12 +11,12 @@
 //! The calibration is refitted in every fold; the model is linear about the parameters found.
 
 use nalgebra::DVector;
+use statrs::function::erf::erfc;
 
 use crate::{
     joint::{Columns, Joint},
     library::Library,
     model::Model,
-    next::erfc,
     problem::{Component, Problem},
 };
 
@@ -42,17 +42,11 @@ impl Key {
     /// Probability that the gain is above zero.
     pub fn confidence(&self) -> f64 {
         if self.error > 0.0 {
-            1.0 - 0.5 * erfc_of(self.gain / self.error)
+            1.0 - 0.5 * erfc(self.gain / self.error / core::f64::consts::SQRT_2)
         } else {
             f64::from(u8::from(self.gain > 0.0))
         }
     }
-}
-
-/// `erfc(z / sqrt 2)` of either sign.
-fn erfc_of(z: f64) -> f64 {
-    let tail = erfc(z.abs() / core::f64::consts::SQRT_2);
-    if z >= 0.0 { tail } else { 2.0 - tail }
 }
 
 /// A key for each effect of the model, in its order; `None` where it has no say.
@@ -102,7 +96,7 @@ fn key_of(without: &[Vec<DVector<f64>>], with: &[Vec<DVector<f64>>]) -> Option<K
 
 /// By channel, the block of each fitted sample.
 fn blocks(problem: &Problem) -> Vec<Vec<usize>> {
-    let rows = crate::place::cells::fitted_rows(problem);
+    let rows = problem.fitted_rows();
     let block = |row: &u32| rows.partition_point(|one| *one < *row as usize) * BLOCKS / rows.len().max(1);
     let frames = problem.frames.iter();
     frames

@@ -9,7 +9,7 @@ use crate::{
     belief::{Promised, UNKNOWN_ALONE},
     believed::Believed,
     case::Subject,
-    cause::{Cause, alone, share_out},
+    cause::{Cause, share_out},
     confusion,
     correction::Correction,
     crossval::Key,
@@ -21,6 +21,8 @@ use crate::{
     leftover::{self, Leftover},
     library::Library,
     model::Model,
+    next::advice,
+    odds::alone,
     place::{self, Place, passage::Passage},
     problem::{Component, Problem},
     sight,
@@ -78,6 +80,14 @@ pub struct Diagnosis {
     pub cells: Vec<(String, Vec<f64>)>,
     /// The pair most worth telling apart, for planning.
     pub rivals: Option<confusion::Pair>,
+}
+
+impl Diagnosis {
+    /// The next experiment, in words.
+    pub fn advice(&self, subject: &Subject) -> String {
+        let confirm = self.causes.first().map(|cause| cause.confirm_by);
+        advice(subject, self.rivals.as_ref(), confirm, self.none_of_these > 0.5)
+    }
 }
 
 /// Diagnoses a case. `progress` is told what goes on and how far it is, 0 to 1.

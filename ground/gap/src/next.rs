@@ -6,6 +6,7 @@
 //! `Q(sqrt(m/2))`.
 
 use nalgebra::DVector;
+use statrs::function::erf::erfc;
 use twin::{
     effect::{Active, Cause, by_name},
     motion::{Motion, RateTable, RotationTest, Still, Tumble},
@@ -13,8 +14,8 @@ use twin::{
 };
 
 use crate::{
-    case::Subject, confusion::Pair, diagnose::Diagnosis, log::Series, problem::Problem, products::Products,
-    reference::Reference, windows::Fit,
+    case::Subject, confusion::Pair, log::Series, problem::Problem, products::Products, reference::Reference,
+    windows::Fit,
 };
 
 /// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
@@ -55,13 +56,12 @@ const CATALOGUE: [Experiment; 5] = [
     },
 ];
 
-/// Advice in words.
-pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
-    let confirm = diagnosis.causes.first().map(|cause| cause.confirm_by);
-    let Some(pair) = &diagnosis.rivals else {
+/// Advice in words: how to tell a pair apart, or how to `confirm` the first cause, or what to do where the gap `is_unknown`.
+pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, is_unknown: bool) -> String {
+    let Some(pair) = rivals else {
         return match confirm {
             Some(confirm) => format!("Nothing is left to tell apart. To be sure: {confirm}"),
-            None if diagnosis.none_of_these > 0.5 => {
+            None if is_unknown => {
                 "Repeat this log: what the library does not know shows whether it returns with the motion, the temperature or the clock.".to_owned()
             }
             None => "None is needed for what this log can show; for what it cannot, see its detection limits.".to_owned(),
@@ -109,25 +109,6 @@ pub fn advice(subject: &Subject, diagnosis: &Diagnosis) -> String {
 fn error(nats: f64) -> f64 {
     let x = (nats.max(0.0) / 2.0).sqrt();
     0.5 * erfc(x / std::f64::consts::SQRT_2)
-}
-
-/// Complementary error function of a positive number, to 1.2e-7 (Press et al., Numerical Recipes, 6.2).
-pub(crate) fn erfc(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.5 * x);
-    const TERMS: [f64; 10] = [
-        -1.265_512_23,
-        1.000_023_68,
-        0.374_091_96,
-        0.096_784_18,
-        -0.186_288_06,
-        0.278_868_07,
-        -1.135_203_98,
-        1.488_515_87,
-        -0.822_152_23,
-        0.170_872_77,
-    ];
-    let sum = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
-    t * (-x * x + sum).exp()
 }
 
 /// Nats between the two on a motion, and its minutes; `None` where one of them cannot be there.

@@ -116,13 +116,17 @@ pub fn locate(problem: &Problem, views: &[View], quiet: &Model) -> Place {
             energy[*row as usize] += value * value;
         }
     }
-    let rows = cells::fitted_rows(problem);
+    let rows = problem.fitted_rows();
     Place {
         channels: sorted(shared(names().zip(excess.iter().copied()).collect())),
         groups: sorted(shared(grouped.collect())),
         octaves: shared(by_octave(&observed, &simulated, problem)),
         regimes: regimes::shares(&problem.twin.feels(0), &rows, &energy),
-        cells: layout.standing_out(unit, &observed.cells, &simulated),
+        cells: layout.standing_out(
+            unit,
+            &observed.cells,
+            &simulated.iter().map(|sums| sums.cells.as_slice()).collect::<Vec<_>>(),
+        ),
         passage: passage::find(problem, &quiet.fitted.rest, &excess),
     }
 }

@@ -217,6 +217,15 @@ impl<'a> Problem<'a> {
         readings
     }
 
+    /// Rows with a fitted sample, rising.
+    pub fn fitted_rows(&self) -> Vec<usize> {
+        let all = self.frames.iter().flat_map(|frame| &frame.series.rows);
+        let mut rows: Vec<usize> = all.map(|row| *row as usize).collect();
+        rows.sort_unstable();
+        rows.dedup();
+        rows
+    }
+
     /// Readings of one channel at every row of the log; NaN where nothing was fitted.
     pub fn measured(&self, channel: usize) -> Vec<f64> {
         let series = &self.frames[channel].series;

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use gap::{
     case::Subject,
     diagnose::{Diagnosis, diagnose},
-    next::advice,
     verdict::Verdict,
 };
 use serde_json::{Value, json};
@@ -27,7 +26,7 @@ fn said(subject: &Subject, diagnosis: &Diagnosis) -> Value {
     let aspects = diagnosis.leftover.aspects.iter().take(5);
     let stages = diagnosis.stages.iter();
     json!({
-        "verdict": Verdict::new(subject, diagnosis, advice(subject, diagnosis)),
+        "verdict": Verdict::new(subject, diagnosis, diagnosis.advice(subject)),
         "gate": [diagnosis.gate.p, diagnosis.gate.log_tail],
         "leftover": [diagnosis.leftover.p, diagnosis.leftover.log_tail],
         "aspects": aspects.map(|aspect| json!([aspect.what, aspect.size])).collect::<Vec<_>>(),

@@ -5,9 +5,10 @@
 //! that only happened to look like the truth on the fit windows.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::function::erf::erfc;
 
 use super::{Held, course::Said};
-use crate::{events::Events, fit_error::FitError, leftover::odds, next::erfc};
+use crate::{events::Events, fit_error::FitError, leftover::odds};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +74,7 @@ impl Held {
         let (mut energy, mut along) = (0.0, 0.0);
         let mut by_parameter = DVector::zeros(claimed.error.slopes.len());
         for ((channel, added), open) in claimed.added.iter().zip(claimed.open) {
-            let series = &self.channels[*channel];
+            let series = &self.samples()[*channel];
             let sigma = |row: usize| claimed.sigmas[*channel][row] * claimed.louder[*channel];
             let after = |row: usize| course.mean(*channel, row, |after| after);
             let samples = series.rows.iter().map(|row| *row as usize).zip(&series.values);

@@ -8,10 +8,10 @@
 //! the simulated logs, which have the case's own motion, holes and calibration.
 
 use nalgebra::DVector;
+use statrs::function::erf::erfc;
 use twin::predict::{Feel, UnitDescription};
 
-use super::Sums;
-use crate::{next::erfc, problem::Problem};
+use crate::problem::Problem;
 
 /// Share of the cells named that may be wrong.
 pub const RATE: f64 = 0.05;
@@ -63,18 +63,9 @@ pub(crate) struct Layout {
     thirds: [[f64; PARTS - 1]; QUANTITIES.len()],
 }
 
-/// Rows with a fitted sample, rising.
-pub(crate) fn fitted_rows(problem: &Problem) -> Vec<usize> {
-    let all = problem.frames.iter().flat_map(|frame| &frame.series.rows);
-    let mut rows: Vec<usize> = all.map(|row| *row as usize).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    rows
-}
-
 impl Layout {
     pub(crate) fn new(problem: &Problem) -> Self {
-        let rows = fitted_rows(problem);
+        let rows = problem.fitted_rows();
         let starts_s = problem.twin.starts_s();
         let feels = problem.twin.feels(0);
         let at = |share: f64, sorted: &[f64]| sorted.get((sorted.len() as f64 * share) as usize).copied();
@@ -126,11 +117,11 @@ impl Layout {
         sums
     }
 
-    pub(crate) fn standing_out(&self, unit: &UnitDescription, observed: &[f64], simulated: &[Sums]) -> Vec<Cell> {
+    pub(crate) fn standing_out(&self, unit: &UnitDescription, observed: &[f64], simulated: &[&[f64]]) -> Vec<Cell> {
         let looked_at: Vec<usize> = (0..observed.len()).filter(|cell| self.counts[*cell] >= LEAST).collect();
         let sizes: Vec<f64> = looked_at
             .iter()
-            .map(|cell| size(observed[*cell], simulated.iter().map(|sums| sums.cells[*cell])))
+            .map(|cell| size(observed[*cell], simulated.iter().map(|sums| sums[*cell])))
             .collect();
         let chances: Vec<f64> = sizes.iter().map(|size| upper_tail(*size)).collect();
         let mut found: Vec<Cell> = discoveries(&chances, RATE)
@@ -178,8 +169,7 @@ fn size(observed: f64, simulated: impl Iterator<Item = f64>) -> f64 {
 
 /// `P(Z >= z)` of a Gaussian.
 fn upper_tail(z: f64) -> f64 {
-    let tail = 0.5 * erfc(z.abs() / core::f64::consts::SQRT_2);
-    if z >= 0.0 { tail } else { 1.0 - tail }
+    0.5 * erfc(z / core::f64::consts::SQRT_2)
 }
 
 /// Which hypotheses are rejected at this false discovery rate (Benjamini and Hochberg's step-up).

@@ -40,7 +40,7 @@ impl Passage {
     /// Of a named cause: each edge lies between the last fitted sample on its one side and the first on its other.
     pub fn of(problem: &Problem, span: Span) -> Self {
         let starts_s = problem.twin.starts_s();
-        let rows = super::cells::fitted_rows(problem);
+        let rows = problem.fitted_rows();
         let edge = |t_s: f64| {
             let next = rows.partition_point(|row| starts_s[*row] < t_s);
             let at = |index: usize| rows.get(index).map_or(t_s, |row| starts_s[*row]);
@@ -76,7 +76,7 @@ pub fn find(problem: &Problem, rests: &[DVector<f64>], excess: &[f64]) -> Option
         held += excess[*channel];
         is_needed
     });
-    let rows = super::cells::fitted_rows(problem);
+    let rows = problem.fitted_rows();
     let starts_s = problem.twin.starts_s();
     let place: Vec<usize> = (0..rows.len()).map(|at| at * STRETCHES / rows.len().max(1)).collect();
     let (mut energies, mut counts) = (vec![0.0; STRETCHES], vec![0.0; STRETCHES]);
