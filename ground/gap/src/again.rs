@@ -9,10 +9,10 @@ use nalgebra::DVector;
 
 use crate::{
     evidence::Screen,
-    products::Entries,
     on::{On, phase},
     piece::{Piece, Touched},
     problem::Problem,
+    products::Entries,
     windows::Span,
 };
 

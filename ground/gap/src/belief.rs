@@ -11,10 +11,8 @@ use crate::{
     events::Events,
     explain::{Explanation, REMAINDER},
     fit_error::FitError,
-    held::{
-        Held,
-        strength::{Claimed, Promise},
-    },
+    held::strength::{Claimed, Promise},
+    hold::Held,
     leftover::Leftover,
     library::Library,
     model::Model,

@@ -2,7 +2,7 @@
 //!
 //! In: finished predictions of every row, made without these samples. Out: [`Shrink`], the gap before, after
 //! recalibration alone, and after effect and recalibration, in total and per channel, in sigma and in physical units,
-//! with an interval. [`Held`] gives scores and nothing else: its samples are private to this file, so no fit reaches them.
+//! with an interval. Only this room opens [`Held`].
 //!
 //! The gap is the root mean square of the residual over the twin's own sigma; the shrink is
 //! `100 (before - after) / (before - floor)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
@@ -20,14 +20,12 @@ mod shrink;
 pub mod stages;
 pub mod strength;
 
-use core::fmt;
-
 use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 pub use self::shrink::{ChannelShrink, Shrink, ceiling_percent};
 use self::{course::Said, shrink::SMALLEST};
-use crate::{events::Events, log::Series};
+use crate::{events::Events, hold::Held};
 
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
@@ -37,21 +35,6 @@ const RESAMPLES: usize = 1000;
 
 /// Fixed, so that one case gives one verdict.
 const SEED: u64 = 0x5eed_0004;
-
-/// Samples of the hold windows.
-#[derive(Clone)]
-pub struct Held {
-    channels: Vec<Series>,
-}
-
-/// How many samples, not which: a derived form would print them.
-impl fmt::Debug for Held {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Held")
-            .field("counts", &self.counts())
-            .finish_non_exhaustive()
-    }
-}
 
 /// Predictions of every row of the log, channel by channel in physical units, made without the held-out samples.
 #[derive(Clone, Copy, Debug)]
@@ -121,16 +104,6 @@ impl Sums {
 }
 
 impl Held {
-    /// Takes the samples over.
-    pub(crate) fn new(channels: Vec<Series>) -> Self {
-        Held { channels }
-    }
-
-    /// Samples of each channel: how many, not which.
-    pub fn counts(&self) -> Vec<usize> {
-        self.channels.iter().map(|series| series.rows.len()).collect()
-    }
-
     /// Judges finished predictions. Rows the reference did not see (a prediction that is not finite) are left out.
     pub fn judge(&self, finished: Finished) -> Shrink {
         let first_s = finished.start_s.first().copied().unwrap_or(0.0);
@@ -139,7 +112,7 @@ impl Held {
         let mut blocks = vec![Sums::default(); ((last_s - first_s) / BLOCK_S) as usize + 1];
         let course = self.course(finished.said());
         let mut channels = Vec::new();
-        for (index, series) in self.channels.iter().enumerate() {
+        for (index, series) in self.samples().iter().enumerate() {
             let louder = finished.louder[index];
             let mut sums = Sums::default();
             let mut rms = [0.0; 2];
@@ -222,6 +195,7 @@ fn central_95(mut values: Vec<f64>) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Series;
 
     const ROWS: usize = 3000;
 
@@ -268,19 +242,6 @@ mod tests {
         assert_eq!(ceiling_percent([1.0, 1.0], 1, 10.0), 0.0);
         let above = ceiling_percent([2.0, 1.2], 1, 1e6);
         assert!((above - 100.0).abs() < 1e-3, "{above}");
-    }
-
-    #[test]
-    fn printing_the_held_samples_prints_none() {
-        let series = Series {
-            rows: vec![3, 4],
-            values: vec![0.123456, 7.5],
-        };
-        let text = format!("{:?}", Held::new(vec![series]));
-        assert!(
-            text.contains('2') && !text.contains("7.5") && !text.contains("0.123"),
-            "{text}"
-        );
     }
 
     #[test]

@@ -34,6 +34,7 @@ pub mod floor;
 pub mod gram;
 pub mod gross;
 pub mod held;
+pub mod hold;
 pub mod imitation;
 pub mod joint;
 pub mod leftover;

@@ -9,9 +9,9 @@
 use nalgebra::DVector;
 
 use crate::{
-    products::Entries,
     piece::{Piece, Touched},
     problem::Problem,
+    products::Entries,
     windows::Span,
 };
 

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     evidence::Screen,
-    products::Entries,
     problem::{Frame, Problem},
+    products::Entries,
 };
 
 /// A channel that an effect touches.

@@ -11,8 +11,8 @@ use twin::predict::Memory;
 use crate::{
     evidence::{Estimate, Screen},
     library::Library,
-    products::Entries,
     problem::{Component, Problem},
+    products::Entries,
 };
 
 /// Gauss-Newton steps: four suffice for the strongest effect tried; eight leave room.

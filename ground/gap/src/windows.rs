@@ -6,7 +6,7 @@
 //! Refuses windows that are empty, run backwards, are not finite or overlap.
 
 use crate::{
-    held::Held,
+    hold::Held,
     log::{Log, Series},
 };
 

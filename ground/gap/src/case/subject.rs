@@ -14,7 +14,7 @@ use twin::{
 use super::{CaseError, Opened, Position, environment::environment, read_table};
 use crate::{
     gross::{Gross, put_right},
-    held::Held,
+    hold::Held,
     log::{Column, Log, Masked, Stream},
     reference::{Reference, finer, used},
     windows::{Fit, Span},

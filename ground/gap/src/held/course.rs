@@ -8,8 +8,7 @@
 //! No instant is fitted. A row's score is `-2 ln p(y_t | y_<t)`, averaged over whether an event happened (prequential, Dawid
 //! 1984): one that is claimed costs what its rarity costs, and a rate that is there for nothing costs too.
 
-use super::Held;
-use crate::events::Events;
+use crate::{events::Events, hold::Held};
 
 /// What a finished model says of every row, and how far samples may be from it.
 #[derive(Clone, Copy)]
@@ -113,7 +112,7 @@ impl Held {
     /// Energy of each row in squares of sigma, by how often the event has happened again.
     fn energies(&self, said: Said, numbers: &[&[Vec<f64>]], rows: usize) -> Vec<Vec<f64>> {
         let mut energies = vec![vec![0.0; numbers.len()]; rows];
-        for (channel, series) in self.channels.iter().enumerate() {
+        for (channel, series) in self.samples().iter().enumerate() {
             for (row, value) in series.rows.iter().zip(&series.values) {
                 let row = *row as usize;
                 let sigma = said.sigmas[channel][row] * said.louder[channel];

@@ -6,8 +6,8 @@
 
 use twin::predict::Twin;
 
-use super::Held;
 use crate::{
+    hold::Held,
     leftover,
     model::Model,
     problem::{Component, Problem},
@@ -20,11 +20,11 @@ impl Held {
     /// Calibration and the sizes of the effects are fitted to the held-out samples anew, and say nothing but this. `None` where
     /// the aspect is of the calibration itself, which is the same in all windows, or where there are no samples.
     pub fn recurrence(&self, twin: &Twin, instrument: &Reference, components: &[Component], what: &str) -> Option<f64> {
-        if self.channels.iter().all(|series| series.rows.is_empty()) {
+        if self.samples().iter().all(|series| series.rows.is_empty()) {
             return None;
         }
         let own = Fit {
-            channels: self.channels.clone(),
+            channels: self.samples().to_vec(),
         };
         let mut problem = Problem::new(twin, &own, instrument);
         for component in components {

@@ -16,8 +16,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use twin::predict::Twin;
 
-use super::{BLOCK_S, Finished, Held, RESAMPLES, SEED, central_95};
-use crate::attitude::{Estimation, Response, Track};
+use super::{BLOCK_S, Finished, RESAMPLES, SEED, central_95};
+use crate::{
+    attitude::{Estimation, Response, Track},
+    hold::Held,
+};
 
 /// Rows that a stage must be there in to be judged.
 const LEAST_ROWS: usize = 50;
@@ -73,8 +76,8 @@ impl Held {
     /// calibration.
     pub fn stages(&self, twin: &Twin, finished: Finished, corrected: Option<&[Response]>) -> Vec<Stage> {
         let log_rows = twin.starts_s().len();
-        let mut measured = vec![vec![f64::NAN; log_rows]; self.channels.len()];
-        for (dense, series) in measured.iter_mut().zip(&self.channels) {
+        let mut measured = vec![vec![f64::NAN; log_rows]; self.samples().len()];
+        for (dense, series) in measured.iter_mut().zip(self.samples()) {
             for (row, value) in series.rows.iter().zip(&series.values) {
                 dense[*row as usize] = *value;
             }

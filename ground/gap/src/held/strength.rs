@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
-use super::{Held, course::Said};
-use crate::{events::Events, fit_error::FitError, leftover::odds};
+use super::course::Said;
+use crate::{events::Events, fit_error::FitError, hold::Held, leftover::odds};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]
