@@ -42,6 +42,7 @@ pub mod library;
 pub mod log;
 pub mod model;
 pub mod next;
+pub mod octaves;
 pub mod odds;
 pub mod on;
 pub mod onset;

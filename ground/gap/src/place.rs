@@ -8,18 +8,18 @@
 //! What noise and calibration leave is simulated on the case's own motion and holes, so a share is of what is above that.
 
 pub mod cells;
-pub mod octaves;
 pub mod passage;
 pub mod regimes;
 
 use nalgebra::DVector;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use self::{cells::Cell, octaves::Octave, passage::Passage};
+use self::{cells::Cell, passage::Passage};
 use crate::{
     joint::Fitted,
     leftover::{View, simulate},
     model::Model,
+    octaves::{self, Octave},
     problem::Problem,
 };
 
