@@ -10,7 +10,7 @@
 
 use std::{error::Error, fmt::Write, fs, time::Instant};
 
-use gap::{case::Subject, diagnose::diagnose};
+use gap::{diagnose::diagnose, input::case::Subject};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use twin::{

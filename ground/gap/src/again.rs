@@ -9,11 +9,11 @@ use nalgebra::DVector;
 
 use crate::{
     evidence::Screen,
+    input::windows::Span,
     on::{On, phase},
     piece::{Piece, Touched},
     problem::Problem,
     products::Entries,
-    windows::Span,
 };
 
 /// Phases into which a period is folded.

@@ -12,7 +12,7 @@ use crate::{
     explain::{Explanation, REMAINDER},
     fit_error::FitError,
     held::strength::{Claimed, Promise},
-    hold::Held,
+    input::hold::Held,
     leftover::Leftover,
     library::Library,
     model::Model,

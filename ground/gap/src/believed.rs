@@ -5,12 +5,12 @@
 
 use crate::{
     belief::{Belief, Promised, promises, second_keys},
-    case::Subject,
     cause::{Cause, cause_of_scatter, causes_of},
     contribution,
     crossval::Key,
     events::Events,
     explain::{Explanation, SAID},
+    input::case::Subject,
     leftover::Leftover,
     library::Library,
     model::Model,

@@ -7,7 +7,7 @@ use twin::effect::Parameter;
 
 use crate::{
     attribute::{Attribution, Chosen},
-    case::Subject,
+    input::case::Subject,
     library::Library,
     odds::{TEMPERATURE, oversize, probability, probability_of_any},
     problem::Problem,

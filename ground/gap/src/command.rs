@@ -14,8 +14,8 @@ use twin::predict::UnitDescription;
 
 use crate::{
     baseline,
-    case::{CaseError, Subject},
     diagnose::{Diagnosis, diagnose},
+    input::case::{CaseError, Subject},
     library::Library,
     page,
     problem::Problem,

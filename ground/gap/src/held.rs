@@ -25,7 +25,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 pub use self::shrink::{ChannelShrink, Shrink, ceiling_percent};
 use self::{course::Said, shrink::SMALLEST};
-use crate::{events::Events, hold::Held};
+use crate::{events::Events, input::hold::Held};
 
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
@@ -195,7 +195,7 @@ fn central_95(mut values: Vec<f64>) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::Series;
+    use crate::input::log::Series;
 
     const ROWS: usize = 3000;
 

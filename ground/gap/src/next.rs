@@ -14,8 +14,10 @@ use twin::{
 };
 
 use crate::{
-    case::Subject, confusion::Pair, log::Series, problem::Problem, products::Products, reference::Reference,
-    windows::Fit,
+    confusion::Pair,
+    input::{case::Subject, log::Series, reference::Reference, windows::Fit},
+    problem::Problem,
+    products::Products,
 };
 
 /// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::windows::Span;
+use crate::input::windows::Span;
 
 /// When an effect that passes is on.
 #[derive(Clone, Copy, Debug, PartialEq)]

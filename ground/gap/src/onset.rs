@@ -9,10 +9,10 @@
 use nalgebra::DVector;
 
 use crate::{
+    input::windows::Span,
     piece::{Piece, Touched},
     problem::Problem,
     products::Entries,
-    windows::Span,
 };
 
 /// Instants at which an effect may begin or end.

@@ -5,7 +5,7 @@
 
 use twin::predict::{Channel, Column, Kind, Twin};
 
-use crate::reference::Reference;
+use crate::input::reference::Reference;
 
 /// [s] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
 const GYRO_PERIOD_S: f64 = 1.0 / 256.0;

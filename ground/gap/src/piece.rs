@@ -126,7 +126,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::{log::Series, reference::Reference, windows::Fit};
+    use crate::input::{log::Series, reference::Reference, windows::Fit};
 
     const ROWS: usize = 100;
 

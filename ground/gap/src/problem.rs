@@ -5,7 +5,7 @@
 //!
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
 //! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
-//! errors are [`crate::reference`]'s and make some samples worth less than others.
+//! errors are [`crate::input::reference`]'s and make some samples worth less than others.
 
 mod frame;
 
@@ -16,7 +16,12 @@ use twin::{
 };
 
 pub use self::frame::Frame;
-use crate::{joint::Columns, on::On, open::calibration, reference::Reference, windows::Fit};
+use crate::{
+    input::{reference::Reference, windows::Fit},
+    joint::Columns,
+    on::On,
+    open::calibration,
+};
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
 /// in it.

@@ -11,7 +11,7 @@ pub use place::{places, when};
 pub use shrink::shrink;
 use wrap::wrapped;
 
-use crate::{case::Subject, diagnose::Diagnosis};
+use crate::{diagnose::Diagnosis, input::case::Subject};
 
 /// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
 const REMAINS: f64 = 2.5;

@@ -5,8 +5,8 @@ mod written;
 use std::{f64::consts::TAU, fmt::Write};
 
 use gap::{
-    case::Subject,
     diagnose::{Diagnosis, diagnose},
+    input::case::Subject,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};

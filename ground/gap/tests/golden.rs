@@ -7,8 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use gap::{
-    case::Subject,
     diagnose::{Diagnosis, diagnose},
+    input::case::Subject,
     verdict::Verdict,
 };
 use serde_json::{Value, json};

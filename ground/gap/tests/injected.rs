@@ -4,7 +4,7 @@ mod gyros;
 
 use std::fs;
 
-use gap::{case::Subject, command::taught, diagnose::Diagnosis, terminal, verdict::Verdict};
+use gap::{command::taught, diagnose::Diagnosis, input::case::Subject, terminal, verdict::Verdict};
 use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};

@@ -7,8 +7,8 @@
 use std::{fmt::Write, fs};
 
 use gap::{
-    case::Subject,
     diagnose::{Diagnosis, diagnose},
+    input::case::Subject,
 };
 
 /// A channel: name, axis in b, physical units a count, bias in counts.

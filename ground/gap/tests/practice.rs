@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gap::{case::Subject, diagnose::diagnose};
+use gap::{diagnose::diagnose, input::case::Subject};
 
 /// The folder of a practice case; `None`, with a message, where there is none.
 fn practice(name: &str) -> Option<PathBuf> {

@@ -6,8 +6,8 @@ mod written;
 use std::fmt::Write;
 
 use gap::{
-    case::Subject,
     diagnose::{Diagnosis, diagnose},
+    input::case::Subject,
     model::Model,
     problem::Problem,
     scatter::scatters,

@@ -9,7 +9,7 @@ use twin::{
 };
 
 use super::*;
-use crate::windows::Span;
+use crate::input::windows::Span;
 
 fn twin() -> Twin {
     let environment = Environment::laboratory();

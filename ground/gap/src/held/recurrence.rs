@@ -7,13 +7,11 @@
 use twin::predict::Twin;
 
 use crate::{
-    hold::Held,
+    input::{hold::Held, reference::Reference, windows::Fit},
     leftover,
     model::Model,
     problem::{Component, Problem},
-    reference::Reference,
     sight,
-    windows::Fit,
 };
 
 impl Held {

@@ -19,7 +19,7 @@ use twin::predict::Twin;
 use super::{BLOCK_S, Finished, RESAMPLES, SEED, central_95};
 use crate::{
     attitude::{Estimation, Response, Track},
-    hold::Held,
+    input::hold::Held,
 };
 
 /// Rows that a stage must be there in to be judged.

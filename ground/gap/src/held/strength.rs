@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
 use super::course::Said;
-use crate::{events::Events, fit_error::FitError, hold::Held, leftover::odds};
+use crate::{events::Events, fit_error::FitError, input::hold::Held, leftover::odds};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]
@@ -116,7 +116,7 @@ mod tests {
     use twin::predict::Column;
 
     use super::*;
-    use crate::log::Series;
+    use crate::input::log::Series;
 
     const SAMPLES: usize = 400;
 

@@ -10,7 +10,7 @@
 
 use nalgebra::DVector;
 
-use crate::{problem::Problem, windows::Span};
+use crate::{input::windows::Span, problem::Problem};
 
 /// Stretches that the fit windows are cut into.
 const STRETCHES: usize = 60;

@@ -4,7 +4,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::{gram::Normal, log::Series};
+use crate::{gram::Normal, input::log::Series};
 
 /// One channel of the fit windows.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@ use std::fmt::{Result, Write};
 
 use super::wrap::wrapped;
 use crate::{
-    case::Subject,
     diagnose::Diagnosis,
+    input::case::Subject,
     place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,

@@ -8,8 +8,8 @@ mod written;
 use std::{fmt::Write, fs};
 
 use gap::{
-    case::Subject,
     diagnose::{Diagnosis, diagnose},
+    input::case::Subject,
 };
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};

@@ -5,7 +5,7 @@
 //!
 //! Refuses windows that are empty, run backwards, are not finite or overlap.
 
-use crate::{
+use crate::input::{
     hold::Held,
     log::{Log, Series},
 };

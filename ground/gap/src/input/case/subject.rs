@@ -12,7 +12,7 @@ use twin::{
 };
 
 use super::{CaseError, Opened, Position, environment::environment, read_table};
-use crate::{
+use crate::input::{
     gross::{Gross, put_right},
     hold::Held,
     log::{Column, Log, Masked, Stream},

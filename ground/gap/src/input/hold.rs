@@ -1,11 +1,11 @@
 //! The samples of the hold windows, locked away.
 //!
-//! In: what [`crate::windows`] parts off. Out: how many there are, and to [`crate::held`], which judges finished models, what
+//! In: what [`crate::input::windows`] parts off. Out: how many there are, and to [`crate::held`], which judges finished models, what
 //! they are. No fit reaches them: `tests/rooms.rs` finds whoever else opens them.
 
 use core::fmt;
 
-use crate::log::Series;
+use crate::input::log::Series;
 
 /// Samples of the hold windows.
 #[derive(Clone)]

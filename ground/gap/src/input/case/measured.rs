@@ -11,7 +11,7 @@ use packets::{
 };
 
 use super::{CaseError, Kind, read_bytes};
-use crate::log::{Column, Log};
+use crate::input::log::{Column, Log};
 
 /// Reads a log.
 ///

@@ -1,12 +1,12 @@
 //! A gap case: one folder with what a unit logged, what it was made to do, and what its designers believed of it.
 //!
 //! In: the folder, or its `case.toml`. Out: [`Case`], whose log is already parted into what may be fitted
-//! ([`crate::windows::Fit`]) and what only judges ([`crate::windows::Held`]).
+//! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::windows::Held`]).
 //!
 //! Refuses, naming file and key: a missing file, a key that is absent or of the wrong type, windows that are empty,
 //! run backwards or overlap, a window without a sample, a motion that ends before the log does, a clock that never
 //! meets the motion's, channels the packets do not have. Lost, missing and clipped samples are not errors: they are
-//! left out and counted in [`crate::log::Masked`].
+//! left out and counted in [`crate::input::log::Masked`].
 
 mod environment;
 mod measured;
@@ -21,7 +21,7 @@ use std::{
 
 use serde::Deserialize;
 
-use crate::{
+use crate::input::{
     log::{Column, Log},
     windows::{Span, Windows},
 };

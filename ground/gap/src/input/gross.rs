@@ -15,7 +15,7 @@ use bench::{
 use nalgebra::Vector3;
 use twin::predict::{Channel, Kind};
 
-use crate::case::Position;
+use crate::input::case::Position;
 
 /// A command that is not what was done.
 #[derive(Clone, Debug, PartialEq)]

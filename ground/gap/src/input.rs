@@ -1,0 +1,14 @@
+//! Step 1, what is given: a unit's log, what it was made to do, and what its designers believed of it.
+//!
+//! In: the folder of a case. Out: [`case::Subject`]: the twin along the log, how well the reference knows, what may be fitted
+//! ([`windows::Fit`]) and what only judges ([`hold::Held`], locked away). Gross errors of a table are put right on the way
+//! ([`gross`]).
+//!
+//! Refuses, naming file and key, whatever cannot be read or does not fit the rest ([`case::CaseError`]).
+
+pub mod case;
+pub mod gross;
+pub mod hold;
+pub mod log;
+pub mod reference;
+pub mod windows;
