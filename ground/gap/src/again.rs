@@ -8,11 +8,13 @@
 use nalgebra::DVector;
 
 use crate::{
-    evidence::Screen,
     input::windows::Span,
-    on::{On, phase},
+    null::{
+        evidence::Screen,
+        interval::{On, phase},
+        problem::Problem,
+    },
     piece::{Piece, Touched},
-    problem::Problem,
     products::Entries,
 };
 

@@ -16,7 +16,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::LIBRARY;
 
-use crate::{library::Library, problem::Problem, products::Entries};
+use crate::{library::Library, null::problem::Problem, products::Entries};
 
 /// [sigma over the root of 2n] by which a channel's gap must exceed one to be off.
 const OFF: f64 = 5.0;

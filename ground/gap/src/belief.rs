@@ -15,8 +15,7 @@ use crate::{
     input::hold::Held,
     leftover::Leftover,
     library::Library,
-    model::Model,
-    problem::Problem,
+    null::{model::Model, problem::Problem},
 };
 
 /// Prior probability that a unit has something the library does not, beside what is named.

@@ -13,9 +13,8 @@ use crate::{
     input::case::Subject,
     leftover::Leftover,
     library::Library,
-    model::Model,
+    null::{model::Model, problem::Problem},
     odds::alternatives,
-    problem::Problem,
 };
 
 /// An explanation with its probabilities.

@@ -9,8 +9,8 @@ use crate::{
     attribute::{Attribution, Chosen},
     input::case::Subject,
     library::Library,
+    null::problem::Problem,
     odds::{TEMPERATURE, oversize, probability, probability_of_any},
-    problem::Problem,
     regime,
     scatter::Scatter,
 };

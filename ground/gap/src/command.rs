@@ -17,9 +17,8 @@ use crate::{
     diagnose::{Diagnosis, diagnose},
     input::case::{CaseError, Subject},
     library::Library,
-    page,
-    problem::Problem,
-    terminal,
+    null::problem::Problem,
+    page, terminal,
     verdict::Verdict,
 };
 

@@ -7,8 +7,7 @@ use crate::{
     attribute::{Attribution, Chosen},
     cause::Cause,
     library::Library,
-    model::Model,
-    problem::Problem,
+    null::{model::Model, problem::Problem},
     refine::{model_of, refine},
     shapley,
 };

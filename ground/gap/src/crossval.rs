@@ -14,10 +14,12 @@ use nalgebra::DVector;
 use statrs::function::erf::erfc;
 
 use crate::{
-    joint::{Columns, Joint},
     library::Library,
-    model::Model,
-    problem::{Component, Problem},
+    null::{
+        joint::{Columns, Joint},
+        model::Model,
+        problem::{Component, Problem},
+    },
 };
 
 /// Blocks, each left out in turn.

@@ -20,11 +20,13 @@ use crate::{
     input::case::Subject,
     leftover::{self, Leftover},
     library::Library,
-    model::Model,
     next::advice,
+    null::{
+        model::Model,
+        problem::{Component, Problem},
+    },
     odds::alone,
     place::{self, Place, passage::Passage},
-    problem::{Component, Problem},
     sight,
     trace::{Trace, cells, traces},
 };

@@ -10,7 +10,7 @@
 use twin::effect::Effect;
 use twin::effect::{Active, Cause};
 
-use crate::{
+use crate::null::{
     model::Model,
     problem::{Component, Problem},
 };

@@ -13,11 +13,13 @@ use twin::part::signal::Noise;
 use crate::{
     attribute::{Attribution, Chosen, attribute},
     library::Library,
-    model::Model,
+    null::{
+        misfit,
+        model::Model,
+        problem::{Frame, Problem},
+    },
     odds::probability_of_any,
-    problem::{Frame, Problem},
     scatter::{Scatter, scatters},
-    temper,
     wander::{self, Walk},
 };
 
@@ -249,7 +251,7 @@ fn reframe(problem: &mut Problem, library: &mut Library, frames: Vec<Frame>) {
 /// how much louder their channel is.
 fn factors(rest: &[DVector<f64>], louder: &[f64], scatter: Option<&Scatter>) -> Vec<f64> {
     let tells = |channel: usize| scatter.is_some_and(|scatter| scatter.tells_of(channel));
-    let channels = temper::factors(rest).into_iter().zip(louder).enumerate();
+    let channels = misfit::factors(rest).into_iter().zip(louder).enumerate();
     channels
         .map(|(channel, (misfit, louder))| match *louder == 1.0 {
             true => misfit,
@@ -299,7 +301,7 @@ fn walked(
     let mut walk = Walk::beside(problem, &[], withheld)?;
     let mut library = library.clone();
     let described = problem.frames.clone();
-    let misfits = temper::factors(&first.fitted.rest);
+    let misfits = misfit::factors(&first.fitted.rest);
     for _ in 0..WALKS {
         let is_walking = |channel: usize| walk.channels.iter().any(|(own, _)| *own == channel);
         let factors = misfits.iter().enumerate();

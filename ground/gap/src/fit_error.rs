@@ -11,7 +11,10 @@
 use nalgebra::{DMatrix, DVector};
 use twin::{effect::Active, predict::Column};
 
-use crate::{library::Hypothesis, model::Model, on::On, problem::Problem};
+use crate::{
+    library::Hypothesis,
+    null::{interval::On, model::Model, problem::Problem},
+};
 
 /// Times the slope is taken anew over one standard deviation of what was found: an onset has no slope over less than a cycle.
 const ROUNDS: usize = 3;
@@ -151,7 +154,7 @@ mod tests {
     use nalgebra::Cholesky;
 
     use super::*;
-    use crate::joint::{Columns, Joint};
+    use crate::null::joint::{Columns, Joint};
 
     #[test]
     fn a_value_beside_parameters_is_off_by_what_fitting_all_together_says() {

@@ -6,7 +6,10 @@
 //! say, for a clock that keeps step with the cycle scatters nothing. And a calibration fitted to so many samples is off by what
 //! they leave open. Neither is counted as a gap that an effect could close.
 
-use crate::{model::Model, open::conversion_period_s, problem::Problem, sight};
+use crate::{
+    null::{calibration::conversion_period_s, model::Model, problem::Problem},
+    sight,
+};
 
 /// The mean squares.
 pub fn floor(problem: &Problem, model: &Model) -> Vec<Vec<f64>> {

@@ -11,7 +11,7 @@
 use nalgebra::DVector;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use crate::joint::{Fitted, Joint};
+use crate::null::joint::{Fitted, Joint};
 
 mod aspects;
 mod clock;

@@ -12,9 +12,11 @@ use twin::{
 };
 
 use crate::{
-    evidence::Screen,
-    on::On,
-    problem::{Component, Problem},
+    null::{
+        evidence::Screen,
+        interval::On,
+        problem::{Component, Problem},
+    },
     products::Products,
 };
 

@@ -16,7 +16,7 @@ use twin::{
 use crate::{
     confusion::Pair,
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
-    problem::Problem,
+    null::problem::Problem,
     products::Products,
 };
 

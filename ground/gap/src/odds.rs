@@ -8,11 +8,11 @@ use twin::effect::{Page, Parameter};
 
 use crate::{
     attribute::{Attribution, Chosen, Rival},
-    evidence::probabilities,
     library::Library,
+    null::evidence::probabilities,
 };
 
-/// Evidence is raised to one over this: see [`crate::evidence`]. A guess, not yet fitted:
+/// Evidence is raised to one over this: see [`crate::null::evidence`]. A guess, not yet fitted:
 /// `TRIALS.md` says how far it holds.
 pub const TEMPERATURE: f64 = 2.0;
 

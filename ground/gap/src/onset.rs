@@ -10,8 +10,8 @@ use nalgebra::DVector;
 
 use crate::{
     input::windows::Span,
+    null::problem::Problem,
     piece::{Piece, Touched},
-    problem::Problem,
     products::Entries,
 };
 

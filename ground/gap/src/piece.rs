@@ -6,8 +6,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    evidence::Screen,
-    problem::{Frame, Problem},
+    null::{
+        evidence::Screen,
+        problem::{Frame, Problem},
+    },
     products::Entries,
 };
 

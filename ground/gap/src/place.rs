@@ -16,11 +16,9 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use self::{cells::Cell, passage::Passage};
 use crate::{
-    joint::Fitted,
     leftover::{View, simulate},
-    model::Model,
+    null::{joint::Fitted, model::Model, problem::Problem},
     octaves::{self, Octave},
-    problem::Problem,
 };
 
 /// Logs simulated: their mean is known to a tenth of the spread, and their spread to a fourteenth.

@@ -7,7 +7,7 @@ use std::cell::RefCell;
 
 use nalgebra::DVector;
 
-use crate::{
+use crate::null::{
     evidence::Screen,
     problem::{Frame, Problem},
 };

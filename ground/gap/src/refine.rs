@@ -9,9 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
 
 use crate::{
-    evidence::{Estimate, Screen},
     library::Library,
-    problem::{Component, Problem},
+    null::{
+        evidence::{Estimate, Screen},
+        problem::{Component, Problem},
+    },
     products::Entries,
 };
 

@@ -2,10 +2,10 @@
 //!
 //! In: the [`Problem`] and what a model predicts with its calibration. Out: the [`Scatter`] that makes the log likeliest, with
 //! the channels it is in. They are judged after the deterministic effects, whose misfit would look like noise, and those are
-//! then searched anew with the noise as found ([`crate::problem::Problem::reframe`]).
+//! then searched anew with the noise as found ([`crate::null::problem::Problem::reframe`]).
 //!
 //! A part that converts by its own clock scatters with the slope of what it measures in any case
-//! ([`crate::open::instant_sigma_s`]); an effect counts only by what it says beyond that.
+//! ([`crate::null::calibration::instant_sigma_s`]); an effect counts only by what it says beyond that.
 //!
 //! Each is judged with the calibration that goes with it ([`crate::uncovered`]).
 //!
@@ -24,8 +24,10 @@ use twin::{
 
 pub use self::search::scatters;
 use crate::{
-    model::Model,
-    problem::{Frame, Problem},
+    null::{
+        model::Model,
+        problem::{Frame, Problem},
+    },
     uncovered::{of_samples, recalibrated},
 };
 

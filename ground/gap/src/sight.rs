@@ -7,9 +7,11 @@ use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
     leftover::{Clock, Codes, Instrument, LEVELS, Open, Suspect, View},
-    model::Model,
-    open::conversion_period_s,
-    problem::{Frame, Problem},
+    null::{
+        calibration::conversion_period_s,
+        model::Model,
+        problem::{Frame, Problem},
+    },
 };
 
 /// Quantities of the motion: rate, force and field in b, temperature.

@@ -4,8 +4,7 @@
 
 use crate::{
     leftover::{STRETCHES, View},
-    model::Model,
-    problem::Problem,
+    null::{model::Model, problem::Problem},
 };
 
 /// Channels whose residuals are shown.

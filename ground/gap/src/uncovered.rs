@@ -9,7 +9,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::Beneath;
 
-use crate::{model::Model, problem::Problem};
+use crate::null::{model::Model, problem::Problem};
 
 /// A channel's prediction with its calibration fitted anew.
 pub struct Recalibrated {

@@ -18,8 +18,10 @@ use twin::{
 };
 
 use crate::{
-    gram::log_determinant,
-    problem::{Component, Frame, Problem},
+    null::{
+        normal::log_determinant,
+        problem::{Component, Frame, Problem},
+    },
     scatter::Scatter,
 };
 

@@ -3,8 +3,13 @@
 mod gyros;
 
 use gap::{
-    again::again, attribute::attribute, fit_error::FitError, input::case::Subject, library::Library, model::Model,
-    on::On, problem::Problem, terminal,
+    again::again,
+    attribute::attribute,
+    fit_error::FitError,
+    input::case::Subject,
+    library::Library,
+    null::{interval::On, model::Model, problem::Problem},
+    terminal,
 };
 use gyros::{diagnosed_in, erring, erring_in, rate};
 

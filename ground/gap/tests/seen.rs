@@ -8,8 +8,7 @@ use std::fmt::Write;
 use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
-    model::Model,
-    problem::Problem,
+    null::{model::Model, problem::Problem},
     scatter::scatters,
 };
 use nalgebra::{UnitQuaternion, Vector3};

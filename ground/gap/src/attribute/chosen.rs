@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::on::On;
+use crate::null::interval::On;
 
 /// A chosen effect.
 #[derive(Clone, Debug)]

@@ -12,9 +12,8 @@ use super::{
 use crate::{
     again::again,
     library::{Hypothesis, Library},
-    on::On,
+    null::{interval::On, problem::Problem},
     onset,
-    problem::Problem,
     products::Entries,
     refine::{Refined, model_of, refine},
 };

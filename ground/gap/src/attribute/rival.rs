@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     library::Library,
-    problem::Problem,
+    null::problem::Problem,
     refine::{Refined, refine},
 };
 

@@ -7,7 +7,7 @@ use std::{iter::once, ops::Range};
 use super::variant::is_any_same;
 use crate::{
     library::{Hypothesis, Library},
-    problem::Problem,
+    null::problem::Problem,
     refine::Refined,
 };
 

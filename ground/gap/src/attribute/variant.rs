@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use super::columns::renew;
 use crate::{
     library::{Hypothesis, Library},
-    problem::Problem,
+    null::problem::Problem,
     refine::{Refined, refine},
 };
 

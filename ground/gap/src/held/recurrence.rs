@@ -9,8 +9,10 @@ use twin::predict::Twin;
 use crate::{
     input::{hold::Held, reference::Reference, windows::Fit},
     leftover,
-    model::Model,
-    problem::{Component, Problem},
+    null::{
+        model::Model,
+        problem::{Component, Problem},
+    },
     sight,
 };
 

@@ -29,7 +29,7 @@ use super::{
     together,
     view::{LEVELLED, STRETCHES, View, place},
 };
-use crate::{joint::Fitted, octaves};
+use crate::{null::joint::Fitted, octaves};
 
 /// [units of noise] within which a sample is where the one before was: what is sent again is as near as a calibration is right,
 /// and how near that is says nothing.

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::on::phase;
+use crate::null::interval::phase;
 
 /// Part by which a clock inside a part may be off: an RC oscillator's few percent.
 const OFF: f64 = 0.05;

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::view::{View, place};
-use crate::joint::Fitted;
+use crate::null::joint::Fitted;
 
 /// [units of noise] to which a vector's length is cut before fourth powers are summed. Vectors of many sensors have lighter
 /// tails than each of these, so the cut lies farther out than that of [`super::sums::tails`].

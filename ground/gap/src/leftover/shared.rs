@@ -13,7 +13,7 @@ use super::{
     label::{OF_CALIBRATION, name_of},
     view::{AXES, Open, View, ZERO},
 };
-use crate::joint::Fitted;
+use crate::null::joint::Fitted;
 
 /// What a part has once for all of its channels.
 pub const OF_PART: [&str; 2] = ["instant", "instant_drift"];

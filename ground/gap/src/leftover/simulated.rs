@@ -11,7 +11,7 @@ use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
 use super::{codes::Counts, instrument::Played, shared::OF_PART, view::View};
-use crate::joint::Joint;
+use crate::null::joint::Joint;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.
 const TAILS: f64 = 10.0;

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::view::{LEVELLED, LEVELS, View};
-use crate::joint::Fitted;
+use crate::null::joint::Fitted;
 
 /// What an effect adds.
 #[derive(Clone, Debug)]

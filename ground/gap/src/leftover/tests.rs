@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Vector3};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
 use super::{view::LEVELLED, *};
-use crate::joint::Columns;
+use crate::null::joint::Columns;
 
 const SAMPLES: usize = 600;
 const CHANNELS: usize = 3;

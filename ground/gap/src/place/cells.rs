@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use statrs::function::erf::erfc;
 use twin::predict::{Feel, UnitDescription};
 
-use crate::problem::Problem;
+use crate::null::problem::Problem;
 
 /// Share of the cells named that may be wrong.
 pub const RATE: f64 = 0.05;

@@ -10,7 +10,7 @@
 
 use nalgebra::DVector;
 
-use crate::{input::windows::Span, problem::Problem};
+use crate::{input::windows::Span, null::problem::Problem};
 
 /// Stretches that the fit windows are cut into.
 const STRETCHES: usize = 60;

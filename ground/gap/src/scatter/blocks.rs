@@ -5,7 +5,7 @@ use twin::{
     predict::Kind,
 };
 
-use crate::problem::Problem;
+use crate::null::problem::Problem;
 
 /// Effects that only make a sample scatter more: a reference that errs does so too.
 const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];

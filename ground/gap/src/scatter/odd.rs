@@ -2,7 +2,7 @@
 
 use twin::{effect::View, predict::Kind};
 
-use crate::open::instant_sigma_s;
+use crate::null::calibration::instant_sigma_s;
 
 /// [standard deviations] by which energy, tails or neighbours of a residual must differ from the nominal for a second look.
 const ODD: f64 = 2.0;

@@ -11,8 +11,7 @@ use super::{
     odd::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
 };
 use crate::{
-    model::Model,
-    problem::Problem,
+    null::{model::Model, problem::Problem},
     uncovered::{as_described, recalibrated},
 };
 

@@ -1,6 +1,6 @@
 //! Evidence of a set of effects against none, and the probabilities that follow.
 //!
-//! In: normal equations with the calibration marginalised ([`crate::gram::Normal`], added up over channels) and the
+//! In: normal equations with the calibration marginalised ([`crate::null::normal::Normal`], added up over channels) and the
 //! prior sigmas of the parameters. Out: the best parameters with their covariance, and
 //! `ln Z = 1/2 s'(I + D^-2)^-1 s - 1/2 ln det(1 + D I D)` over the model without them: exact for linear effects, the
 //! Laplace approximation otherwise (MacKay 1992). The determinant is the Occam term that prefers one value of gravity to
@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::gram::log_determinant;
+use crate::null::normal::log_determinant;
 
 /// How many times its usual size an effect may have, and the probability of each.
 const SIZES: [(f64, f64); 3] = [(0.2, 0.25), (1.0, 0.5), (5.0, 0.25)];
@@ -58,7 +58,7 @@ impl Screen {
     }
 
     /// Adds one channel's normal equations, whose columns stand at `places` here.
-    pub fn add(&mut self, places: &[usize], normal: &crate::gram::Normal) {
+    pub fn add(&mut self, places: &[usize], normal: &crate::null::normal::Normal) {
         for (row, to_row) in places.iter().enumerate() {
             self.score[*to_row] += normal.score[row];
             for (column, to_column) in places.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! The fit windows as a least-squares problem: residuals and columns of every channel in units of its noise.
 //!
-//! In: the twin, the fit windows, how well the reference is known. Out: what [`crate::joint`] and [`crate::evidence`] work
+//! In: the twin, the fit windows, how well the reference is known. Out: what [`crate::null::joint`] and [`crate::null::evidence`] work
 //! on. What the twin predicts is compared at the rows that are there and that the reference saw.
 //!
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
@@ -18,9 +18,7 @@ use twin::{
 pub use self::frame::Frame;
 use crate::{
     input::{reference::Reference, windows::Fit},
-    joint::Columns,
-    on::On,
-    open::calibration,
+    null::{calibration::calibration, interval::On, joint::Columns},
 };
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre

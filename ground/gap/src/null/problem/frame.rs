@@ -4,7 +4,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::{gram::Normal, input::log::Series};
+use crate::{input::log::Series, null::normal::Normal};
 
 /// One channel of the fit windows.
 #[derive(Clone, Debug)]

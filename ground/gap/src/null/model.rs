@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::{
+use crate::null::{
     joint::{Fitted, Joint},
     problem::{Component, Problem},
 };

@@ -119,7 +119,7 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{evidence::Screen, gram::Normal};
+    use crate::null::{evidence::Screen, normal::Normal};
 
     /// Double precision over some hundred operations on numbers near one.
     const ROUNDING: f64 = 1e-9;

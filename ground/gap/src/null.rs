@@ -1,0 +1,18 @@
+//! Step 2, nothing wrong: what calibration, noise and reference alone would leave of the fit windows.
+//!
+//! In: the twin, the fit windows and the reference. Out: [`problem::Problem`], residuals and columns of every channel in units of
+//! its noise, and on it a linear Gaussian fit ([`joint`]) of what the [`calibration`] and the reference leave open: normal
+//! equations with the calibration marginalised ([`normal`]), their [`evidence`], and the finished [`model`]. A [`misfit`] that
+//! looks like noise is told from noise by how long it stays alike. An effect that comes and goes is on in an [`interval`].
+//!
+//! With thousands of samples any error of 0.1 % is significant. That is why the calibration is marginalised everywhere: none of
+//! what it leaves open is an effect.
+
+pub mod calibration;
+pub mod evidence;
+pub mod interval;
+pub mod joint;
+pub mod misfit;
+pub mod model;
+pub mod normal;
+pub mod problem;
