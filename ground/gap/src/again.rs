@@ -9,13 +9,13 @@ use nalgebra::DVector;
 
 use crate::{
     input::windows::Span,
+    library::products::Entries,
     null::{
         evidence::Screen,
         interval::{On, phase},
         problem::Problem,
     },
     piece::{Piece, Touched},
-    products::Entries,
 };
 
 /// Phases into which a period is folded.

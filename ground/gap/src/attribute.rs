@@ -28,7 +28,7 @@ use self::{
     variant::is_any_same,
 };
 use crate::{
-    library::Library,
+    library::hypotheses::Library,
     null::problem::{Component, Problem},
     refine::{Refined, model_of, refine},
 };

@@ -16,7 +16,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::LIBRARY;
 
-use crate::{library::Library, null::problem::Problem, products::Entries};
+use crate::{
+    library::{hypotheses::Library, products::Entries},
+    null::problem::Problem,
+};
 
 /// [sigma over the root of 2n] by which a channel's gap must exceed one to be off.
 const OFF: f64 = 5.0;
@@ -72,7 +75,7 @@ pub fn largest_residual(problem: &Problem, library: &Library) -> Vec<Named> {
     let best = own
         .filter_map(|hypothesis| Some((fall(library, &hypothesis.places, &residuals)?.0, hypothesis)))
         .max_by(|one, other| one.0.total_cmp(&other.0));
-    let named = |(_, hypothesis): (f64, &crate::library::Hypothesis)| Named {
+    let named = |(_, hypothesis): (f64, &crate::library::hypotheses::Hypothesis)| Named {
         effect: hypothesis.effect(),
         channels: vec![channel],
         share: 1.0,

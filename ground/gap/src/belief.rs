@@ -14,7 +14,7 @@ use crate::{
     held::strength::{Claimed, Promise},
     input::hold::Held,
     leftover::Leftover,
-    library::Library,
+    library::hypotheses::Library,
     null::{model::Model, problem::Problem},
 };
 

@@ -12,7 +12,7 @@ use crate::{
     explain::{Explanation, SAID},
     input::case::Subject,
     leftover::Leftover,
-    library::Library,
+    library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     odds::alternatives,
 };

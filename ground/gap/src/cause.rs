@@ -8,7 +8,7 @@ use twin::effect::Parameter;
 use crate::{
     attribute::{Attribution, Chosen},
     input::case::Subject,
-    library::Library,
+    library::hypotheses::Library,
     null::problem::Problem,
     odds::{TEMPERATURE, oversize, probability, probability_of_any},
     regime,

@@ -16,7 +16,7 @@ use crate::{
     baseline,
     diagnose::{Diagnosis, diagnose},
     input::case::{CaseError, Subject},
-    library::Library,
+    library::hypotheses::Library,
     null::problem::Problem,
     page, terminal,
     verdict::Verdict,

@@ -5,7 +5,7 @@
 //! marginalised), so that the two differ by `m = 1/2 |h_i|^2 (1 - rho^2)` nats at best (Eriksson, Frisk and Krysander 2013);
 //! deciding between them then errs with probability `Q(sqrt(m/2))`: 11 nats, 1 %; 3 nats, 11 %.
 
-use crate::{attribute::Attribution, library::Library, odds::by_effect};
+use crate::{attribute::Attribution, library::hypotheses::Library, odds::by_effect};
 
 /// [nats] below which two effects are not told apart: 6 % errors.
 const APART: f64 = 5.0;

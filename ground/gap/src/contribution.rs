@@ -6,7 +6,7 @@
 use crate::{
     attribute::{Attribution, Chosen},
     cause::Cause,
-    library::Library,
+    library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     refine::{model_of, refine},
     shapley,

@@ -14,7 +14,7 @@ use nalgebra::DVector;
 use statrs::function::erf::erfc;
 
 use crate::{
-    library::Library,
+    library::hypotheses::Library,
     null::{
         joint::{Columns, Joint},
         model::Model,

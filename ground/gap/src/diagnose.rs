@@ -19,7 +19,7 @@ use crate::{
     imitation::{Imitation, imitation},
     input::case::Subject,
     leftover::{self, Leftover},
-    library::Library,
+    library::hypotheses::Library,
     next::advice,
     null::{
         model::Model,

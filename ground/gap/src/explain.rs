@@ -12,7 +12,7 @@ use twin::part::signal::Noise;
 
 use crate::{
     attribute::{Attribution, Chosen, attribute},
-    library::Library,
+    library::hypotheses::Library,
     null::{
         misfit,
         model::Model,

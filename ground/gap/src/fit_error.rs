@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use twin::{effect::Active, predict::Column};
 
 use crate::{
-    library::Hypothesis,
+    library::hypotheses::Hypothesis,
     null::{interval::On, model::Model, problem::Problem},
 };
 

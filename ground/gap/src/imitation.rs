@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 
-use crate::{attribute::Attribution, library::Library};
+use crate::{attribute::Attribution, library::hypotheses::Library};
 
 /// Effects compared: more do not stand beside each other on a page.
 const MOST: usize = 10;

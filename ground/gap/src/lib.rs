@@ -42,7 +42,6 @@ pub mod onset;
 pub mod page;
 pub mod piece;
 pub mod place;
-pub mod products;
 pub mod refine;
 pub mod regime;
 pub mod scatter;

@@ -16,8 +16,8 @@ use twin::{
 use crate::{
     confusion::Pair,
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
+    library::products::Products,
     null::problem::Problem,
-    products::Products,
 };
 
 /// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.

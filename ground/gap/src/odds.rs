@@ -8,7 +8,7 @@ use twin::effect::{Page, Parameter};
 
 use crate::{
     attribute::{Attribution, Chosen, Rival},
-    library::Library,
+    library::hypotheses::Library,
     null::evidence::probabilities,
 };
 

@@ -10,9 +10,9 @@ use nalgebra::DVector;
 
 use crate::{
     input::windows::Span,
+    library::products::Entries,
     null::problem::Problem,
     piece::{Piece, Touched},
-    products::Entries,
 };
 
 /// Instants at which an effect may begin or end.

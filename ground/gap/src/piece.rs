@@ -6,11 +6,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
+    library::products::Entries,
     null::{
         evidence::Screen,
         problem::{Frame, Problem},
     },
-    products::Entries,
 };
 
 /// A channel that an effect touches.

@@ -9,12 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
 
 use crate::{
-    library::Library,
+    library::{hypotheses::Library, products::Entries},
     null::{
         evidence::{Estimate, Screen},
         problem::{Component, Problem},
     },
-    products::Entries,
 };
 
 /// Gauss-Newton steps: four suffice for the strongest effect tried; eight leave room.

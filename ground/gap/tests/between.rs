@@ -7,7 +7,7 @@ use gap::{
     attribute::attribute,
     fit_error::FitError,
     input::case::Subject,
-    library::Library,
+    library::hypotheses::Library,
     null::{interval::On, model::Model, problem::Problem},
     terminal,
 };

@@ -11,10 +11,12 @@ use super::{
 };
 use crate::{
     again::again,
-    library::{Hypothesis, Library},
+    library::{
+        hypotheses::{Hypothesis, Library},
+        products::Entries,
+    },
     null::{interval::On, problem::Problem},
     onset,
-    products::Entries,
     refine::{Refined, model_of, refine},
 };
 

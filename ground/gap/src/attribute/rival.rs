@@ -9,7 +9,7 @@ use super::{
     variant::{is_any_same, without_its_physics},
 };
 use crate::{
-    library::Library,
+    library::hypotheses::Library,
     null::problem::Problem,
     refine::{Refined, refine},
 };

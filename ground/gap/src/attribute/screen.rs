@@ -6,7 +6,7 @@ use std::{iter::once, ops::Range};
 
 use super::variant::is_any_same;
 use crate::{
-    library::{Hypothesis, Library},
+    library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
     refine::Refined,
 };

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 
 use super::columns::renew;
 use crate::{
-    library::{Hypothesis, Library},
+    library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
     refine::{Refined, refine},
 };

@@ -1,0 +1,205 @@
+//! Every hypothesis of the effect library on one case, and its columns.
+//!
+//! In: the [`Problem`]. Out: a [`Hypothesis`] for each effect, place and variant, with the columns of its parameters
+//! at zero. Places share columns (one gyro's bias is the same column whether the gyro stands alone or among the four), so
+//! a column is made once. Prior odds: half for "nothing", half shared equally by the effects, and an effect's share equally
+//! by its places and variants (half to the widest places); so looking in more places costs what it should.
+
+use nalgebra::DVector;
+use twin::{
+    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter, onsets},
+    predict::Kind,
+};
+
+use crate::{
+    library::products::Products,
+    null::{
+        evidence::Screen,
+        interval::On,
+        problem::{Component, Problem},
+    },
+};
+
+/// An effect at a place.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// Which and where.
+    pub cause: Cause,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Where the columns of its parameters stand.
+    pub places: Vec<usize>,
+    /// Logarithm of its prior odds against nothing.
+    pub log_prior: f64,
+    /// When it is on; `None` for always.
+    pub span: Option<On>,
+}
+
+impl Hypothesis {
+    /// Name of its effect.
+    pub fn effect(&self) -> &'static str {
+        self.cause.effect.page().name
+    }
+
+    /// It, with these parameters.
+    pub fn active(&self, theta: &DVector<f64>) -> Active {
+        Active {
+            cause: self.cause.clone(),
+            theta: theta.iter().copied().collect(),
+        }
+    }
+
+    /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants [s];
+    /// `None` where there are none.
+    pub fn values_between(&self, starts_s: &[f64]) -> Option<Vec<f64>> {
+        let mut values = self.cause.effect.between(starts_s);
+        if !self.cause.effect.has_values_between() {
+            let onsets: Vec<f64> = onsets(starts_s).collect();
+            let is_other = |value: &f64| !onsets.contains(value);
+            let others: Vec<f64> = values.iter().copied().filter(is_other).collect();
+            let is_onset = values.len() == others.len() + onsets.len() && !others.contains(&self.cause.variant);
+            if !is_onset || self.places.is_empty() {
+                return None;
+            }
+            values = onsets;
+        }
+        values.sort_by(f64::total_cmp);
+        Some(values)
+    }
+
+    /// It, when it is on.
+    pub fn component(&self, theta: &DVector<f64>) -> Component {
+        Component {
+            active: self.active(theta),
+            span: self.span,
+        }
+    }
+}
+
+/// All of them.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// In the order of the effect library.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Columns, first those of the reference.
+    pub products: Products,
+    /// Prior sigma of each column's parameter.
+    pub prior_sigmas: Vec<f64>,
+    /// How many columns are the reference's.
+    pub reference: usize,
+}
+
+impl Library {
+    /// Makes the columns; `withheld` names effects to leave out; `progress` is told how far it is, from 0 to 1.
+    pub fn new(problem: &Problem, withheld: &[String], progress: &dyn Fn(f64)) -> Self {
+        let unit = problem.twin.unit();
+        let starts_s = problem.twin.starts_s();
+        let mut library = Library {
+            hypotheses: Vec::new(),
+            products: Products::default(),
+            prior_sigmas: problem.reference.iter().map(|column| column.sigma).collect(),
+            reference: problem.reference.len(),
+        };
+        for column in problem.reference_columns() {
+            library.products.push(problem, column);
+        }
+        // A gyro that sends codes of its own is a vibrating one, whose answer has no Sagnac phase to be the sine of.
+        let of_light = unit
+            .channels
+            .iter()
+            .any(|channel| channel.sensor == Kind::Gyro && channel.bits.is_none());
+        // Rows that bring their own time leave a hole when they are lost, and nothing late.
+        let is_counted = unit.cycle_s.is_some();
+        let is_offered = |name: &str| {
+            withheld.iter().all(|withheld| withheld != name)
+                && (of_light || name != "gyro-sine-response")
+                && (is_counted || name != "packet-loss")
+        };
+        let offered: Vec<_> = LIBRARY
+            .iter()
+            .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))
+            .collect();
+        for (done, effect) in offered.iter().enumerate() {
+            let (localities, variants) = (effect.localities(unit), effect.variants(starts_s));
+            let widest = localities.iter().filter(|locality| is_wide(locality)).count();
+            let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
+            for locality in &localities {
+                for variant in &variants {
+                    let places = if widest == 0 || widest == localities.len() {
+                        localities.len()
+                    } else if is_wide(locality) {
+                        2 * widest
+                    } else {
+                        2 * (localities.len() - widest)
+                    };
+                    let log_prior = -((LIBRARY.len() * places * variants.len()).max(1) as f64).ln();
+                    let cause = Cause {
+                        effect: **effect,
+                        locality: locality.clone(),
+                        variant: *variant,
+                    };
+                    let parameters = cause.parameters(unit);
+                    let width = effect.page().parameters.len().max(1);
+                    let find = |index: usize, known: &[(Vec<usize>, usize, f64, usize)]| {
+                        let touched = cause.touched_by(index, unit);
+                        let same = |entry: &&(Vec<usize>, usize, f64, usize)| {
+                            entry.0 == touched && entry.1 == index % width && entry.2 == *variant
+                        };
+                        known.iter().find(same).map(|entry| entry.3)
+                    };
+                    let all_known = (0..parameters.len()).all(|index| find(index, &known).is_some());
+                    if !all_known {
+                        let zero = Active {
+                            cause: cause.clone(),
+                            theta: vec![0.0; parameters.len()],
+                        };
+                        let columns = problem.twin.jacobian(&[zero], 0);
+                        for (index, column) in columns.iter().enumerate() {
+                            if find(index, &known).is_none() {
+                                let place = library.products.push(problem, problem.in_noise(column, None));
+                                known.push((cause.touched_by(index, unit), index % width, *variant, place));
+                                library.prior_sigmas.push(column.sigma);
+                            }
+                        }
+                    }
+                    let places: Vec<usize> = (0..parameters.len()).filter_map(|index| find(index, &known)).collect();
+                    if !places.is_empty() || effect.page().nature == Nature::Discrete {
+                        library.hypotheses.push(Hypothesis {
+                            cause,
+                            parameters,
+                            places,
+                            log_prior,
+                            span: None,
+                        });
+                    }
+                }
+            }
+            progress((done + 1) as f64 / offered.len() as f64);
+        }
+        library
+    }
+
+    /// Takes what is open anew: the problem's motion is another.
+    pub fn reopen(&mut self, problem: &Problem) {
+        for (place, column) in problem.reference_columns().into_iter().enumerate() {
+            self.products.renew(problem, place, column);
+        }
+        let weights: Vec<DVector<f64>> = problem.frames.iter().map(|frame| frame.weights.clone()).collect();
+        self.products.reweigh(problem, &weights);
+    }
+
+    /// Normal equations of some columns, given the scores of all.
+    pub fn screen(&self, places: &[usize], scores: &[f64]) -> Screen {
+        self.products.screen(places, scores, &self.prior_sigmas)
+    }
+
+    /// Whether a hypothesis has no parameters to fit.
+    pub fn is_discrete(&self, hypothesis: usize) -> bool {
+        self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
+    }
+}
+
+/// Whether a place is all there is: a cause behind a whole kind of sensor is as likely as one in any single place.
+fn is_wide(locality: &Locality) -> bool {
+    matches!(locality, Locality::Unit | Locality::Common | Locality::All)
+}
