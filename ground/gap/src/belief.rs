@@ -9,13 +9,13 @@ use crate::{
     cause::Cause,
     crossval::{self, Key},
     events::Events,
-    explain::{Explanation, REMAINDER},
     fit_error::FitError,
     held::strength::{Claimed, Promise},
     input::hold::Held,
     leftover::Leftover,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
+    search::explanation::{Explanation, REMAINDER},
 };
 
 /// Prior probability that a unit has something the library does not, beside what is named.

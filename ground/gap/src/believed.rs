@@ -9,12 +9,14 @@ use crate::{
     contribution,
     crossval::Key,
     events::Events,
-    explain::{Explanation, SAID},
     input::case::Subject,
     leftover::Leftover,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
-    odds::alternatives,
+    search::{
+        explanation::{Explanation, SAID},
+        odds::alternatives,
+    },
 };
 
 /// An explanation with its probabilities.

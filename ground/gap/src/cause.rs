@@ -6,13 +6,15 @@
 use twin::effect::Parameter;
 
 use crate::{
-    attribute::{Attribution, Chosen},
     input::case::Subject,
     library::hypotheses::Library,
     null::problem::Problem,
-    odds::{TEMPERATURE, oversize, probability, probability_of_any},
     regime,
-    scatter::Scatter,
+    search::{
+        odds::{TEMPERATURE, oversize, probability, probability_of_any},
+        readings::{Attribution, Chosen},
+        scatter::Scatter,
+    },
 };
 
 /// Of its largest size, from where an engineer should look twice.

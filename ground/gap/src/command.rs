@@ -13,12 +13,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use twin::predict::UnitDescription;
 
 use crate::{
-    baseline,
     diagnose::{Diagnosis, diagnose},
     input::case::{CaseError, Subject},
     library::hypotheses::Library,
     null::problem::Problem,
-    page, terminal,
+    page,
+    search::baseline,
+    terminal,
     verdict::Verdict,
 };
 

@@ -5,7 +5,10 @@
 //! marginalised), so that the two differ by `m = 1/2 |h_i|^2 (1 - rho^2)` nats at best (Eriksson, Frisk and Krysander 2013);
 //! deciding between them then errs with probability `Q(sqrt(m/2))`: 11 nats, 1 %; 3 nats, 11 %.
 
-use crate::{attribute::Attribution, library::hypotheses::Library, odds::by_effect};
+use crate::{
+    library::hypotheses::Library,
+    search::{odds::by_effect, readings::Attribution},
+};
 
 /// [nats] below which two effects are not told apart: 6 % errors.
 const APART: f64 = 5.0;
@@ -68,7 +71,7 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
 
 /// The pair most worth telling apart: the likeliest rival of the strongest cause.
 pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
-    let other = |chosen: &crate::attribute::Chosen| {
+    let other = |chosen: &crate::search::readings::Chosen| {
         let own = library.hypotheses[chosen.hypothesis].effect();
         chosen
             .rivals
@@ -91,7 +94,7 @@ pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
     })
 }
 
-fn nats_apart(library: &Library, chosen: &crate::attribute::Chosen, rival: usize) -> Option<f64> {
+fn nats_apart(library: &Library, chosen: &crate::search::readings::Chosen, rival: usize) -> Option<f64> {
     let own = &library.hypotheses[chosen.hypothesis].places;
     let others = &library.hypotheses[rival].places;
     if own.is_empty() || others.is_empty() {

@@ -4,11 +4,13 @@
 //! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
 
 use crate::{
-    attribute::{Attribution, Chosen},
     cause::Cause,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
-    refine::{model_of, refine},
+    search::{
+        gauss_newton::{model_of, refine},
+        readings::{Attribution, Chosen},
+    },
     shapley,
 };
 

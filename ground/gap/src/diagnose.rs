@@ -5,7 +5,6 @@
 //! gap, they say whether it is there too.
 
 use crate::{
-    attribute::attribute,
     belief::{Promised, UNKNOWN_ALONE},
     believed::Believed,
     cause::{Cause, share_out},
@@ -13,7 +12,6 @@ use crate::{
     correction::Correction,
     crossval::Key,
     events::Events,
-    explain::{Explanation, SAID},
     floor::floor,
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
@@ -25,8 +23,12 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
-    odds::alone,
     place::{self, Place, passage::Passage},
+    search::{
+        explanation::{Explanation, SAID},
+        odds::alone,
+        readings::attribute,
+    },
     sight,
     trace::{Trace, cells, traces},
 };

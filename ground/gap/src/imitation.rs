@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 
-use crate::{attribute::Attribution, library::hypotheses::Library};
+use crate::{library::hypotheses::Library, search::readings::Attribution};
 
 /// Effects compared: more do not stand beside each other on a page.
 const MOST: usize = 10;

@@ -12,10 +12,7 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
-pub mod again;
 pub mod attitude;
-pub mod attribute;
-pub mod baseline;
 pub mod belief;
 pub mod believed;
 pub mod cause;
@@ -26,7 +23,6 @@ pub mod correction;
 pub mod crossval;
 pub mod diagnose;
 pub mod events;
-pub mod explain;
 pub mod fit_error;
 pub mod floor;
 pub mod held;
@@ -37,20 +33,14 @@ pub mod library;
 pub mod next;
 pub mod null;
 pub mod octaves;
-pub mod odds;
-pub mod onset;
 pub mod page;
-pub mod piece;
 pub mod place;
-pub mod refine;
 pub mod regime;
-pub mod scatter;
+pub mod search;
 pub mod shapley;
 pub mod sight;
 pub mod terminal;
 pub mod trace;
-pub mod uncovered;
 pub mod verdict;
-pub mod wander;
 
 pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

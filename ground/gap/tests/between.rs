@@ -3,12 +3,11 @@
 mod gyros;
 
 use gap::{
-    again::again,
-    attribute::attribute,
     fit_error::FitError,
     input::case::Subject,
     library::hypotheses::Library,
     null::{interval::On, model::Model, problem::Problem},
+    search::{periodic::again, readings::attribute},
     terminal,
 };
 use gyros::{diagnosed_in, erring, erring_in, rate};

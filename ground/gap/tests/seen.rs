@@ -9,7 +9,7 @@ use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
     null::{model::Model, problem::Problem},
-    scatter::scatters,
+    search::scatter::scatters,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::{belief::UNKNOWN_ALONE, diagnose::Diagnosis, explain::SAID, input::case::Subject};
+use crate::{belief::UNKNOWN_ALONE, diagnose::Diagnosis, input::case::Subject, search::explanation::SAID};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;

@@ -2,17 +2,17 @@
 //!
 //! In: the problem, a model and what it leaves. Out: the effects that gain anything, best first. All are tried about the
 //! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
-//! and maximisation ([`crate::uncovered`]), also in channels where only the wrong one hid them.
+//! and maximisation ([`crate::search::recalibrated`]), also in channels where only the wrong one hid them.
 
 use twin::effect::{Beneath, Effect, LIBRARY, Nature, View, logged_step, most_likely};
 
 use super::{
     Scatter, blocks,
-    odd::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
+    screen::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
 };
 use crate::{
     null::{model::Model, problem::Problem},
-    uncovered::{as_described, recalibrated},
+    search::recalibrated::{as_described, recalibrated},
 };
 
 /// Effects that stand for white noise, for its outliers, or for errors of each sample's own.

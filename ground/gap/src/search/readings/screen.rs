@@ -8,7 +8,7 @@ use super::variant::is_any_same;
 use crate::{
     library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
-    refine::Refined,
+    search::gauss_newton::Refined,
 };
 
 /// Candidates of a screen that are fitted exactly.

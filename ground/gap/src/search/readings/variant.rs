@@ -9,7 +9,7 @@ use super::columns::renew;
 use crate::{
     library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
-    refine::{Refined, refine},
+    search::gauss_newton::{Refined, refine},
 };
 
 /// Times the distance between values tried is halved: an onset in a log of ten minutes to a cycle, a limit to a part in

@@ -11,16 +11,18 @@ use nalgebra::DVector;
 use twin::part::signal::Noise;
 
 use crate::{
-    attribute::{Attribution, Chosen, attribute},
     library::hypotheses::Library,
     null::{
         misfit,
         model::Model,
         problem::{Frame, Problem},
     },
-    odds::probability_of_any,
-    scatter::{Scatter, scatters},
-    wander::{self, Walk},
+    search::{
+        bias_walk::{self, Walk},
+        odds::probability_of_any,
+        readings::{Attribution, Chosen, attribute},
+        scatter::{Scatter, scatters},
+    },
 };
 
 /// [nats] an effect on the scatter must gain.
@@ -87,7 +89,7 @@ impl Explanation {
         let is_alone = alone.is_some();
         let mut wanders = alone
             .as_ref()
-            .is_some_and(|alone| alone.effect.page().name == wander::NAME);
+            .is_some_and(|alone| alone.effect.page().name == bias_walk::NAME);
         if is_alone {
             found.chosen.clear();
             scatter = alone;
@@ -182,7 +184,7 @@ impl Explanation {
         };
         match &self.scatter {
             // Louder noise takes in whatever is there, and a walk whatever is slow: that it does is no sign of its law.
-            Some(scatter) if [LOUDER, wander::NAME].contains(&scatter.effect.page().name) => by_readings(scatter),
+            Some(scatter) if [LOUDER, bias_walk::NAME].contains(&scatter.effect.page().name) => by_readings(scatter),
             Some(scatter) => by_readings(scatter) + 2.0 * scatter.gain,
             None => self.energy_without(quiet, &[]),
         }
@@ -271,8 +273,14 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 /// everything.
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-    let is_walk = scatter.effect.page().name == wander::NAME;
-    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= wander::FEWEST)
+    let is_walk = scatter.effect.page().name == bias_walk::NAME;
+    !scatter.beneath.is_empty()
+        || is_walk
+            && scatter
+                .channels
+                .iter()
+                .map(steps)
+                .all(|steps| steps >= bias_walk::FEWEST)
 }
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.

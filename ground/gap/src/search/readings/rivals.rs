@@ -4,14 +4,14 @@
 
 use super::{
     chosen::{Chosen, Rival},
-    passing::{fitted, stretches},
+    intervals::{fitted, stretches},
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::{is_any_same, without_its_physics},
 };
 use crate::{
     library::hypotheses::Library,
     null::problem::Problem,
-    refine::{Refined, refine},
+    search::gauss_newton::{Refined, refine},
 };
 
 /// [nats] behind the chosen effect from which a rival is not worth an exact fit.

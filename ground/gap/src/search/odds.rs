@@ -7,9 +7,9 @@ use nalgebra::DVector;
 use twin::effect::{Page, Parameter};
 
 use crate::{
-    attribute::{Attribution, Chosen, Rival},
     library::hypotheses::Library,
     null::evidence::probabilities,
+    search::readings::{Attribution, Chosen, Rival},
 };
 
 /// Evidence is raised to one over this: see [`crate::null::evidence`]. A guess, not yet fitted:

@@ -1,7 +1,7 @@
 //! Effects that come and go: the stretch of time in which one is on.
 //!
 //! In: a set of hypotheses, refined. Out: for each hypothesis whose cause [passes](twin::effect::Page::passes) the stretch in
-//! which it would explain most ([`onset`]), and sets refined with a member that is on in a stretch only.
+//! which it would explain most ([`once`]), and sets refined with a member that is on in a stretch only.
 
 use nalgebra::DVector;
 
@@ -10,14 +10,16 @@ use super::{
     variant::sharpened,
 };
 use crate::{
-    again::again,
     library::{
         hypotheses::{Hypothesis, Library},
         products::Entries,
     },
     null::{interval::On, problem::Problem},
-    onset,
-    refine::{Refined, model_of, refine},
+    search::{
+        gauss_newton::{Refined, model_of, refine},
+        once,
+        periodic::again,
+    },
 };
 
 /// Part of what a set explains that an effect must bring to be seen coming and going beside it: what another effect's law
@@ -51,7 +53,7 @@ pub(super) fn stretches(
             .collect();
         let found = match repeats {
             true => again(problem, &rest, &slopes, &sigmas),
-            false => onset::stretch(problem, &rest, &slopes, &sigmas).map(|(span, more)| (span.into(), more)),
+            false => once::stretch(problem, &rest, &slopes, &sigmas).map(|(span, more)| (span.into(), more)),
         };
         let found = found.filter(|(_, more)| *gain + more > least);
         *gain = match found {
@@ -134,7 +136,7 @@ pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], b
     let rest = problem.residuals(&model);
     let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
     let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
-    let Some((span, _)) = onset::stretch(problem, &rest, slopes, &sigmas) else {
+    let Some((span, _)) = once::stretch(problem, &rest, slopes, &sigmas) else {
         return best;
     };
     let refined = passing(problem, library, set, &best.thetas, span.into());

@@ -12,7 +12,7 @@ use crate::{
     input::windows::Span,
     library::products::Entries,
     null::problem::Problem,
-    piece::{Piece, Touched},
+    search::interval_sums::{Piece, Touched},
 };
 
 /// Instants at which an effect may begin or end.

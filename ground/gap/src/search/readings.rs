@@ -12,8 +12,8 @@
 
 mod chosen;
 mod columns;
-mod passing;
-mod rival;
+mod intervals;
+mod rivals;
 mod screen;
 mod variant;
 
@@ -22,15 +22,15 @@ use nalgebra::{DMatrix, DVector};
 pub use self::chosen::{Chosen, Rival};
 use self::{
     columns::always,
-    passing::{bounded, fitted, stretches, taken},
-    rival::compare,
+    intervals::{bounded, fitted, stretches, taken},
+    rivals::compare,
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::is_any_same,
 };
 use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
-    refine::{Refined, model_of, refine},
+    search::gauss_newton::{Refined, model_of, refine},
 };
 
 /// [nats] an effect must bring beyond its prior odds: three make a wrong addition one in twenty.

@@ -13,7 +13,7 @@ const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corrupti
 /// Stands in a spectrum where neither energy nor neighbours say anything of it.
 const LINE: &str = "vibration";
 
-/// Whether a residual that scatters as described as far as [`super::odd`] sees may hold it.
+/// Whether a residual that scatters as described as far as [`super::screen`] sees may hold it.
 pub fn is_hidden(effect: &dyn Effect) -> bool {
     effect.page().name == LINE
 }

@@ -7,14 +7,14 @@
 //! A part that converts by its own clock scatters with the slope of what it measures in any case
 //! ([`crate::null::calibration::instant_sigma_s`]); an effect counts only by what it says beyond that.
 //!
-//! Each is judged with the calibration that goes with it ([`crate::uncovered`]).
+//! Each is judged with the calibration that goes with it ([`crate::search::recalibrated`]).
 //!
 //! A channel is counted in when its likelihood gains more than one parameter fitted to so many samples costs
 //! (`1/2 ln n`, Schwarz 1978) and one nat for having been looked at.
 
 mod blocks;
-mod odd;
-mod search;
+mod likelihood;
+mod screen;
 
 use nalgebra::DVector;
 use twin::{
@@ -22,13 +22,13 @@ use twin::{
     part::signal::Noise,
 };
 
-pub use self::search::scatters;
+pub use self::likelihood::scatters;
 use crate::{
     null::{
         model::Model,
         problem::{Frame, Problem},
     },
-    uncovered::{of_samples, recalibrated},
+    search::recalibrated::{of_samples, recalibrated},
 };
 
 /// An effect on the scatter, where it is and how large.

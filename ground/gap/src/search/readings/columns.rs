@@ -4,7 +4,7 @@
 
 use nalgebra::DVector;
 
-use crate::{library::hypotheses::Library, null::problem::Problem, refine::model_of};
+use crate::{library::hypotheses::Library, null::problem::Problem, search::gauss_newton::model_of};
 
 /// Takes the stretch of time from a hypothesis again.
 pub(super) fn always(problem: &Problem, library: &mut Library, hypothesis: usize) {

@@ -22,7 +22,7 @@ use crate::{
         normal::log_determinant,
         problem::{Component, Frame, Problem},
     },
-    scatter::Scatter,
+    search::scatter::Scatter,
 };
 
 /// The effect's name.
