@@ -12,10 +12,10 @@ use crate::{
     fit_error::FitError,
     held::strength::{Claimed, Promise},
     input::hold::Held,
-    leftover::Leftover,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     search::explanation::{Explanation, REMAINDER},
+    unknown::adequacy::Leftover,
 };
 
 /// Prior probability that a unit has something the library does not, beside what is named.

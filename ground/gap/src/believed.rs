@@ -10,13 +10,13 @@ use crate::{
     crossval::Key,
     events::Events,
     input::case::Subject,
-    leftover::Leftover,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     search::{
         explanation::{Explanation, SAID},
         odds::alternatives,
     },
+    unknown::adequacy::Leftover,
 };
 
 /// An explanation with its probabilities.

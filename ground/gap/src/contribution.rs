@@ -1,6 +1,6 @@
 //! What each of several effects contributes, where they overlap: shares of the excess that add up.
 //!
-//! In: the chosen effects. Out: an energy for each, the Shapley value ([`crate::shapley`]) of what every set of them takes
+//! In: the chosen effects. Out: an energy for each, the Shapley value ([`crate::unknown::shapley`]) of what every set of them takes
 //! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
 
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
         gauss_newton::{model_of, refine},
         readings::{Attribution, Chosen},
     },
-    shapley,
+    unknown::shapley,
 };
 
 /// Effects for which every set is fitted: 32 fits.

@@ -16,21 +16,23 @@ use crate::{
     held::{Finished, Shrink, ceiling_percent, stages::Stage},
     imitation::{Imitation, imitation},
     input::case::Subject,
-    leftover::{self, Leftover},
     library::hypotheses::Library,
     next::advice,
     null::{
         model::Model,
         problem::{Component, Problem},
     },
-    place::{self, Place, passage::Passage},
     search::{
         explanation::{Explanation, SAID},
         odds::alone,
         readings::attribute,
     },
-    sight,
-    trace::{Trace, cells, traces},
+    unknown::{
+        adequacy::{self, Leftover},
+        place::{self, Place, passage::Passage},
+        traces::{Trace, cells, traces},
+        views,
+    },
 };
 
 /// Probability of as large a leftover by chance from which on nothing speaks for one, wherever else it is.
@@ -102,8 +104,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let search = |share| progress("search", share);
     let mut found = attribute(&problem, &mut library, &search);
     let quiet = Model::around(&problem, Vec::new());
-    let views = sight::views(&problem, &quiet.predicted);
-    let gate = leftover::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
+    let views = views::views(&problem, &quiet.predicted);
+    let gate = adequacy::judge(&views, &quiet.joint, &quiet.fitted, &[], None);
     progress("where", 0.0);
     let mut place = place::locate(&problem, &views, &quiet);
 
@@ -261,12 +263,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
 fn left_by(problem: &Problem, explanation: &Explanation) -> Leftover {
     let model = &explanation.model;
     let disturb = explanation.disturb(problem);
-    leftover::judge(
-        &sight::views(problem, &explanation.beneath),
+    adequacy::judge(
+        &views::views(problem, &explanation.beneath),
         &model.joint,
         &model.fitted,
-        &sight::suspects(problem, model),
-        (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| leftover::Disturb {
+        &views::suspects(problem, model),
+        (disturb.as_ref().zip(explanation.scatter.as_ref())).map(|(of, scatter)| adequacy::Disturb {
             channels: &scatter.channels,
             of,
         }),

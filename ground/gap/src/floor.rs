@@ -8,7 +8,7 @@
 
 use crate::{
     null::{calibration::conversion_period_s, model::Model, problem::Problem},
-    sight,
+    unknown::views,
 };
 
 /// The mean squares.
@@ -18,7 +18,7 @@ pub fn floor(problem: &Problem, model: &Model) -> Vec<Vec<f64>> {
         let period_s = conversion_period_s(own);
         // As described, whatever the samples were weighed by.
         let noise = problem.frames[channel].own.map(|part| own.sigma() / part);
-        let part = sight::clock(problem, channel, &model.predicted[channel], &noise)
+        let part = views::clock(problem, channel, &model.predicted[channel], &noise)
             .map_or(0.0, |(clock, left)| clock.part_shown(left.into_iter()).min(1.0));
         let slopes = problem.true_twin().by_instant(channel);
         let open = problem.still_open(channel);

@@ -8,12 +8,11 @@ use twin::predict::Twin;
 
 use crate::{
     input::{hold::Held, reference::Reference, windows::Fit},
-    leftover,
     null::{
         model::Model,
         problem::{Component, Problem},
     },
-    sight,
+    unknown::{adequacy, views},
 };
 
 impl Held {
@@ -31,11 +30,11 @@ impl Held {
             problem.retell(&component.active.cause);
         }
         let model = Model::around(&problem, components.to_vec());
-        leftover::recurrence(
-            &sight::views(&problem, &model.predicted),
+        adequacy::recurrence(
+            &views::views(&problem, &model.predicted),
             &model.joint,
             &model.fitted,
-            &sight::suspects(&problem, &model),
+            &views::suspects(&problem, &model),
             what,
         )
     }

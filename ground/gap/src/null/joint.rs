@@ -2,7 +2,7 @@
 //!
 //! In: per channel the columns `[N | E]` in units of its noise, `N` already times its prior sigmas. Out, for any residual:
 //! the effects' parameters, each channel's calibration over its sigmas, and what is left. The factorisations are made
-//! once, because [`crate::leftover`] repeats the fit on hundreds of simulated logs.
+//! once, because [`crate::unknown::adequacy`] repeats the fit on hundreds of simulated logs.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

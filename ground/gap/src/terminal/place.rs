@@ -6,7 +6,7 @@ use super::wrap::wrapped;
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
-    place::{
+    unknown::place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,
     },

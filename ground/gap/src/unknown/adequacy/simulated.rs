@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::Rng};
 
-use super::{codes::Counts, instrument::Played, shared::OF_PART, view::View};
+use super::{calibrations::OF_PART, codes::Counts, instrument::Played, view::View};
 use crate::null::joint::Joint;
 
 /// Degrees of freedom of the noise's Student law: an excess kurtosis of one.

@@ -3,8 +3,8 @@
 //! In: the [`Problem`] and a finished [`Model`]. Out: what the page draws.
 
 use crate::{
-    leftover::{STRETCHES, View},
     null::{model::Model, problem::Problem},
+    unknown::adequacy::{STRETCHES, View},
 };
 
 /// Channels whose residuals are shown.

@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
-    leftover::{Clock, Codes, Instrument, LEVELS, Open, Suspect, View},
     null::{
         calibration::conversion_period_s,
         model::Model,
         problem::{Frame, Problem},
     },
+    unknown::adequacy::{Clock, Codes, Instrument, LEVELS, Open, Suspect, View},
 };
 
 /// Quantities of the motion: rate, force and field in b, temperature.

@@ -1,6 +1,6 @@
 //! What is open of each channel, and found along one line in several.
 
-use super::{super::shared::Shared, *};
+use super::{super::calibrations::Shared, *};
 
 /// Judged with the only open column of each channel off by so many sigmas.
 fn off(views: &[View], joint: &Joint, sigmas: [f64; CHANNELS]) -> Leftover {

@@ -10,26 +10,26 @@
 //! axes. Of all channels together: the energy of a stretch of time, and noise that comes and goes in all of a kind; the same
 //! vector in all sensors of a kind, along any axes or one, and in single samples; the same factor, as of a supply they share;
 //! the same small rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows;
-//! what is open of each channel and was found along one line in several ([`super::shared`]). Of a named effect: whether it is
-//! as strong everywhere as its law says ([`super::strength`]), and if it is one on the scatter, whether waves of each length
+//! what is open of each channel and was found along one line in several ([`super::calibrations`]). Of a named effect: whether it is
+//! as strong everywhere as its law says ([`super::uniformity`]), and if it is one on the scatter, whether waves of each length
 //! have the energy that it claims, and outliers the size and the distance from the sample before, no more and no less: a law of
 //! outliers "anywhere in the range" would else stand for any, values that are sent again among them; and whether channels that
-//! scatter each by itself go one way ([`super::together`]).
+//! scatter each by itself go one way ([`super::courses`]).
 
 use nalgebra::{DMatrix, Vector1};
 
 use super::{
+    calibrations::Shared,
     common::Common,
     label::{Label, OF_CALIBRATION, name_of},
     shapes::{BINS, Shapes},
-    shared::Shared,
     spectrum::{Spectrum, strongest},
-    strength::{Strength, Suspect},
     sums::{Bursts, alike, between_levels, mean_logarithm, outliers, squares, tails},
     together,
+    uniformity::{Strength, Suspect},
     view::{LEVELLED, STRETCHES, View, place},
 };
-use crate::{null::joint::Fitted, octaves};
+use crate::{null::joint::Fitted, unknown::octaves};
 
 /// [units of noise] within which a sample is where the one before was: what is sent again is as near as a calibration is right,
 /// and how near that is says nothing.
@@ -296,7 +296,7 @@ impl<'a> Sights<'a> {
                 .iter()
                 .filter(|channel| self.views[**channel].kind == kind);
             let courses = own.map(|channel| (self.views[*channel].phase.as_slice(), fitted.rest[*channel].as_slice()));
-            sums.push(together::alike(courses));
+            sums.push(courses::alike(courses));
         }
         sums.extend([sizes, distances].map(|values| mean_logarithm(values.into_iter())));
         sums

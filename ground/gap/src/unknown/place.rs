@@ -2,7 +2,7 @@
 //!
 //! In: the fit windows' residual with the calibration refitted and no effect in ([`Model`]), and what the unit does at each
 //! row. Out: a [`Place`]: shares of the excess (energy above noise and calibration) by channel, plate and octave, each
-//! adding up to one; by regime as LMG shares of the energy from row to row ([`crate::shapley`]); the cells that stand out
+//! adding up to one; by regime as LMG shares of the energy from row to row ([`crate::unknown::shapley`]); the cells that stand out
 //! ([`cells`]); and when the gap is there ([`passage`]). What an effect strains the calibration by counts as its channel's.
 //!
 //! What noise and calibration leave is simulated on the case's own motion and holes, so a share is of what is above that.
@@ -16,9 +16,11 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use self::{cells::Cell, passage::Passage};
 use crate::{
-    leftover::{View, simulate},
     null::{joint::Fitted, model::Model, problem::Problem},
-    octaves::{self, Octave},
+    unknown::{
+        adequacy::{View, simulate},
+        octaves::{self, Octave},
+    },
 };
 
 /// Logs simulated: their mean is known to a tenth of the spread, and their spread to a fourteenth.

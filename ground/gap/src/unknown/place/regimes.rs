@@ -7,7 +7,7 @@
 
 use twin::predict::Feel;
 
-use crate::shapley;
+use crate::unknown::shapley;
 
 /// Bins of a quantity: enough for a threshold, few enough to be filled.
 const BINS: usize = 5;

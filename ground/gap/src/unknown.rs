@@ -1,0 +1,12 @@
+//! Step 5, what is left: is it more than noise and calibration leave, and where is it?
+//!
+//! In: a finished model. Out: [`adequacy::Leftover`], a probability of as much by chance with the aspects that say otherwise,
+//! by logs simulated from the model; [`place::Place`], the shares of the gap by channel, group, octave, regime and time; and
+//! [`traces`] of the channels that stand out. [`views`] says what each channel is looked at with.
+
+pub mod adequacy;
+pub mod octaves;
+pub mod place;
+pub mod shapley;
+pub mod traces;
+pub mod views;
