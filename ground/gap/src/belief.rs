@@ -7,10 +7,12 @@
 
 use crate::{
     cause::Cause,
-    crossval::{self, Key},
-    events::Events,
-    fit_error::FitError,
-    held::strength::{Claimed, Promise},
+    holdout::{
+        cross_validation::{self, Key},
+        events::Events,
+        fit_error::FitError,
+        strength::{Claimed, Promise},
+    },
     input::hold::Held,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
@@ -88,7 +90,7 @@ pub fn second_keys(
         // They were withdrawn.
         return Vec::new();
     }
-    let keys = crossval::keys(problem, library, model).into_iter();
+    let keys = cross_validation::keys(problem, library, model).into_iter();
     let said = keys.zip(causes).filter_map(|(key, cause)| {
         let key = key?;
         cause.probability = cause.probability.min(key.confidence());

@@ -17,7 +17,7 @@ use twin::{
     predict::{Chain, Channel, Kind, Twin},
 };
 
-use crate::{attitude::Response, null::problem::Component};
+use crate::{holdout::attitude::Response, null::problem::Component};
 
 /// How an effect enters a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,7 +12,6 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
-pub mod attitude;
 pub mod belief;
 pub mod believed;
 pub mod cause;
@@ -20,12 +19,8 @@ pub mod command;
 pub mod confusion;
 pub mod contribution;
 pub mod correction;
-pub mod crossval;
 pub mod diagnose;
-pub mod events;
-pub mod fit_error;
-pub mod floor;
-pub mod held;
+pub mod holdout;
 pub mod imitation;
 pub mod input;
 pub mod library;

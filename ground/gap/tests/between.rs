@@ -3,7 +3,7 @@
 mod gyros;
 
 use gap::{
-    fit_error::FitError,
+    holdout::fit_error::FitError,
     input::case::Subject,
     library::hypotheses::Library,
     null::{interval::On, model::Model, problem::Problem},

@@ -1,6 +1,6 @@
 //! The samples of the hold windows, locked away.
 //!
-//! In: what [`crate::input::windows`] parts off. Out: how many there are, and to [`crate::held`], which judges finished models, what
+//! In: what [`crate::input::windows`] parts off. Out: how many there are, and to [`crate::holdout::judge`], which judges finished models, what
 //! they are. No fit reaches them: `tests/rooms.rs` finds whoever else opens them.
 
 use core::fmt;
@@ -33,7 +33,7 @@ impl Held {
         self.channels.iter().map(|series| series.rows.len()).collect()
     }
 
-    /// The samples. Only [`crate::held`] may ask for them.
+    /// The samples. Only [`crate::holdout::judge`] may ask for them.
     pub(crate) fn samples(&self) -> &[Series] {
         &self.channels
     }

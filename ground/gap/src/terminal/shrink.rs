@@ -2,7 +2,7 @@
 
 use std::fmt::{Result, Write};
 
-use crate::{diagnose::Diagnosis, held::stages::Stage, input::case::Subject};
+use crate::{diagnose::Diagnosis, holdout::stages::Stage, input::case::Subject};
 
 /// How far it shrinks: in total, by stage and by channel.
 pub fn shrink(subject: &Subject, diagnosis: &Diagnosis) -> String {

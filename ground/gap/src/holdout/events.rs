@@ -2,7 +2,7 @@
 //!
 //! In: the problem and a model that is fitted. Out: [`Events`], of an effect whose occurrences are random ([`Effect::happened`]):
 //! when they are on the fit windows is fitted, but how often they are and how large is all of it that other windows share.
-//! Nothing held out is asked; [`crate::held`] counts there what happened since.
+//! Nothing held out is asked; [`crate::holdout::judge`] counts there what happened since.
 //!
 //! `n` events in `N` cycles are taken for a rate of `(n + 1/2) / N` a cycle (the mean of Jeffreys' posterior of a Poisson rate).
 

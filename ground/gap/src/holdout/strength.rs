@@ -7,8 +7,12 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
-use super::course::Said;
-use crate::{events::Events, fit_error::FitError, input::hold::Held, unknown::adequacy::odds};
+use super::recurrences::Said;
+use crate::{
+    holdout::{events::Events, fit_error::FitError},
+    input::hold::Held,
+    unknown::adequacy::odds,
+};
 
 /// What is said of a finished effect.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@
 //! No instant is fitted. A row's score is `-2 ln p(y_t | y_<t)`, averaged over whether an event happened (prequential, Dawid
 //! 1984): one that is claimed costs what its rarity costs, and a rate that is there for nothing costs too.
 
-use crate::{events::Events, input::hold::Held};
+use crate::{holdout::events::Events, input::hold::Held};
 
 /// What a finished model says of every row, and how far samples may be from it.
 #[derive(Clone, Copy)]
@@ -133,7 +133,7 @@ impl Held {
 mod tests {
     use super::*;
     use crate::{
-        held::{Finished, Shrink},
+        holdout::{judge::Finished, shrink::Shrink},
         input::log::Series,
     };
 

@@ -1,4 +1,4 @@
-//! How far a held-out gap shrinks, and what that says of an effect: what [`super::Held::judge`] gives.
+//! How far a held-out gap shrinks, and what that says of an effect: what [`crate::input::hold::Held::judge`] gives.
 
 /// Part of the gap by which recalibration and an effect may differ and shrink it as much.
 const SAME: f64 = 0.01;

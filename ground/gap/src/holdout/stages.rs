@@ -16,9 +16,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use twin::predict::Twin;
 
-use super::{BLOCK_S, Finished, RESAMPLES, SEED, central_95};
+use super::judge::{BLOCK_S, Finished, RESAMPLES, SEED, central_95};
 use crate::{
-    attitude::{Estimation, Response, Track},
+    holdout::attitude::{Estimation, Response, Track},
     input::hold::Held,
 };
 

@@ -2,39 +2,33 @@
 //!
 //! In: finished predictions of every row, made without these samples. Out: [`Shrink`], the gap before, after
 //! recalibration alone, and after effect and recalibration, in total and per channel, in sigma and in physical units,
-//! with an interval. Only this room opens [`Held`].
+//! with an interval.
 //!
-//! The gap is the root mean square of the residual over the twin's own sigma; the shrink is
-//! `100 (before - after) / (before - floor)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of
-//! [`BLOCK_S`], because residuals of a wrong twin are not independent from row to row. The floor of the gap is what a
-//! perfect twin would leave ([`crate::floor`]), little more than 1; its ceiling, what the true effect would shrink with its
-//! parameters fitted on as much data, is [`ceiling_percent`].
+//! The gap is the root mean square of the residual over the twin's own sigma; the shrink is `100 (before - after) / (before
+//! - floor)`. Its interval is the moving-block bootstrap's (Kuensch 1989) over stretches of [`BLOCK_S`], because residuals
+//! of a wrong twin are not independent from row to row. The floor of the gap is what a perfect twin would leave
+//! ([`crate::holdout::floor`]), little more than 1; its ceiling, what the true effect would shrink with its parameters
+//! fitted on as much data, is [`super::shrink::ceiling_percent`].
 //!
-//! Further down the pipeline, calibrated vectors and attitude are judged in [`stages`], and each effect's own strength in
-//! [`strength`]; in [`recurrence`], whether what is left is there too. What happens at random happens here at instants
-//! of its own ([`course`]).
-
-mod course;
-mod recurrence;
-mod shrink;
-pub mod stages;
-pub mod strength;
+//! What happens at random happens here at instants of its own ([`super::recurrences`]).
 
 use rand_distr::Distribution;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-pub use self::shrink::{ChannelShrink, Shrink, ceiling_percent};
-use self::{course::Said, shrink::SMALLEST};
-use crate::{events::Events, input::hold::Held};
+use super::{
+    recurrences::Said,
+    shrink::{ChannelShrink, SMALLEST, Shrink},
+};
+use crate::{holdout::events::Events, input::hold::Held};
 
 /// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
 
 /// Bootstrap samples: the 2.5 % quantile then stands on 25 of them.
-const RESAMPLES: usize = 1000;
+pub(super) const RESAMPLES: usize = 1000;
 
 /// Fixed, so that one case gives one verdict.
-const SEED: u64 = 0x5eed_0004;
+pub(super) const SEED: u64 = 0x5eed_0004;
 
 /// Predictions of every row of the log, channel by channel in physical units, made without the held-out samples.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +54,7 @@ pub struct Finished<'a> {
 }
 
 impl<'a> Finished<'a> {
-    fn said(&self) -> Said<'a> {
+    pub(super) fn said(&self) -> Said<'a> {
         Said {
             after: self.after,
             sigmas: self.sigmas,
@@ -183,7 +177,7 @@ fn bootstrap(blocks: &[Sums]) -> ([f64; 2], [f64; 2]) {
     (central_95(percents), central_95(beyond))
 }
 
-fn central_95(mut values: Vec<f64>) -> [f64; 2] {
+pub(super) fn central_95(mut values: Vec<f64>) -> [f64; 2] {
     if values.is_empty() {
         return [0.0; 2];
     }
@@ -194,7 +188,7 @@ fn central_95(mut values: Vec<f64>) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::shrink::ceiling_percent, *};
     use crate::input::log::Series;
 
     const ROWS: usize = 3000;
