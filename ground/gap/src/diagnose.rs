@@ -5,9 +5,6 @@
 //! gap, they say whether it is there too.
 
 use crate::{
-    belief::{Promised, UNKNOWN_ALONE},
-    believed::Believed,
-    cause::{Cause, share_out},
     confusion,
     correction::Correction,
     holdout::{
@@ -25,6 +22,11 @@ use crate::{
     null::{
         model::Model,
         problem::{Component, Problem},
+    },
+    probability::{
+        cause::{Cause, share_out},
+        doubt::{Promised, UNKNOWN_ALONE},
+        posterior::Believed,
     },
     search::{
         explanation::{Explanation, SAID},

@@ -12,12 +12,8 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
-pub mod belief;
-pub mod believed;
-pub mod cause;
 pub mod command;
 pub mod confusion;
-pub mod contribution;
 pub mod correction;
 pub mod diagnose;
 pub mod holdout;
@@ -27,7 +23,7 @@ pub mod library;
 pub mod next;
 pub mod null;
 pub mod page;
-pub mod regime;
+pub mod probability;
 pub mod search;
 pub mod terminal;
 pub mod unknown;

@@ -153,7 +153,7 @@ fn gross_causes(subject: &Subject) -> impl Iterator<Item = Cause> {
     commands.into_iter()
 }
 
-fn of_cause(subject: &Subject, cause: &crate::cause::Cause) -> Cause {
+fn of_cause(subject: &Subject, cause: &crate::probability::cause::Cause) -> Cause {
     let parameters = cause.parameters.iter().map(|sized| {
         let parameter = Parameter {
             value: sized.value,

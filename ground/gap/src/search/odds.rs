@@ -1,7 +1,7 @@
 //! How likely a chosen effect is among all that could stand in its place, by evidence alone.
 //!
 //! In: an [`Attribution`]. Out: probabilities of effects, and of "one of those that cannot be told apart". What the held-out
-//! windows and what is left over say comes later, in [`crate::belief`].
+//! windows and what is left over say comes later, in [`crate::probability::doubt`].
 
 use nalgebra::DVector;
 use twin::effect::{Page, Parameter};

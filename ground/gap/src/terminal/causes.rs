@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::{belief::UNKNOWN_ALONE, diagnose::Diagnosis, input::case::Subject, search::explanation::SAID};
+use crate::{diagnose::Diagnosis, input::case::Subject, probability::doubt::UNKNOWN_ALONE, search::explanation::SAID};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;

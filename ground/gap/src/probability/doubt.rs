@@ -6,7 +6,6 @@
 //! another strength on the held-out windows than on the fitted ones.
 
 use crate::{
-    cause::Cause,
     holdout::{
         cross_validation::{self, Key},
         events::Events,
@@ -16,6 +15,7 @@ use crate::{
     input::hold::Held,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
+    probability::cause::Cause,
     search::explanation::{Explanation, REMAINDER},
     unknown::adequacy::Leftover,
 };

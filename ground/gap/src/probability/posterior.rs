@@ -1,16 +1,18 @@
 //! What is believed of an explanation: which of its effects are said to be causes, and what else may be there.
 //!
 //! In: an [`Explanation`] and what it leaves. Out: [`Believed`]: every effect weighed by evidence, cross-validation, the held-out
-//! windows and what is left over, in this order ([`crate::belief`]).
+//! windows and what is left over, in this order ([`crate::probability::doubt`]).
 
 use crate::{
-    belief::{Belief, Promised, promises, second_keys},
-    cause::{Cause, cause_of_scatter, causes_of},
-    contribution,
     holdout::{cross_validation::Key, events::Events},
     input::case::Subject,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
+    probability::{
+        cause::{Cause, cause_of_scatter, causes_of},
+        contribution,
+        doubt::{Belief, Promised, promises, second_keys},
+    },
     search::{
         explanation::{Explanation, SAID},
         odds::alternatives,

@@ -4,9 +4,9 @@
 //! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
 
 use crate::{
-    cause::Cause,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
+    probability::cause::Cause,
     search::{
         gauss_newton::{model_of, refine},
         readings::{Attribution, Chosen},

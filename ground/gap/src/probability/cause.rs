@@ -9,7 +9,7 @@ use crate::{
     input::case::Subject,
     library::hypotheses::Library,
     null::problem::Problem,
-    regime,
+    probability::regime,
     search::{
         odds::{TEMPERATURE, oversize, probability, probability_of_any},
         readings::{Attribution, Chosen},
