@@ -6,7 +6,7 @@
 
 use crate::{
     confusion,
-    correction::Correction,
+    correct::correction::Correction,
     holdout::{
         cross_validation::Key,
         events::Events,

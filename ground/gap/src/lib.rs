@@ -14,7 +14,7 @@
 
 pub mod command;
 pub mod confusion;
-pub mod correction;
+pub mod correct;
 pub mod diagnose;
 pub mod holdout;
 pub mod imitation;
