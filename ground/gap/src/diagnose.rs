@@ -5,7 +5,11 @@
 //! gap, they say whether it is there too.
 
 use crate::{
-    confusion,
+    advise::{
+        confusion,
+        experiment::advice,
+        imitation::{Imitation, imitation},
+    },
     correct::correction::Correction,
     holdout::{
         cross_validation::Key,
@@ -15,10 +19,8 @@ use crate::{
         shrink::{Shrink, ceiling_percent},
         stages::Stage,
     },
-    imitation::{Imitation, imitation},
     input::case::Subject,
     library::hypotheses::Library,
-    next::advice,
     null::{
         model::Model,
         problem::{Component, Problem},

@@ -12,15 +12,13 @@
 //! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
 //! significant, and none of it is an effect.
 
+pub mod advise;
 pub mod command;
-pub mod confusion;
 pub mod correct;
 pub mod diagnose;
 pub mod holdout;
-pub mod imitation;
 pub mod input;
 pub mod library;
-pub mod next;
 pub mod null;
 pub mod page;
 pub mod probability;

@@ -3,7 +3,7 @@
 //! In: the library and what was chosen. Out: an [`Imitation`]: for the chosen effects and those that gained most alone,
 //! the share of the energy of the row's effect, at its most likely size alone, that the column's effect can put in its
 //! place, calibration marginalised. One is not to be told apart on this motion, whatever the noise
-//! ([`crate::confusion`] has the nats).
+//! ([`crate::advise::confusion`] has the nats).
 
 use nalgebra::DVector;
 

@@ -2,7 +2,7 @@
 //!
 //! In: the cause and its likeliest rival, with the sizes found. Out: of a catalogue of motions the one that separates them
 //! most a minute, and the error of a decision between the two before and after it. The twin flies each motion with the
-//! unit's own channels; two effects differ there by `m` nats ([`crate::confusion`]) and are confused with probability
+//! unit's own channels; two effects differ there by `m` nats ([`crate::advise::confusion`]) and are confused with probability
 //! `Q(sqrt(m/2))`.
 
 use nalgebra::DVector;
@@ -14,7 +14,7 @@ use twin::{
 };
 
 use crate::{
-    confusion::Pair,
+    advise::confusion::Pair,
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
     library::products::Products,
     null::problem::Problem,
