@@ -3,7 +3,7 @@
 //! its siblings.
 use std::{error::Error, fs, path::Path, time::Instant};
 
-use gap::{diagnose::diagnose, input::case::Subject, verdict::Verdict};
+use gap::{diagnose::diagnose, input::case::Subject, report::verdict::Verdict};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let withheld = std::env::var("WITHHOLD").unwrap_or_default();

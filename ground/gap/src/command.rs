@@ -17,10 +17,8 @@ use crate::{
     input::case::{CaseError, Subject},
     library::hypotheses::Library,
     null::problem::Problem,
-    page,
+    report::{page, terminal, verdict::Verdict},
     search::baseline,
-    terminal,
-    verdict::Verdict,
 };
 
 /// Finds what the twin of a unit lacks

@@ -20,11 +20,9 @@ pub mod holdout;
 pub mod input;
 pub mod library;
 pub mod null;
-pub mod page;
 pub mod probability;
+pub mod report;
 pub mod search;
-pub mod terminal;
 pub mod unknown;
-pub mod verdict;
 
 pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

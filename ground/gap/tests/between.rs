@@ -7,8 +7,8 @@ use gap::{
     input::case::Subject,
     library::hypotheses::Library,
     null::{interval::On, model::Model, problem::Problem},
+    report::terminal,
     search::{periodic::again, readings::attribute},
-    terminal,
 };
 use gyros::{diagnosed_in, erring, erring_in, rate};
 

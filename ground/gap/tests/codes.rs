@@ -2,7 +2,7 @@
 
 mod gyros;
 
-use gap::terminal;
+use gap::report::terminal;
 use gyros::{diagnosed_in, erring, rewritten};
 use tempfile::TempDir;
 use twin::effect::kin;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
-    verdict::Verdict,
+    report::verdict::Verdict,
 };
 use serde_json::{Value, json};
 

@@ -4,7 +4,12 @@ mod gyros;
 
 use std::fs;
 
-use gap::{command::taught, diagnose::Diagnosis, input::case::Subject, terminal, verdict::Verdict};
+use gap::{
+    command::taught,
+    diagnose::Diagnosis,
+    input::case::Subject,
+    report::{terminal, verdict::Verdict},
+};
 use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};

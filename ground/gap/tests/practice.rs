@@ -63,6 +63,6 @@ fn a_printed_table_yields_its_wrong_commands_its_inverted_gyro_and_the_sagnac_si
         diagnosis.causes.first().map(|cause| cause.effect),
         Some("gyro-sine-response")
     );
-    let screen = gap::terminal::screen(&subject, &diagnosis, "");
+    let screen = gap::report::terminal::screen(&subject, &diagnosis, "");
     assert!(screen.contains("lme02: scale drift or none of these"), "{screen}");
 }

@@ -2,7 +2,7 @@
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Map, Marks, Panel};
 
-use crate::{diagnose::Diagnosis, input::case::Subject, terminal, unknown::traces::Trace};
+use crate::{diagnose::Diagnosis, input::case::Subject, report::terminal, unknown::traces::Trace};
 
 /// Rows of a map of probabilities.
 const SHOWN: usize = 10;

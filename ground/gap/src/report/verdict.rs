@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, terminal};
+use crate::{diagnose::Diagnosis, input::case::Subject, report::terminal};
 
 /// Share of the excess that the channels named for an unexplained residual hold together.
 const MOST_OF_IT: f64 = 0.8;
