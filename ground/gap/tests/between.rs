@@ -6,7 +6,7 @@ use gap::{
     holdout::fit_error::FitError,
     input::case::Subject,
     library::hypotheses::Library,
-    null::{interval::On, model::Model, problem::Problem},
+    null::{interval::Interval, model::Model, problem::Problem},
     report::terminal,
     search::{periodic::again, readings::attribute},
 };
@@ -51,7 +51,8 @@ fn off(tau_s: f64) -> f64 {
 fn a_time_constant_is_off_by_as_much_as_is_said() {
     let off = TAUS_S.map(off);
     let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
-    // Of twelve draws, 99 in 100 within half as much again; moved as long as that is worth a tenth of a nat, which is half a standard deviation.
+    // Of twelve draws, 99 in 100 within half as much again; moved as long as that is worth a tenth of a nat, which is half a
+    // standard deviation.
     assert!((0.4..1.5).contains(&rms), "{off:?}");
 }
 
@@ -91,7 +92,7 @@ fn one_of_a_set_that_cannot_be_told_apart_is_a_cause_and_corrects_nothing() {
 }
 
 /// When a constant error of gz is on, and the nats that gains over always.
-fn when_on(error: impl Fn(f64) -> f64) -> Option<(On, f64)> {
+fn when_on(error: impl Fn(f64) -> f64) -> Option<(Interval, f64)> {
     let folder = erring(error, "");
     let subject = Subject::open(folder.path()).expect("opens");
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);

@@ -13,7 +13,7 @@ use twin::{effect::Active, predict::Column};
 
 use crate::{
     library::hypotheses::Hypothesis,
-    null::{interval::On, model::Model, problem::Problem},
+    null::{interval::Interval, model::Model, problem::Problem},
 };
 
 /// Times the slope is taken anew over one standard deviation of what was found: an onset has no slope over less than a cycle.
@@ -113,7 +113,7 @@ fn slope(problem: &Problem, model: &Model, at: usize, step: f64, prior: f64) -> 
 }
 
 /// A column while a component is on.
-fn within(problem: &Problem, mut column: Column, span: Option<On>) -> Column {
+fn within(problem: &Problem, mut column: Column, span: Option<Interval>) -> Column {
     let Some(span) = span else { return column };
     for (_, values) in &mut column.entries {
         for (value, start_s) in values.iter_mut().zip(problem.twin.starts_s()) {

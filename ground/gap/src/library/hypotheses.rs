@@ -15,7 +15,7 @@ use crate::{
     library::products::Products,
     null::{
         evidence::Screen,
-        interval::On,
+        interval::Interval,
         problem::{Component, Problem},
     },
 };
@@ -32,7 +32,7 @@ pub struct Hypothesis {
     /// Logarithm of its prior odds against nothing.
     pub log_prior: f64,
     /// When it is on; `None` for always.
-    pub span: Option<On>,
+    pub span: Option<Interval>,
 }
 
 impl Hypothesis {

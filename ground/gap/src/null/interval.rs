@@ -6,14 +6,14 @@ use crate::input::windows::Span;
 
 /// When an effect that passes is on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct On {
+pub struct Interval {
     /// The stretch, or one of those.
     pub stretch: Span,
     /// [s] after which it comes again; `None` for once.
     pub every_s: Option<f64>,
 }
 
-impl On {
+impl Interval {
     /// Whether it is on at an instant [s].
     pub fn contains(self, t_s: f64) -> bool {
         match self.every_s {
@@ -29,13 +29,13 @@ pub fn phase(cycles: f64) -> f64 {
     cycles - cycles.floor()
 }
 
-impl From<Span> for On {
+impl From<Span> for Interval {
     fn from(stretch: Span) -> Self {
-        On { stretch, every_s: None }
+        Interval { stretch, every_s: None }
     }
 }
 
-impl fmt::Display for On {
+impl fmt::Display for Interval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Span { from, to } = self.stretch;
         match self.every_s {
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn what_comes_again_is_on_before_and_after_the_stretch_that_tells_it() {
-        let on = On {
+        let on = Interval {
             stretch: Span { from: 25.0, to: 28.0 },
             every_s: Some(10.0),
         };

@@ -1,7 +1,8 @@
 //! The fit windows as a least-squares problem: residuals and columns of every channel in units of its noise.
 //!
-//! In: the twin, the fit windows, how well the reference is known. Out: what [`crate::null::joint`] and [`crate::null::evidence`] work
-//! on. What the twin predicts is compared at the rows that are there and that the reference saw.
+//! In: the twin, the fit windows, how well the reference is known. Out: what [`crate::null::joint`] and
+//! [`crate::null::evidence`] work on. What the twin predicts is compared at the rows that are there and that the reference
+//! saw.
 //!
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
 //! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
@@ -18,7 +19,7 @@ use twin::{
 pub use self::frame::Frame;
 use crate::{
     input::{reference::Reference, windows::Fit},
-    null::{calibration::calibration, interval::On, joint::Columns},
+    null::{calibration::calibration, interval::Interval, joint::Columns},
 };
 
 /// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
@@ -31,7 +32,7 @@ pub struct Component {
     /// What and how large.
     pub active: Active,
     /// When; `None` for always.
-    pub span: Option<On>,
+    pub span: Option<Interval>,
 }
 
 /// The least-squares problem of a case.
@@ -310,7 +311,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A column at the rows that are fitted, in units of noise.
-    pub fn in_noise(&self, column: &Column, span: Option<On>) -> Vec<(usize, DVector<f64>)> {
+    pub fn in_noise(&self, column: &Column, span: Option<Interval>) -> Vec<(usize, DVector<f64>)> {
         let starts_s = self.twin.starts_s();
         let at = |(channel, values): &(usize, Vec<f64>)| {
             let frame = &self.frames[*channel];

@@ -1,7 +1,7 @@
 //! What each of several effects contributes, where they overlap: shares of the excess that add up.
 //!
-//! In: the chosen effects. Out: an energy for each, the Shapley value ([`crate::unknown::shapley`]) of what every set of them takes
-//! off the excess when it is fitted alone with the calibration. They add up to what all take off together.
+//! In: the chosen effects. Out: an energy for each, the Shapley value ([`crate::unknown::shapley`]) of what every set of
+//! them takes off the excess when it is fitted alone with the calibration. They add up to what all take off together.
 
 use crate::{
     library::hypotheses::Library,

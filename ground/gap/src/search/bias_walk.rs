@@ -28,7 +28,8 @@ use crate::{
 /// The effect's name.
 pub const NAME: &str = "gyro-bias-walk";
 
-/// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods under 19 s.
+/// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods
+/// under 19 s.
 const TERMS: usize = 32;
 
 /// Samples from which a walk is told from anything else: the rows of a table are fewer, and no walk.

@@ -12,7 +12,7 @@ use crate::{
     library::products::Entries,
     null::{
         evidence::Screen,
-        interval::{On, phase},
+        interval::{Interval, phase},
         problem::Problem,
     },
     search::interval_sums::{Piece, Touched},
@@ -47,7 +47,7 @@ struct Folded<'a> {
 
 /// The stretch that comes again in which the effect with these `slopes` is on, and the nats it gains over always; `None` for
 /// none that is much better. `rest` is the residual of every channel without it.
-pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(On, f64)> {
+pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigmas: &[f64]) -> Option<(Interval, f64)> {
     let folded = Folded::new(problem, rest, slopes, sigmas);
     let instants = folded.channels.iter().flat_map(|channel| folded.instants_s(channel));
     let (from_s, to_s) = instants.fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), t_s| {
@@ -91,7 +91,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
         from,
         to: from + phase(off - on) * every_s,
     };
-    let on = On {
+    let on = Interval {
         stretch,
         every_s: Some(every_s),
     };
@@ -187,7 +187,7 @@ impl<'a> Folded<'a> {
     }
 
     /// What is there while it is on, in a part of the time.
-    fn within(&self, on: On, part: Span) -> Screen {
+    fn within(&self, on: Interval, part: Span) -> Screen {
         let mut piece = self.none();
         for (at, channel) in self.channels.iter().enumerate() {
             let is_in = |(_, t_s): &(usize, f64)| on.contains(*t_s) && part.contains(*t_s);

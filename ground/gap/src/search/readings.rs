@@ -3,12 +3,12 @@
 //! In: the [`Problem`] and its [`Library`]. Out: an [`Attribution`]: the chosen effects with parameters and covariance, and
 //! for each its rivals with their evidence, "nothing" among them.
 //!
-//! A screen of all hypotheses costs matrices only ([`crate::null::evidence`]); the best few are then fitted by Gauss-Newton, because a
-//! latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its evidence, after
-//! the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against all rivals in its
-//! place, and dropped if the rest can do without it. An effect that comes and goes is screened with the stretch of time in
-//! which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of another if it has to be on
-//! throughout.
+//! A screen of all hypotheses costs matrices only ([`crate::null::evidence`]); the best few are then fitted by Gauss-Newton,
+//! because a latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its
+//! evidence, after the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against
+//! all rivals in its place, and dropped if the rest can do without it. An effect that comes and goes is screened with the
+//! stretch of time in which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of
+//! another if it has to be on throughout.
 
 mod chosen;
 mod columns;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::null::interval::On;
+use crate::null::interval::Interval;
 
 /// A chosen effect.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ pub struct Rival {
     /// [nats] over the model with neither, prior odds included.
     pub gain: f64,
     /// When it would be on; `None` for always.
-    pub span: Option<On>,
+    pub span: Option<Interval>,
     /// Whether it is the hypothesis, and not the same course without what its physics makes of it, which has no name.
     pub is_named: bool,
 }

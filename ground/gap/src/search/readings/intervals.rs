@@ -14,7 +14,7 @@ use crate::{
         hypotheses::{Hypothesis, Library},
         products::Entries,
     },
-    null::{interval::On, problem::Problem},
+    null::{interval::Interval, problem::Problem},
     search::{
         gauss_newton::{Refined, model_of, refine},
         once,
@@ -35,7 +35,7 @@ pub(super) fn stretches(
     best: &Refined,
     nothing: f64,
     gains: &mut [f64],
-) -> Vec<Option<On>> {
+) -> Vec<Option<Interval>> {
     let model = model_of(library, set, &best.thetas);
     let least = PASSING_PART * (best.log_evidence - nothing);
     let rest = problem.residuals(&model);
@@ -74,7 +74,7 @@ pub(super) fn taken(
     library: &mut Library,
     set: &[usize],
     start: &[DVector<f64>],
-    span: Option<On>,
+    span: Option<Interval>,
 ) -> Refined {
     let refined = match span {
         Some(span) => passing(problem, library, set, start, span),
@@ -90,7 +90,7 @@ pub(super) fn fitted(
     library: &mut Library,
     set: &[usize],
     start: &[DVector<f64>],
-    span: Option<On>,
+    span: Option<Interval>,
     is_contested: bool,
 ) -> Refined {
     match (span, set.last()) {
@@ -114,7 +114,7 @@ pub(super) fn fitted(
 
 /// A set with its last member on in a stretch of time only, refined. The library has its columns for that stretch from then
 /// on; [`always`] gives it back those it had.
-fn passing(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>], span: On) -> Refined {
+fn passing(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>], span: Interval) -> Refined {
     let last = set[set.len() - 1];
     library.hypotheses[last].span = Some(span);
     let mut thetas = start.to_vec();
