@@ -1,10 +1,10 @@
 //! Step 6, the windows that only judge: does a finished model hold on samples that it has not seen?
 //!
 //! In: a model that no longer changes, and [`crate::input::hold::Held`], which only this room opens. Out: how far the gap
-//! shrinks ([`judge`], [`shrink`]), down the pipeline to calibrated vectors and [`attitude`] ([`stages`]); how strong each effect is
-//! there ([`strength`]), apart from what the fit may be off by ([`fit_error`]); how often an event happened again ([`events`],
-//! [`recurrences`]); and whether what is left is there too ([`leftover`]). The [`floor`] is what a perfect twin would leave. The
-//! same question asked within the fit windows is [`cross_validation`].
+//! shrinks ([`judge`], [`shrink`]), down the pipeline to calibrated vectors and [`attitude`] ([`stages`]); how strong each
+//! effect is there ([`strength`]), apart from what the fit may be off by ([`fit_error`]); how often an event happened again
+//! ([`events`], [`recurrences`]); and whether what is left is there too ([`leftover`]). The [`floor`] is what a perfect twin
+//! would leave. The same question asked within the fit windows is [`cross_validation`].
 
 pub mod attitude;
 pub mod cross_validation;

@@ -1,16 +1,23 @@
 //! The gap between the twin and the unit: where it is, which effect makes it, how far it shrinks.
 //!
-//! In: a case ([`case`]), that is a unit's log, what it was made to do, and what its designers believed of it. Out: a
-//! verdict. The flow, one module a step:
+//! In: a case, that is a unit's log, what it was made to do, and what its designers believed of it. Out: a verdict. Ten steps,
+//! a room each; a room needs only those above it, [`diagnose`] walks through all of them, and [`command`] is the shell.
 //!
-//! ```text
-//! case -> windows (what is fitted | what only judges) -> problem (residual in units of noise)
-//!      -> library (every effect at every place) -> attribute (which, by evidence) -> explain (and how it scatters)
-//!      -> leftover (is it enough) -> held (how far it shrinks) -> belief, believed (how likely a name is) -> verdict
-//! ```
+//! | step | room | asks | gives |
+//! |---|---|---|---|
+//! | 1 | [`input`] | what was logged, and what was the unit made to do? | [`input::case::Subject`], the hold windows locked away |
+//! | 2 | [`null`] | what would calibration, noise and reference alone leave? | [`null::problem::Problem`], [`null::model::Model`] |
+//! | 3 | [`library`] | what may be wrong, and how would it show in this log? | [`library::hypotheses::Library`] |
+//! | 4 | [`search`] | which effects does the evidence prefer? | [`search::explanation::Explanation`] |
+//! | 5 | [`unknown`] | is what is left more than noise, and where is it? | [`unknown::adequacy::Leftover`], [`unknown::place::Place`] |
+//! | 6 | [`holdout`] | does it hold on samples it has not seen? | [`holdout::shrink::Shrink`], strengths, attitude |
+//! | 7 | [`probability`] | how sure is each name? | [`probability::posterior::Believed`] |
+//! | 8 | [`correct`] | what can the unit correct? | [`correct::correction::Correction`] |
+//! | 9 | [`advise`] | what should be measured next, and what would not have been seen? | advice, sets, limits |
+//! | 10 | [`report`] | how is it told? | `verdict.json`, a screen, a page |
 //!
-//! What the calibration leaves open is marginalised throughout ([`gram`]): with thousands of samples any error of 0.1 % is
-//! significant, and none of it is an effect.
+//! `tests/rooms.rs` holds the order and the lock: no room needs a later one, and only [`holdout`] opens the held-out samples.
+//! `tests/golden.rs` holds what is said.
 
 pub mod advise;
 pub mod command;

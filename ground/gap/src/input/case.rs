@@ -1,7 +1,7 @@
 //! A gap case: one folder with what a unit logged, what it was made to do, and what its designers believed of it.
 //!
 //! In: the folder, or its `case.toml`. Out: [`Case`], whose log is already parted into what may be fitted
-//! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::windows::Held`]).
+//! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::hold::Held`]).
 //!
 //! Refuses, naming file and key: a missing file, a key that is absent or of the wrong type, windows that are empty,
 //! run backwards or overlap, a window without a sample, a motion that ends before the log does, a clock that never

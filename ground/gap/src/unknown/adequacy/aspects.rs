@@ -1,31 +1,32 @@
 //! Everything that is looked at in a residual: a list of sums of squares.
 //!
 //! In: the [`View`]s of all channels, the named effects' [`Suspect`]s and a fit. Out: one sum of squares an aspect, with its
-//! name. A test that looks at many shapes at once sees none of them well, so each suspicion has a sum of its own. Of a channel,
-//! and of all channels of a kind together, for what is small in each of twelve is large in all: its energy; slow shapes in
-//! time; shapes in time and motion together ([`super::shapes`]); the motion itself; neighbouring samples alike (Ljung and Box
-//! 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone ([`super::spectrum`]); heavy
-//! tails; the size of the fitted calibration, without which an unknown effect hides in the calibration; steps between levels of
-//! one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]). Of a part, each frequency in all its
-//! axes. Of all channels together: the energy of a stretch of time, and noise that comes and goes in all of a kind; the same
-//! vector in all sensors of a kind, along any axes or one, and in single samples; the same factor, as of a supply they share;
-//! the same small rotation in all sensors, which a loose mount or a reference that slips leaves and no single channel shows;
-//! what is open of each channel and was found along one line in several ([`super::calibrations`]). Of a named effect: whether it is
-//! as strong everywhere as its law says ([`super::uniformity`]), and if it is one on the scatter, whether waves of each length
-//! have the energy that it claims, and outliers the size and the distance from the sample before, no more and no less: a law of
-//! outliers "anywhere in the range" would else stand for any, values that are sent again among them; and whether channels that
-//! scatter each by itself go one way ([`super::courses`]).
+//! name. A test that looks at many shapes at once sees none of them well, so each suspicion has a sum of its own. Of a
+//! channel, and of all channels of a kind together, for what is small in each of twelve is large in all: its energy; slow
+//! shapes in time; shapes in time and motion together ([`super::shapes`]); the motion itself; neighbouring samples alike
+//! (Ljung and Box 1978); noise that comes and goes, neighbouring squares alike (McLeod and Li 1983); a tone
+//! ([`super::spectrum`]); heavy tails; the size of the fitted calibration, without which an unknown effect hides in the
+//! calibration; steps between levels of one quantity, which a wrong law leaves; codes that do not come ([`super::codes`]).
+//! Of a part, each frequency in all its axes. Of all channels together: the energy of a stretch of time, and noise that
+//! comes and goes in all of a kind; the same vector in all sensors of a kind, along any axes or one, and in single samples;
+//! the same factor, as of a supply they share; the same small rotation in all sensors, which a loose mount or a reference
+//! that slips leaves and no single channel shows; what is open of each channel and was found along one line in several
+//! ([`super::calibrations`]). Of a named effect: whether it is as strong everywhere as its law says ([`super::uniformity`]),
+//! and if it is one on the scatter, whether waves of each length have the energy that it claims, and outliers the size and
+//! the distance from the sample before, no more and no less: a law of outliers "anywhere in the range" would else stand for
+//! any, values that are sent again among them; and whether channels that scatter each by itself go one way
+//! ([`super::courses`]).
 
 use nalgebra::{DMatrix, Vector1};
 
 use super::{
     calibrations::Shared,
     common::Common,
+    courses,
     label::{Label, OF_CALIBRATION, name_of},
     shapes::{BINS, Shapes},
     spectrum::{Spectrum, strongest},
     sums::{Bursts, alike, between_levels, mean_logarithm, outliers, squares, tails},
-    together,
     uniformity::{Strength, Suspect},
     view::{LEVELLED, STRETCHES, View, place},
 };
@@ -295,8 +296,8 @@ impl<'a> Sights<'a> {
                 .scattered
                 .iter()
                 .filter(|channel| self.views[**channel].kind == kind);
-            let courses = own.map(|channel| (self.views[*channel].phase.as_slice(), fitted.rest[*channel].as_slice()));
-            sums.push(courses::alike(courses));
+            let slow = own.map(|channel| (self.views[*channel].phase.as_slice(), fitted.rest[*channel].as_slice()));
+            sums.push(courses::alike(slow));
         }
         sums.extend([sizes, distances].map(|values| mean_logarithm(values.into_iter())));
         sums

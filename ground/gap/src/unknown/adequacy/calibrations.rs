@@ -1,10 +1,11 @@
 //! What is open of each channel by itself and was found along one line in several.
 //!
-//! In: what is open in each channel, and a fit. Out: for each set of channels that have something in common the square of what
-//! they were found to share, in units of what chance leaves of it. Each channel was calibrated alone and each part converts by
-//! its own clock, so that what is shared is no calibration: the same delay or factor in a kind of sensors, one vector on all
-//! zeros of a kind, one turn of the axes of a part, of a plate, of a kind or of all sensors. A magnet on the body that moves twelve
-//! zeros by 2.8 sigmas each is ten sigmas of one vector, and among the squares of biases, factors and axes was not seen.
+//! In: what is open in each channel, and a fit. Out: for each set of channels that have something in common the square of
+//! what they were found to share, in units of what chance leaves of it. Each channel was calibrated alone and each part
+//! converts by its own clock, so that what is shared is no calibration: the same delay or factor in a kind of sensors, one
+//! vector on all zeros of a kind, one turn of the axes of a part, of a plate, of a kind or of all sensors. A magnet on the
+//! body that moves twelve zeros by 2.8 sigmas each is ten sigmas of one vector, and among the squares of biases, factors and
+//! axes was not seen.
 
 use nalgebra::{Matrix3, Vector3};
 

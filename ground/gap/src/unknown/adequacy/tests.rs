@@ -6,11 +6,11 @@ mod recurrence;
 mod scatter;
 mod shared;
 
-use nalgebra::{DMatrix, Vector3};
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
 use super::{view::LEVELLED, *};
 use crate::null::joint::Columns;
+use nalgebra::{DMatrix, Vector3};
 
 const SAMPLES: usize = 600;
 const CHANNELS: usize = 3;
