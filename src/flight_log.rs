@@ -10,19 +10,22 @@
 //!
 //! 1. A page is programmed once, with a record and a copy of the one before: a lost page takes only the newest with it.
 //! 2. A block belongs to one boot. Bits that a cut tore may read differently each time, so nothing is programmed into a
-//!    block whose erase was not completed since this start, and no key is used twice.
+//!    block whose erase was not completed since this start, and no key is used twice. A boot that left little takes no
+//!    block of its own for good: the next one copies it and takes turns with it (carry.rs).
 //! 3. The first thing a boot changes is the superblock, and only then an old block: what a torn superblock seems to
 //!    say is made true before anything follows from it.
 //! 4. Appending is done when the page has been read back. A block that fails is retired in the superblock, and the
 //!    record goes to the next one.
 //! 5. Erasing the log is one more in the superblock's epoch; blocks are erased later, in free time, and each again just
-//!    before it is used. A block that carries the running epoch is never erased, whatever the search for the end said.
+//!    before it is used. A block that carries the running epoch is never erased, whatever the search for the end said,
+//!    unless all of it has been read from another block (carry.rs).
 //! 6. A full log says so and stops.
 //!
-//! Refuses: another chip or none, a newer format (named), foreign content (until it is erased by command), more bad
-//! blocks than the chip's data sheet allows.
+//! Refuses: another chip or none, a newer format (named), foreign content (until it is erased by command), a chip without a
+//! block that works.
 
 mod blocks;
+mod carry;
 pub mod dump;
 mod error;
 mod mount;
@@ -65,6 +68,8 @@ pub struct FlightLog<N> {
     ahead: Option<u16>,
     /// No block from here on is used.
     next_block: u16,
+    /// Where the newest records are, found at mount.
+    newest_block: Option<u16>,
     erase_next: Option<u16>,
     seq: u32,
     /// The record of the newest page, or found newest at mount; how many of `last` and `second` are set.
@@ -103,6 +108,7 @@ impl<N: Nand> FlightLog<N> {
             head: None,
             ahead: None,
             next_block: LOG_START,
+            newest_block: None,
             erase_next: None,
             seq: 0,
             last: [0; record::RECORD_BYTES],
@@ -175,10 +181,10 @@ impl<N: Nand> FlightLog<N> {
         let Some(next) = self.erase_next.filter(|_| !self.superblock.flight) else {
             return Ok(false);
         };
-        self.erase_next = match self.free_block(next.max(self.next_block)).await? {
+        self.erase_next = match self.free_block(next.max(self.next_block))? {
             Some(block) => {
                 self.erase(block).await?;
-                Some(block + 1)
+                Some(block.saturating_add(1))
             }
             None => None,
         };
@@ -204,11 +210,13 @@ impl<N: Nand> FlightLog<N> {
         }
         self.superblock.epoch = self.superblock.epoch.checked_add(1).ok_or(LogError::Worn)?;
         self.superblock.first_block = LOG_START;
+        self.superblock.block_before = 0;
         self.open();
         self.begun = false;
         self.head = None;
         self.ahead = None;
         self.next_block = LOG_START;
+        self.newest_block = None;
         self.carried = 0;
         self.status.last = None;
         self.state = State::Mounted;
@@ -220,14 +228,16 @@ impl<N: Nand> FlightLog<N> {
 
     /// Reads page `number` of the log for a dump, counted from its first block: the whole records of the running epoch
     /// in it. Works until the chip itself fails; pages from [`Status::used`] on are blank.
-    pub async fn read(&mut self, number: u32) -> Result<[Option<&RecordBytes>; 2], LogError> {
+    pub fn read(&mut self, number: u32) -> Result<[Option<&RecordBytes>; 2], LogError> {
         self.mounted()?;
         let at = self.page_number(number).ok_or(LogError::Full)?;
-        self.chip.read(at, &mut self.back).await?;
+        self.chip.read(at, &mut self.back)?;
         let whole = self.whole_records();
-        Ok(core::array::from_fn(|half| {
-            whole[half].map(|_| page::record(&self.back, half))
-        }))
+        let [first, second] = whole;
+        Ok([
+            first.map(|_| page::record(&self.back, 0)),
+            second.map(|_| page::record(&self.back, 1)),
+        ])
     }
 
     /// How it stands.
@@ -235,14 +245,20 @@ impl<N: Nand> FlightLog<N> {
         let per_block = u32::from(PAGES_PER_BLOCK);
         let blocks = self.chip.blocks();
         let log_bad = |end| u32::from(self.superblock.bad.count(LOG_START..end));
+        let after = |block: u16| block.saturating_add(1);
+        let end_block = match self.ahead {
+            Some(ahead) if after(ahead) == self.next_block => ahead,
+            _ => self.next_block,
+        };
         let end = match self.head {
-            Some(at) => at.row(),
-            None => u32::from(self.next_block - u16::from(self.ahead.is_some())) * per_block,
+            Some(at) if after(at.block) >= end_block => at.row(),
+            _ => u32::from(end_block) * per_block,
         };
         Status {
             used: end.saturating_sub(u32::from(LOG_START) * per_block),
-            capacity: (u32::from(blocks.saturating_sub(LOG_START)) - log_bad(blocks)) * per_block,
+            capacity: u32::from(blocks.saturating_sub(LOG_START)).saturating_sub(log_bad(blocks)) * per_block,
             bad_blocks: self.superblock.bad.count(0..blocks),
+            more_bad_blocks: self.superblock.bad.is_full(),
             erasing: self.erase_next.map(|next| u32::from(blocks.saturating_sub(next))),
             ..self.status
         }
@@ -270,7 +286,7 @@ impl<N: Nand> FlightLog<N> {
             seq: self.seq,
         };
         // Taken even if the record does not come to be: half of it may.
-        self.seq += 1;
+        self.seq = self.seq.saturating_add(1);
         key
     }
 
@@ -282,27 +298,44 @@ impl<N: Nand> FlightLog<N> {
         }
     }
 
-    /// Writes superblock and header of this boot, and with them the two newest records of the boots before: their last
-    /// pages may be torn, and then these are the only copies.
+    /// Writes superblock and header of this boot, and before the header the records of the block that it carries on, or
+    /// after it the two newest records of the boots before: their last pages may be torn, and then these are the only copies.
     async fn begin(&mut self, now_us: u64) -> Result<(), LogError> {
-        let first = self.free_block(self.next_block).await?.ok_or(LogError::Full)?;
+        let course = self.course()?;
+        let first = match course.into {
+            Some(block) => block,
+            None => self.free_block(self.next_block)?.ok_or(LogError::Full)?,
+        };
         if !self.opened || self.superblock.first_block != first {
             self.open();
+            self.superblock.block_before = self.newest_block.unwrap_or(0);
             self.superblock.first_block = first;
             self.save().await?;
         }
+        if let Some(block) = course.into {
+            self.next_block = self.next_block.max(block.saturating_add(1));
+            self.ahead = self.erase(block).await?.then_some(block);
+        }
+        let copied = match course.source {
+            Some(block) => self.copy(block).await?,
+            None => false,
+        };
         self.header.opened_us = now_us;
         let key = self.next_key();
         let header = record::encode_header(key, &self.header);
-        let newest = if self.carried > 0 { &self.last } else { &header };
-        page::compose(&mut self.page, &header, newest);
-        self.put_page().await?;
-        if self.carried < 2 {
-            self.second = header;
+        if copied {
+            self.put_record(header).await?;
+        } else {
+            let newest = if self.carried > 0 { &self.last } else { &header };
+            page::compose(&mut self.page, &header, newest);
+            self.put_page().await?;
+            if self.carried < 2 {
+                self.second = header;
+            }
+            page::compose(&mut self.page, &self.second, &header);
+            self.put_page().await?;
+            self.last = self.second;
         }
-        page::compose(&mut self.page, &self.second, &header);
-        self.put_page().await?;
-        self.last = self.second;
         self.begun = true;
         Ok(())
     }
@@ -324,7 +357,7 @@ impl<N: Nand> FlightLog<N> {
             let tag = self.tag(Kind::Log);
             page::address(&mut self.page, at, tag);
             if self.program(at).await? {
-                let page = at.page + 1;
+                let page = at.page.wrapping_add(1);
                 self.head = (page < PAGES_PER_BLOCK).then_some(PageAddress { page, ..at });
                 return Ok(());
             }

@@ -49,7 +49,7 @@ pub struct PageAddress {
 impl PageAddress {
     /// Page number from the start of the chip: the row address of the data sheet.
     pub fn row(self) -> u32 {
-        u32::from(self.block) * u32::from(PAGES_PER_BLOCK) + u32::from(self.page)
+        (u32::from(self.block) * u32::from(PAGES_PER_BLOCK)).wrapping_add(self.page.into())
     }
 }
 
@@ -63,8 +63,10 @@ pub enum NandError {
     Timeout,
     /// Its status says that the program or erase failed: the block is worn out.
     Failed,
-    /// The supply is failing; nothing was begun.
+    /// The supply is failing: nothing was begun, or what was under way was given up.
     PowerFailing,
+    /// Its status says that it is write-protected while its WP# is lifted: nothing was begun.
+    Protected,
 }
 
 impl fmt::Display for NandError {
@@ -79,6 +81,7 @@ impl fmt::Display for NandError {
             NandError::Timeout => f.write_str("the NAND stays busy"),
             NandError::Failed => f.write_str("the NAND reports a failed program or erase"),
             NandError::PowerFailing => f.write_str("the supply is failing"),
+            NandError::Protected => f.write_str("the NAND stays write-protected: look at its WP# wire"),
         }
     }
 }
@@ -93,9 +96,10 @@ pub trait Nand {
     /// Resets it and asks who it is.
     async fn identify(&mut self) -> Result<(), NandError>;
     /// Reads a page as it is, wrong bits included.
-    async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError>;
+    /// Waited for in place: it is over before a sleep would be.
+    fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError>;
     /// Reads a page's spare area as it is.
-    async fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError>;
+    fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError>;
     /// Programs a page. `Ok` says that the chip reports success, not that the bytes are there.
     async fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Result<(), NandError>;
     /// Erases a block.
@@ -112,12 +116,12 @@ impl<N: Nand> Nand for &mut N {
         N::identify(self).await
     }
 
-    async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
-        N::read(self, at, bytes).await
+    fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
+        N::read(self, at, bytes)
     }
 
-    async fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
-        N::read_spare(self, at, bytes).await
+    fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
+        N::read_spare(self, at, bytes)
     }
 
     async fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Result<(), NandError> {

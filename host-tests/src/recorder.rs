@@ -24,7 +24,7 @@ use rand_xoshiro::{
     SplitMix64,
     rand_core::{Rng, SeedableRng},
 };
-use twin::part::nand::{Cells, Tear};
+use twin::part::nand::{Cells, Tear, Wear};
 
 /// What became of some runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,6 +80,14 @@ impl AddAssign for Tally {
         self.refused += other.refused;
     }
 }
+
+/// Every way to wear out.
+pub const WEARS: [Wear; 4] = [
+    Wear::ProgramFails,
+    Wear::EraseFails,
+    Wear::ProgramDoesNothing,
+    Wear::EraseDoesNothing,
+];
 
 /// Entry number `id`; every one is different in every field.
 pub fn entry(id: u32) -> Entry {

@@ -7,8 +7,8 @@
 use std::collections::BTreeSet;
 
 use emems::nand::{PAGES_PER_BLOCK, PageAddress};
-use host_tests::recorder::{Flown, campaign, draws};
-use twin::part::nand::{Cells, TEARS, Tear, Wear};
+use host_tests::recorder::{Flown, WEARS, campaign, draws};
+use twin::part::nand::{Cells, TEARS, Tear};
 
 /// Blocks of the chip of a short flight: four for the superblock, room for a block each boot and the records.
 const BLOCKS: u16 = 14;
@@ -89,12 +89,7 @@ fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
         let mut chip = Cells::new(blocks, &[draw(blocks.into()) as u16 / 8 * 8 + 7], flight);
         chip.befalls.flips_per_thousand = 50;
         for _ in 0..draw(4) {
-            let wear = [
-                Wear::ProgramFails,
-                Wear::EraseFails,
-                Wear::ProgramDoesNothing,
-                Wear::EraseDoesNothing,
-            ][draw(4) as usize];
+            let wear = WEARS[draw(4) as usize];
             let worn = (draw(blocks.into()) as u16, draw(60) as u32, wear);
             chip.befalls.worn.push(worn);
         }

@@ -52,7 +52,7 @@ fn dumped(chip: &mut Cells) -> BTreeSet<u64> {
         log.mount().await.expect("mounts");
         let mut dumped = BTreeSet::new();
         for page in 0..log.status().used {
-            for record in log.read(page).await.expect("reads").into_iter().flatten() {
+            for record in log.read(page).expect("reads").into_iter().flatten() {
                 if let Ok((_, Content::Packet(entry))) = record::decode(record) {
                     dumped.insert(entry.start_us);
                 }

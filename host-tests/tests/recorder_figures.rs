@@ -77,13 +77,13 @@ impl emems::nand::Nand for Clocked<'_> {
     async fn identify(&mut self) -> Result<(), NandError> {
         Ok(())
     }
-    async fn read(&mut self, at: PageAddress, bytes: &mut emems::nand::PageBytes) -> Result<(), NandError> {
-        let done = emems::nand::Nand::read(self.chip, at, bytes).await;
+    fn read(&mut self, at: PageAddress, bytes: &mut emems::nand::PageBytes) -> Result<(), NandError> {
+        let done = emems::nand::Nand::read(self.chip, at, bytes);
         self.clock.set(self.chip.time);
         done
     }
-    async fn read_spare(&mut self, at: PageAddress, bytes: &mut emems::nand::SpareBytes) -> Result<(), NandError> {
-        let done = emems::nand::Nand::read_spare(self.chip, at, bytes).await;
+    fn read_spare(&mut self, at: PageAddress, bytes: &mut emems::nand::SpareBytes) -> Result<(), NandError> {
+        let done = emems::nand::Nand::read_spare(self.chip, at, bytes);
         self.clock.set(self.chip.time);
         done
     }

@@ -20,15 +20,15 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// What the spare area of a page says, and whether the maker marked it bad.
-    pub(super) async fn stamp(&mut self, block: u16, page: u8) -> Result<(Stamp, bool), LogError> {
+    pub(super) fn stamp(&mut self, block: u16, page: u8) -> Result<(Stamp, bool), LogError> {
         let at = PageAddress { block, page };
         let mut spare = [0xFF; SPARE_BYTES];
-        self.chip.read_spare(at, &mut spare).await?;
+        self.chip.read_spare(at, &mut spare)?;
         let stamp = page::stamp(&spare, at);
         let mut marked = spare[BAD_MARK] != 0xFF;
         if marked {
             // Once more: a bit that reads wrong once must not cost a block.
-            self.chip.read_spare(at, &mut spare).await?;
+            self.chip.read_spare(at, &mut spare)?;
             marked = spare[BAD_MARK] != 0xFF;
         }
         self.status.astray |= matches!(stamp, Stamp::Astray(tag, _) if tag.epoch == self.superblock.epoch);
@@ -36,17 +36,22 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Whether a page carries records of the running epoch, its own or another's.
-    fn is_of_this_log(&self, stamp: Stamp) -> bool {
+    pub(super) fn is_of_this_log(&self, stamp: Stamp) -> bool {
         let (Stamp::Ours(tag) | Stamp::Astray(tag, _)) = stamp else {
             return false;
         };
         tag.kind == Kind::Log && tag.epoch == self.superblock.epoch
     }
 
+    /// Whether there is such a block, and it is none of the superblock's.
+    pub(super) fn is_of_the_log(&self, block: u16) -> bool {
+        (LOG_START..self.chip.blocks()).contains(&block)
+    }
+
     /// Whether a block holds records of the running epoch; its second page speaks for a first one that is lost.
-    pub(super) async fn is_live(&mut self, block: u16) -> Result<bool, LogError> {
+    pub(super) fn is_live(&mut self, block: u16) -> Result<bool, LogError> {
         for page in 0..2 {
-            let (stamp, _) = self.stamp(block, page).await?;
+            let (stamp, _) = self.stamp(block, page)?;
             if matches!(stamp, Stamp::Ours(_)) && self.is_of_this_log(stamp) {
                 return Ok(true);
             }
@@ -56,15 +61,15 @@ impl<N: Nand> FlightLog<N> {
 
     /// The first block from `from` on that may be erased. A block that is live, or answers for one that is, may not,
     /// whatever mount made of it; nor one the maker marked.
-    pub(super) async fn free_block(&mut self, from: u16) -> Result<Option<u16>, LogError> {
+    pub(super) fn free_block(&mut self, from: u16) -> Result<Option<u16>, LogError> {
         'blocks: for block in from.max(LOG_START)..self.chip.blocks() {
             if self.superblock.bad.contains(block) {
                 continue;
             }
             for page in 0..2 {
-                let (stamp, marked) = self.stamp(block, page).await?;
+                let (stamp, marked) = self.stamp(block, page)?;
                 if marked {
-                    self.superblock.bad.insert(block)?;
+                    self.remember_bad(block);
                     continue 'blocks;
                 }
                 if self.is_of_this_log(stamp) {
@@ -78,8 +83,8 @@ impl<N: Nand> FlightLog<N> {
 
     /// The next free block, erased.
     pub(super) async fn erased_block(&mut self) -> Result<u16, LogError> {
-        while let Some(block) = self.free_block(self.next_block).await? {
-            self.next_block = block + 1;
+        while let Some(block) = self.free_block(self.next_block)? {
+            self.next_block = block.saturating_add(1);
             if self.erase(block).await? {
                 return Ok(block);
             }
@@ -103,14 +108,15 @@ impl<N: Nand> FlightLog<N> {
             Err(NandError::Failed) => return Ok(false),
             Err(error) => return Err(error.into()),
         }
-        self.chip.read(at, &mut self.back).await?;
+        self.chip.read(at, &mut self.back)?;
         if self.back == self.page {
             return Ok(true);
         }
         let stamp = page::stamp(page::spare(&self.back), at);
         let whole = self.corrected();
-        let same = |half: usize| whole[half] && page::record(&self.back, half) == page::record(&self.page, half);
-        Ok(matches!(stamp, Stamp::Ours(_)) && same(0) && same(1))
+        let [first, second] = whole;
+        let same = |half: usize| page::record(&self.back, half) == page::record(&self.page, half);
+        Ok(matches!(stamp, Stamp::Ours(_)) && first && second && same(0) && same(1))
     }
 
     /// Corrects the page that was read; which halves are whole. Counts.
@@ -130,9 +136,11 @@ impl<N: Nand> FlightLog<N> {
             return [None; 2];
         }
         let whole = self.corrected();
-        core::array::from_fn(|half| {
-            let key = record::key(page::record(&self.back, half)).ok()?;
-            (whole[half] && key.epoch == self.superblock.epoch).then_some(key)
+        let mut half = 0;
+        whole.map(|whole| {
+            let key = record::key(page::record(&self.back, half)).ok();
+            half = 1;
+            key.filter(|key| whole && key.epoch == self.superblock.epoch)
         })
     }
 
@@ -147,8 +155,14 @@ impl<N: Nand> FlightLog<N> {
 
     /// Never uses a block again.
     pub(super) async fn retire(&mut self, block: u16) -> Result<(), LogError> {
-        self.superblock.bad.insert(block)?;
+        self.remember_bad(block);
         self.save().await
+    }
+
+    /// A bad block beyond those that can be remembered costs a look at it in each start, and no record: the maker's mark is
+    /// read before an erase, and a block that fails is left for the next one.
+    pub(super) fn remember_bad(&mut self, block: u16) {
+        let _ = self.superblock.bad.insert(block);
     }
 
     /// Saves the superblock: two pages in a block that was erased since this start and is not the one with the save
@@ -157,13 +171,13 @@ impl<N: Nand> FlightLog<N> {
         for _ in 0..2 * LOG_START {
             self.superblock.number = self.superblock.number.saturating_add(1);
             let (block, page) = match self.home {
-                (block, Some(page)) if page + COPIES <= PAGES_PER_BLOCK => (block, page),
+                (block, Some(page)) if page <= PAGES_PER_BLOCK - COPIES => (block, page),
                 (block, _) => {
                     let next = self.next_home(block).ok_or(LogError::Worn)?;
                     match self.chip.erase(next).await {
                         Ok(()) => {}
                         Err(NandError::Failed) => {
-                            self.superblock.bad.insert(next)?;
+                            self.remember_bad(next);
                             continue;
                         }
                         Err(error) => return Err(error.into()),
@@ -177,15 +191,15 @@ impl<N: Nand> FlightLog<N> {
                     && self
                         .put_superblock(PageAddress {
                             block,
-                            page: page + copy,
+                            page: page.wrapping_add(copy),
                         })
                         .await?;
             }
             if kept {
-                self.home = (block, Some(page + COPIES));
+                self.home = (block, Some(page.wrapping_add(COPIES)));
                 return Ok(());
             }
-            self.superblock.bad.insert(block)?;
+            self.remember_bad(block);
             // A home that failed with an older save in it still has that one; one that was just erased has none.
             self.home = if page > 0 { (block, None) } else { (self.home.0, None) };
         }
@@ -202,15 +216,16 @@ impl<N: Nand> FlightLog<N> {
             Err(NandError::Failed) => return Ok(false),
             Err(error) => return Err(error.into()),
         }
-        self.chip.read(at, &mut self.back).await?;
+        self.chip.read(at, &mut self.back)?;
         let whole = self.corrected();
-        Ok((0..2).all(|half| whole[half] && *page::record(&self.back, half) == bytes))
+        let same = |half: usize| *page::record(&self.back, half) == bytes;
+        Ok(whole == [true; 2] && same(0) && same(1))
     }
 
     /// The next good block for the superblock after `block`, which keeps the save before.
     fn next_home(&self, block: u16) -> Option<u16> {
         (1..LOG_START)
-            .map(|step| (block + step) % LOG_START)
+            .map(|step| block.wrapping_add(step) % LOG_START)
             .find(|home| !self.superblock.bad.contains(*home))
     }
 }

@@ -82,7 +82,7 @@ fn put(frame: &mut Frame, byte: u8) {
 
 fn put_hex(frame: &mut Frame, byte: u8) {
     for digit in [byte >> 4, byte & 0xF] {
-        put(frame, b"0123456789ABCDEF"[usize::from(digit)]);
+        put(frame, b"0123456789ABCDEF"[usize::from(digit & 0xF)]);
     }
 }
 

@@ -2,7 +2,6 @@
 
 use core::fmt;
 
-use super::superblock;
 use crate::nand::NandError;
 
 /// Why the log refuses.
@@ -19,19 +18,13 @@ pub enum LogError {
     Foreign,
     /// No room is left; nothing was overwritten.
     Full,
-    /// More bad blocks than a chip within its specified life has.
+    /// No block can be written: all are bad, several failed one after the other, or the superblock's own have.
     Worn,
 }
 
 impl From<NandError> for LogError {
     fn from(error: NandError) -> Self {
         LogError::Nand(error)
-    }
-}
-
-impl From<superblock::TooManyBadBlocks> for LogError {
-    fn from(_: superblock::TooManyBadBlocks) -> Self {
-        LogError::Worn
     }
 }
 
@@ -43,7 +36,7 @@ impl fmt::Display for LogError {
             LogError::Newer(version) => write!(f, "log of newer format {version}: update the firmware"),
             LogError::Foreign => f.write_str("NAND holds something else: G_MA makes it a log"),
             LogError::Full => f.write_str("full"),
-            LogError::Worn => f.write_str("too many bad blocks"),
+            LogError::Worn => f.write_str("no block of the NAND can be written"),
         }
     }
 }

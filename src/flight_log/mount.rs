@@ -72,13 +72,19 @@ impl<N: Nand> FlightLog<N> {
         (self.opened, self.begun) = (false, false);
         (self.head, self.ahead, self.erase_next) = (None, None, None);
         (self.next_block, self.seq, self.carried) = (LOG_START, 0, 0);
+        self.newest_block = None;
         self.status.last = None;
     }
 
     async fn find_all(&mut self) -> Result<(), LogError> {
         self.chip.identify().await?;
-        let head = match self.find_superblock().await? {
-            Found::Sure => match self.search_head().await? {
+        let found = self.find_superblock()?;
+        if found != Found::Sure {
+            // A newer save may say otherwise.
+            self.superblock.block_before = 0;
+        }
+        let head = match found {
+            Found::Sure => match self.search_head()? {
                 Some(head) => Some(head),
                 None if self.superblock.first_block <= LOG_START => None,
                 None => self.scan(true).await?,
@@ -94,19 +100,34 @@ impl<N: Nand> FlightLog<N> {
         let Some(head) = head else {
             return Ok(());
         };
-        self.next_block = head + 1;
-        self.find_newest(head).await
+        self.next_block = head.saturating_add(1);
+        self.newest_block = Some(self.find_newest_block(head)?);
+        self.find_newest(head)
+    }
+
+    /// The block where the newest boot left its last records, or, if it left none, the one before: not always the last
+    /// block, because two may take turns ([`super::carry`]).
+    fn find_newest_block(&mut self, head: u16) -> Result<u16, LogError> {
+        let boot = self.superblock.boot as u16;
+        for block in [head, self.superblock.first_block] {
+            if self.is_of_the_log(block) && self.boot_of(block)? == Some(boot) {
+                return Ok(block);
+            }
+        }
+        let before = self.superblock.block_before;
+        let is_there = self.is_of_the_log(before) && self.is_live(before)?;
+        Ok(if is_there { before } else { head })
     }
 
     /// Reads the superblock's blocks.
-    async fn find_superblock(&mut self) -> Result<Found, LogError> {
+    fn find_superblock(&mut self) -> Result<Found, LogError> {
         let mut found = Found::Nothing;
-        let mut copies = 0;
+        let mut copies = 0_u8;
         let mut torn = [false; LOG_START as usize];
         for block in 0..LOG_START.min(self.chip.blocks()) {
             for page in 0..PAGES_PER_BLOCK {
                 let at = PageAddress { block, page };
-                self.chip.read(at, &mut self.back).await?;
+                self.chip.read(at, &mut self.back)?;
                 if page::is_blank(&self.back) {
                     break;
                 }
@@ -114,7 +135,10 @@ impl<N: Nand> FlightLog<N> {
                     Stamp::Ours(tag) if tag.kind == Kind::Superblock);
                 let whole = self.corrected();
                 let mut readable = false;
-                for half in (0..2).filter(|half| whole[*half]) {
+                for (half, whole) in whole.into_iter().enumerate() {
+                    if !whole {
+                        continue;
+                    }
                     match superblock::decode(page::record(&self.back, half)) {
                         Ok(superblock) => {
                             readable = true;
@@ -132,12 +156,16 @@ impl<N: Nand> FlightLog<N> {
                         break;
                     }
                 }
-                copies += u32::from(readable && self.home.0 == block);
-                torn[usize::from(block)] |= !(readable && ours);
+                copies = copies.wrapping_add((readable && self.home.0 == block).into());
+                if let Some(torn) = torn.get_mut(usize::from(block)) {
+                    *torn |= !(readable && ours);
+                }
             }
         }
         // What a retired block holds is no news.
-        let torn = (0..LOG_START).any(|block| torn[usize::from(block)] && !self.superblock.bad.contains(block));
+        let torn = (0..)
+            .zip(torn)
+            .any(|(block, torn)| torn && !self.superblock.bad.contains(block));
         Ok(match found {
             Found::Doubtful if copies >= 2 && !torn => Found::Sure,
             found => found,
@@ -145,15 +173,20 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// The last live block, sought among those of the newest boot.
-    async fn search_head(&mut self) -> Result<Option<u16>, LogError> {
-        let first = self.superblock.first_block.max(LOG_START);
+    fn search_head(&mut self) -> Result<Option<u16>, LogError> {
+        let begun = [self.superblock.first_block, self.superblock.block_before];
+        let [other, first] = [begun.iter().min(), begun.iter().max()].map(|block| *block.unwrap_or(&0));
+        let first = first.max(LOG_START);
         let end = self.chip.blocks();
-        let Some(mut low) = self.good(first..end) else {
+        let Some(mut low) = self.good(first..end)? else {
             return Ok(None);
         };
-        if !self.is_live(low).await? {
+        if !self.is_live(low)? {
+            if self.is_of_the_log(other) && self.is_live(other)? {
+                return Ok(Some(other));
+            }
             for block in (LOG_START.max(first.saturating_sub(LOOK_BACK))..first).rev() {
-                if !self.superblock.bad.contains(block) && self.is_live(block).await? {
+                if !self.superblock.bad.contains(block) && self.is_live(block)? {
                     return Ok(Some(block));
                 }
             }
@@ -161,32 +194,42 @@ impl<N: Nand> FlightLog<N> {
         }
         let (mut high, mut step) = (end, 1);
         // Twice as far each time, until a block is not live; then halfway between.
-        while let Some(block) = low.checked_add(step).and_then(|from| self.good(from..end)) {
-            if !self.is_live(block).await? {
+        while let Some(from) = low.checked_add(step) {
+            let Some(block) = self.good(from..end)? else { break };
+            if !self.is_live(block)? {
                 high = block;
                 break;
             }
             low = block;
             step = step.saturating_mul(2);
         }
-        while high - low > 1 {
-            let middle = low + (high - low) / 2;
-            match self.good(middle..high) {
-                Some(block) if self.is_live(block).await? => low = block,
+        while high.saturating_sub(low) > 1 {
+            let middle = low.midpoint(high);
+            match self.good(middle..high)? {
+                Some(block) if self.is_live(block)? => low = block,
                 _ => high = middle,
             }
         }
         Ok(Some(low))
     }
 
-    fn good(&self, mut blocks: core::ops::Range<u16>) -> Option<u16> {
-        blocks.find(|block| !self.superblock.bad.contains(*block))
+    /// The first of these blocks that is not known to be bad.
+    fn good(&mut self, blocks: core::ops::Range<u16>) -> Result<Option<u16>, LogError> {
+        for block in blocks {
+            // Where some are not remembered, the maker's mark tells.
+            let is_bad = self.superblock.bad.contains(block)
+                || self.superblock.bad.is_full() && (self.stamp(block, 0)?.1 || self.stamp(block, 1)?.1);
+            if !is_bad {
+                return Ok(Some(block));
+            }
+        }
+        Ok(None)
     }
 
     /// Looks at every block; the last one of the newest epoch. Without a superblock it makes a new one of what it finds.
     async fn scan(&mut self, superblock: bool) -> Result<Option<u16>, LogError> {
         let mut newest: Option<(u16, u16)> = None;
-        let mut foreign = false;
+        let (mut foreign, mut usable) = (false, false);
         for block in 0..self.chip.blocks() {
             if block % STRIDE == 0 {
                 yield_now().await;
@@ -194,16 +237,17 @@ impl<N: Nand> FlightLog<N> {
             if self.superblock.bad.contains(block) {
                 continue;
             }
-            let (mut stamp, marked) = self.stamp(block, 0).await?;
+            let (mut stamp, marked) = self.stamp(block, 0)?;
             if marked && !superblock {
-                self.superblock.bad.insert(block)?;
+                self.remember_bad(block);
                 continue;
             }
             if block < LOG_START {
                 continue;
             }
+            usable = true;
             if stamp == Stamp::Garbage {
-                stamp = self.stamp(block, 1).await?.0;
+                stamp = self.stamp(block, 1)?.0;
                 foreign |= stamp == Stamp::Garbage;
             }
             if let Stamp::Ours(tag) = stamp
@@ -212,6 +256,9 @@ impl<N: Nand> FlightLog<N> {
             {
                 newest = Some((tag.epoch, block));
             }
+        }
+        if !usable {
+            return Err(LogError::Worn);
         }
         let newest = newest.filter(|(epoch, _)| *epoch >= self.superblock.epoch);
         if let Some((epoch, _)) = newest {
@@ -231,8 +278,8 @@ impl<N: Nand> FlightLog<N> {
             if block % STRIDE == 0 {
                 yield_now().await;
             }
-            if self.stamp(block, 1).await?.1 {
-                self.superblock.bad.insert(block)?;
+            if self.stamp(block, 1)?.1 {
+                self.remember_bad(block);
             }
         }
         Ok(())
@@ -241,10 +288,22 @@ impl<N: Nand> FlightLog<N> {
     /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
     /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
     /// may be torn too. What they say of the mode counts if there is no superblock.
-    async fn find_newest(&mut self, head: u16) -> Result<(), LogError> {
+    fn find_newest(&mut self, head: u16) -> Result<(), LogError> {
         let mut newest = [record::Key::default(); 2];
+        // Two blocks may take turns, and which of them is newer need not be known.
+        let turns = [self.superblock.first_block, self.superblock.block_before];
+        for block in turns {
+            if self.is_of_the_log(block) {
+                self.find_newest_in(block, &mut newest)?;
+            }
+        }
+        let mut looked_at = 0_usize;
         for block in (head.saturating_sub(LOOK_BACK).max(LOG_START)..=head).rev() {
-            if !self.superblock.bad.contains(block) && self.find_newest_in(block, &mut newest).await? {
+            if self.superblock.bad.contains(block) {
+                continue;
+            }
+            looked_at = looked_at.wrapping_add(1);
+            if self.find_newest_in(block, &mut newest)? && looked_at >= turns.len() {
                 break;
             }
         }
@@ -259,13 +318,13 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Whether the search is over.
-    async fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
+    fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
         for page in (0..PAGES_PER_BLOCK).rev() {
             let at = PageAddress { block, page };
-            if self.stamp(block, page).await?.0 == Stamp::Blank {
+            if self.stamp(block, page)?.0 == Stamp::Blank {
                 continue;
             }
-            self.chip.read(at, &mut self.back).await?;
+            self.chip.read(at, &mut self.back)?;
             for (half, key) in self.whole_records().into_iter().enumerate() {
                 let Some(key) = key else { continue };
                 self.superblock.boot = self.superblock.boot.max(key.boot);
@@ -276,7 +335,7 @@ impl<N: Nand> FlightLog<N> {
                 if self.carried == 0 || key > newest[0] {
                     (self.second, self.last) = (self.last, *bytes);
                     *newest = [key, newest[0]];
-                    self.carried = (self.carried + 1).min(2);
+                    self.carried = if self.carried == 0 { 1 } else { 2 };
                 } else if key < newest[0] && (self.carried == 1 || key > newest[1]) {
                     self.second = *bytes;
                     newest[1] = key;

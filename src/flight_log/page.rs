@@ -22,7 +22,7 @@ use crc::{CRC_16_IBM_3740, Crc};
 
 use super::record::{RECORD_BYTES, RecordBytes};
 use crate::nand::{
-    MAIN_BYTES, PageAddress, PageBytes, SPARE_BYTES, SpareBytes,
+    PageAddress, PageBytes, SPARE_BYTES, SpareBytes,
     ecc::{self, Uncorrectable},
 };
 
@@ -78,9 +78,11 @@ const CODES: [usize; 2] = [0, 6];
 /// Writes both records and their codes into `page`; [`address`] makes it whole.
 pub fn compose(page: &mut PageBytes, a: &RecordBytes, b: &RecordBytes) {
     page.fill(0xFF);
-    for (half, record) in [a, b].into_iter().enumerate() {
-        page[half * RECORD_BYTES..][..RECORD_BYTES].copy_from_slice(record);
-        page[MAIN_BYTES + CODES[half]..][..3].copy_from_slice(&ecc::code(record));
+    let (halves, spare) = page.as_chunks_mut::<RECORD_BYTES>();
+    for ((half, record), at) in halves.iter_mut().zip([a, b]).zip(CODES) {
+        *half = *record;
+        let code = spare.iter_mut().skip(at).zip(ecc::code(record));
+        code.for_each(|(slot, byte)| *slot = byte);
     }
 }
 
@@ -93,8 +95,11 @@ pub fn address(page: &mut PageBytes, at: PageAddress, tag: Tag) {
     bytes[8] = version_and_kind(tag.kind);
     let crc = check(&bytes, at.page);
     bytes[6..8].copy_from_slice(&crc.to_le_bytes());
+    let (_, spare) = page.as_chunks_mut::<RECORD_BYTES>();
     for (column, byte) in TAG.into_iter().zip(bytes) {
-        page[MAIN_BYTES + column] = byte;
+        if let Some(slot) = spare.get_mut(column) {
+            *slot = byte;
+        }
     }
 }
 
@@ -141,15 +146,24 @@ pub fn is_blank(page: &PageBytes) -> bool {
 /// Puts both halves right; for each, how many bits were wrong.
 pub fn correct(page: &mut PageBytes) -> [Result<u32, Uncorrectable>; 2] {
     let (halves, spare) = page.as_chunks_mut::<RECORD_BYTES>();
-    core::array::from_fn(|half| {
-        let code = core::array::from_fn(|byte| spare[CODES[half] + byte]);
-        ecc::correct(&mut halves[half], code)
+    let code = |at: usize| {
+        spare
+            .get(at..)
+            .and_then(<[u8]>::first_chunk)
+            .copied()
+            .unwrap_or_default()
+    };
+    let mut halves = halves.iter_mut().zip(CODES);
+    core::array::from_fn(|_| match halves.next() {
+        Some((half, at)) => ecc::correct(half, code(at)),
+        None => Err(Uncorrectable),
     })
 }
 
 /// Half 0 or 1 of a page.
 pub fn record(page: &PageBytes, half: usize) -> &RecordBytes {
-    &page.as_chunks().0[half]
+    let (halves, _) = page.as_chunks();
+    halves.get(half).unwrap_or(&[0; RECORD_BYTES])
 }
 
 fn version_and_kind(kind: Kind) -> u8 {
@@ -157,11 +171,14 @@ fn version_and_kind(kind: Kind) -> u8 {
 }
 
 fn zeros(bytes: &[u8]) -> u32 {
-    bytes.iter().map(|byte| byte.count_zeros()).sum()
+    let each = bytes.iter().map(|byte| byte.count_zeros());
+    each.fold(0, u32::wrapping_add)
 }
 
 fn flipped(mut bytes: [u8; TAG.len()], bit: usize) -> [u8; TAG.len()] {
-    bytes[bit / 8] ^= 1 << (bit % 8);
+    if let Some(byte) = bytes.get_mut(bit / 8) {
+        *byte ^= 1 << (bit % 8);
+    }
     bytes
 }
 
@@ -182,7 +199,7 @@ fn check(bytes: &[u8; TAG.len()], page: u8) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nand::BAD_MARK;
+    use crate::nand::{BAD_MARK, MAIN_BYTES};
 
     const AT: PageAddress = PageAddress { block: 77, page: 9 };
     const TAG_OF_LOG: Tag = Tag {

@@ -338,11 +338,12 @@ fn rounded_up_to_cut(value: f32) -> f32 {
 }
 
 fn put(bytes: &mut RecordBytes, at: usize, field: &[u8]) {
-    bytes[at..at + field.len()].copy_from_slice(field);
+    let place = bytes.iter_mut().skip(at);
+    place.zip(field).for_each(|(slot, byte)| *slot = *byte);
 }
 
 fn take<const N: usize>(bytes: &RecordBytes, at: usize) -> [u8; N] {
-    core::array::from_fn(|offset| bytes[at + offset])
+    bytes.get(at..).and_then(<[u8]>::first_chunk).copied().unwrap_or([0; N])
 }
 
 /// A text as far as it is one.

@@ -10,8 +10,10 @@ pub struct Status {
     pub used: u32,
     /// Pages in all.
     pub capacity: u32,
-    /// Bad blocks.
+    /// Bad blocks that are remembered.
     pub bad_blocks: u16,
+    /// No other can be remembered: there may be more, which are found anew in each start.
+    pub more_bad_blocks: bool,
     /// Bits corrected since the start.
     pub corrected: u32,
     /// Half pages that were beyond correction since the start, torn ones included.
@@ -27,6 +29,6 @@ pub struct Status {
 impl Status {
     /// [min] until the log is full, at a record each `period_ms`.
     pub fn minutes_left(&self, period_ms: u64) -> u64 {
-        u64::from(self.capacity.saturating_sub(self.used)) * period_ms / 60_000
+        u64::from(self.capacity.saturating_sub(self.used)).saturating_mul(period_ms) / 60_000
     }
 }

@@ -2,28 +2,33 @@
 //!
 //! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
 //! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording), `6-7` epoch, `8-11` its own number,
-//! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-247` their numbers ascending,
-//! `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
+//! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-243` their numbers ascending,
+//! `244-245` the block with the newest records before that boot (0: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
 
 use heapless::Vec;
 
-use super::record::{CRC, RECORD_BYTES, RecordBytes};
+use super::{
+    LOG_START,
+    record::{CRC, RECORD_BYTES, RecordBytes},
+};
 
 /// The version this code writes and the newest it reads.
 pub const VERSION: u8 = 1;
 
-/// Bad blocks that fit: the data sheet allows 80 of 4096 over the chip's life.
+/// Bad blocks that fit: the data sheet allows 80 of 4096 over the chip's life. Of them places for the superblock's own
+/// blocks are kept free, which nothing but this list tells to be bad.
 pub const BAD_BLOCKS: usize = 112;
 
 const MAGIC: [u8; 4] = *b"eMSB";
 const CHECKED: usize = RECORD_BYTES - 4;
 const LIST: usize = 20;
+const BLOCK_BEFORE: usize = 244;
 
 /// Blocks that are not used, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BadBlocks(Vec<u16, BAD_BLOCKS>);
 
-/// There is no room for another bad block: the chip is beyond its specified life.
+/// There is no room to remember another bad block: the chip is beyond its specified life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyBadBlocks;
 
@@ -37,13 +42,20 @@ impl BadBlocks {
     pub fn insert(&mut self, block: u16) -> Result<(), TooManyBadBlocks> {
         match self.0.binary_search(&block) {
             Ok(_) => Ok(()),
+            Err(_) if block >= LOG_START && self.is_full() => Err(TooManyBadBlocks),
             Err(place) => self.0.insert(place, block).map_err(|_| TooManyBadBlocks),
         }
     }
 
+    /// Whether no other block of the log can be remembered.
+    pub fn is_full(&self) -> bool {
+        self.0.len() >= BAD_BLOCKS.saturating_sub(LOG_START.into())
+    }
+
     /// How many are in `blocks`.
     pub fn count(&self, blocks: core::ops::Range<u16>) -> u16 {
-        self.0.iter().filter(|block| blocks.contains(block)).count() as u16
+        let counted = self.0.iter().filter(|block| blocks.contains(block));
+        counted.fold(0, |count: u16, _| count.wrapping_add(1))
     }
 
     /// Their numbers, ascending.
@@ -63,6 +75,8 @@ pub struct Superblock {
     pub boot: u32,
     /// Where that boot began.
     pub first_block: u16,
+    /// The block with the newest records when it began; 0 for none.
+    pub block_before: u16,
     /// The unit is in FLIGHT.
     pub flight: bool,
     /// Packets are being recorded.
@@ -83,7 +97,10 @@ pub enum SuperblockError {
 /// Its 256 bytes.
 pub fn encode(superblock: &Superblock) -> RecordBytes {
     let mut bytes = [0; RECORD_BYTES];
-    let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
+    let mut put = |at: usize, field: &[u8]| {
+        let place = bytes.iter_mut().skip(at);
+        place.zip(field).for_each(|(slot, byte)| *slot = *byte);
+    };
     put(0, &MAGIC);
     put(
         4,
@@ -96,6 +113,7 @@ pub fn encode(superblock: &Superblock) -> RecordBytes {
     put(8, &superblock.number.to_le_bytes());
     put(12, &superblock.boot.to_le_bytes());
     put(16, &superblock.first_block.to_le_bytes());
+    put(BLOCK_BEFORE, &superblock.block_before.to_le_bytes());
     put(18, &(superblock.bad.0.len() as u16).to_le_bytes());
     for (index, block) in superblock.bad.0.iter().enumerate() {
         put(LIST + 2 * index, &block.to_le_bytes());
@@ -121,14 +139,17 @@ pub fn decode(bytes: &RecordBytes) -> Result<Superblock, SuperblockError> {
         return Err(SuperblockError::Damaged);
     }
     for index in 0..count {
-        bad.insert(word(LIST + 2 * index))
-            .map_err(|_| SuperblockError::Damaged)?;
+        let block = word(LIST + 2 * index);
+        if let Err(place) = bad.0.binary_search(&block) {
+            bad.0.insert(place, block).map_err(|_| SuperblockError::Damaged)?;
+        }
     }
     Ok(Superblock {
         number: long(8),
         epoch: word(6),
         boot: long(12),
         first_block: word(16),
+        block_before: word(BLOCK_BEFORE),
         flight: bytes[5] & 1 != 0,
         recording: bytes[5] & 2 != 0,
         bad,
@@ -149,6 +170,7 @@ mod tests {
             epoch: 5,
             boot: 0x0003_0004,
             first_block: 99,
+            block_before: 98,
             flight: true,
             recording: false,
             bad,
@@ -162,10 +184,15 @@ mod tests {
     }
 
     #[test]
-    fn a_full_list_of_bad_blocks_is_kept_and_refuses_another() {
+    fn a_full_list_of_bad_blocks_is_kept_and_refuses_another_of_the_log() {
         let mut full = superblock();
-        full.bad = BadBlocks(Vec::from_iter(0..BAD_BLOCKS as u16));
+        full.bad = BadBlocks(Vec::from_iter(LOG_START..BAD_BLOCKS as u16));
         assert_eq!(full.bad.insert(500), Err(TooManyBadBlocks));
+        assert_eq!(decode(&encode(&full)), Ok(full.clone()));
+        for home in 0..LOG_START {
+            assert_eq!(full.bad.insert(home), Ok(()));
+        }
+        assert_eq!(full.bad.as_slice().len(), BAD_BLOCKS);
         assert_eq!(decode(&encode(&full)), Ok(full));
     }
 

@@ -42,9 +42,9 @@ pub fn code(half: &[u8; HALF_BYTES]) -> Code {
 /// Puts right what can be put right; how many bits were wrong, the code's own included.
 pub fn correct(half: &mut [u8; HALF_BYTES], stored: Code) -> Result<u32, Uncorrectable> {
     let computed = code(half);
-    let differs = [0, 1, 2].map(|byte| stored[byte] ^ computed[byte]);
+    let [first, second, third] = [0, 1, 2].map(|byte: usize| stored[byte] ^ computed[byte]);
     // The lowest two bits of the third byte are no parities; they are written as ones and may flip unnoticed.
-    let syndrome = u32::from(differs[0]) << 14 | u32::from(differs[1]) << 6 | u32::from(differs[2] >> 2);
+    let syndrome = u32::from(first) << 14 | u32::from(second) << 6 | u32::from(third >> 2);
     // One wrong bit changes exactly one of the two parities of each of the eleven pairs.
     const EVEN: u32 = 0x15_5555;
     match syndrome {
@@ -68,10 +68,9 @@ fn odd(byte: u8) -> bool {
 /// Bit k of the byte at bit 2k.
 fn interleave(byte: u8) -> u16 {
     let mut spread = u16::from(byte);
-    for (shift, mask) in [(4, 0x0F0F), (2, 0x3333), (1, 0x5555)] {
-        spread = (spread | spread << shift) & mask;
-    }
-    spread
+    spread = (spread | spread << 4) & 0x0F0F;
+    spread = (spread | spread << 2) & 0x3333;
+    (spread | spread << 1) & 0x5555
 }
 
 /// Bit 2k of the word at bit k, eleven bits.

@@ -9,14 +9,18 @@
 //! | page to its register, tR | | 15 us | 1000 status reads |
 //! | program, tPROG | 200 us | 500 us | 5 ms |
 //! | erase, tBERS | 2 ms | 3 ms | 10 ms |
+//! | reset, tRST | | 5 us; 500 us out of an erase | 5 ms |
 //!
 //! (K9F1208U0M data sheet, AC characteristics.) A read is waited for in place: it is over before a sleep would be. The
-//! others are slept for. Refuses another identity, a part that stays busy, and to begin anything once the supply fails;
-//! write protection is lifted for the duration of a program or erase only.
+//! others are slept for. Refuses another identity, a part that stays busy, and to begin anything once the supply fails.
+//!
+//! Write protection is lifted for the duration of a program or erase only. Between WP# and the command stand 100 ns (tWW);
+//! the status read in that time (two latch cycles, 226 ns) has to say that the part is writable. WP# may be drawn at any
+//! time by who watches the supply: the part gives up what it was doing, its status says so, and that is no worn block.
 
 use embedded_hal_async::delay::DelayNs;
 
-use super::{K9F1208_BLOCKS, MAIN_BYTES, Nand, NandError, PAGES_PER_BLOCK, PageAddress, PageBytes, SpareBytes};
+use super::{K9F1208_BLOCKS, MAIN_BYTES, Nand, NandError, PageAddress, PageBytes, SpareBytes};
 
 /// The wires to the chip, one latch cycle a byte.
 pub trait NandBus {
@@ -51,19 +55,36 @@ mod command {
 const FAIL: u8 = 1 << 0;
 /// Status bit: ready.
 const READY: u8 = 1 << 6;
+/// Status bit: WP# is high.
+const WRITABLE: u8 = 1 << 7;
 
 /// Identities that this driver knows: maker, device.
 const KNOWN: [[u8; 2]; 2] = [[0xEC, 0x76], [0x20, 0x76]];
 
 /// Status reads that are waited for in place: each takes two latch cycles of some 60 ns, and tR is 15 us.
 const READ_POLLS: u32 = 1000;
-/// [us] limit of a program; twice the data sheet's would do, a chip at the end of its life takes longer.
-const PROGRAM_LIMIT_US: u32 = 5_000;
-/// [us] limit of an erase.
-const ERASE_LIMIT_US: u32 = 10_000;
-/// [us] what a program or erase takes at least, and then between two looks.
-const PROGRAM_SLEEP_US: u32 = 200;
-const ERASE_SLEEP_US: u32 = 500;
+
+/// How the end of an operation is waited for: so many looks, so far apart [us].
+struct Wait {
+    looks: u32,
+    apart_us: u32,
+}
+
+/// 5 ms; twice the data sheet's would do, a chip at the end of its life takes longer.
+const PROGRAM: Wait = Wait {
+    looks: 25,
+    apart_us: 200,
+};
+/// 10 ms.
+const ERASE: Wait = Wait {
+    looks: 20,
+    apart_us: 500,
+};
+/// 5 ms: as long as whatever is given up.
+const RESET: Wait = Wait {
+    looks: 25,
+    apart_us: 200,
+};
 
 /// A chip on a bus.
 pub struct K9f1208<B, D> {
@@ -87,7 +108,8 @@ impl<B: NandBus, D: DelayNs> K9f1208<B, D> {
         self.bus.command(command::READ_STATUS);
         let mut status = [0];
         self.bus.read(&mut status);
-        status[0]
+        let [status] = status;
+        status
     }
 
     /// Waits in place until a page is in the chip's register, and turns its output back from status to data.
@@ -101,28 +123,49 @@ impl<B: NandBus, D: DelayNs> K9f1208<B, D> {
         Err(NandError::Timeout)
     }
 
-    /// Sleeps until a program or erase is over.
-    async fn done(&mut self, sleep_us: u32, limit_us: u32) -> Result<(), NandError> {
-        for _ in 0..limit_us / sleep_us {
-            self.delay.delay_us(sleep_us).await;
+    /// Sleeps until the part is ready; its status.
+    async fn ready(&mut self, wait: Wait) -> Result<u8, NandError> {
+        for _ in 0..wait.looks {
+            self.delay.delay_us(wait.apart_us).await;
             let status = self.status();
             if status & READY != 0 {
-                return if status & FAIL == 0 {
-                    Ok(())
-                } else {
-                    Err(NandError::Failed)
-                };
+                return Ok(status);
             }
         }
         Err(NandError::Timeout)
     }
 
-    fn may_change(&mut self) -> Result<(), NandError> {
+    /// Sleeps until a program or erase is over, protects, and says what came of it.
+    async fn done(&mut self, wait: Wait) -> Result<(), NandError> {
+        let status = self.ready(wait).await;
+        self.bus.protect(true);
+        let status = status?;
+        if status & WRITABLE == 0 || !self.bus.power_good() {
+            // Given up half-way, or nobody knows: a block is not worn because the supply failed.
+            return Err(NandError::PowerFailing);
+        }
+        if status & FAIL == 0 {
+            Ok(())
+        } else {
+            Err(NandError::Failed)
+        }
+    }
+
+    /// Lifts write protection while the supply is good.
+    fn lift_protection(&mut self) -> Result<(), NandError> {
         if !self.bus.power_good() {
             return Err(NandError::PowerFailing);
         }
         self.bus.protect(false);
-        Ok(())
+        if self.status() & WRITABLE != 0 {
+            return Ok(());
+        }
+        self.bus.protect(true);
+        Err(if self.bus.power_good() {
+            NandError::Protected
+        } else {
+            NandError::PowerFailing
+        })
     }
 }
 
@@ -134,25 +177,20 @@ impl<B: NandBus, D: DelayNs> Nand for K9f1208<B, D> {
     async fn identify(&mut self) -> Result<(), NandError> {
         self.bus.protect(true);
         self.bus.command(command::RESET);
-        // An interrupted erase takes up to 500 us to be given up (tRST).
-        self.delay.delay_us(PROGRAM_SLEEP_US).await;
+        // While it resets it takes no other command, and would be taken for another part.
+        self.ready(RESET).await?;
         self.bus.command(command::READ_ID);
         self.bus.address(0);
         let mut id = [0; 2];
         self.bus.read(&mut id);
-        if !KNOWN.contains(&id) {
-            return Err(NandError::WrongId(id));
+        if KNOWN.contains(&id) {
+            Ok(())
+        } else {
+            Err(NandError::WrongId(id))
         }
-        self.done(PROGRAM_SLEEP_US, PROGRAM_LIMIT_US)
-            .await
-            .or_else(|error| match error {
-                // What an operation before the reset came to is of no interest.
-                NandError::Failed => Ok(()),
-                error => Err(error),
-            })
     }
 
-    async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
+    fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
         self.bus.command(command::READ_MAIN);
         self.bus.address(0);
         self.row(at.row());
@@ -161,7 +199,7 @@ impl<B: NandBus, D: DelayNs> Nand for K9f1208<B, D> {
         Ok(())
     }
 
-    async fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
+    fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
         self.bus.command(command::READ_SPARE);
         self.bus.address(0);
         self.row(at.row());
@@ -171,26 +209,22 @@ impl<B: NandBus, D: DelayNs> Nand for K9f1208<B, D> {
     }
 
     async fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Result<(), NandError> {
-        self.may_change()?;
+        self.lift_protection()?;
         self.bus.command(command::READ_MAIN);
         self.bus.command(command::PROGRAM);
         self.bus.address(0);
         self.row(at.row());
         self.bus.write(bytes);
         self.bus.command(command::PROGRAM_CONFIRM);
-        let done = self.done(PROGRAM_SLEEP_US, PROGRAM_LIMIT_US).await;
-        self.bus.protect(true);
-        done
+        self.done(PROGRAM).await
     }
 
     async fn erase(&mut self, block: u16) -> Result<(), NandError> {
-        self.may_change()?;
+        self.lift_protection()?;
         self.bus.command(command::ERASE);
-        self.row(u32::from(block) * u32::from(PAGES_PER_BLOCK));
+        self.row(PageAddress { block, page: 0 }.row());
         self.bus.command(command::ERASE_CONFIRM);
-        let done = self.done(ERASE_SLEEP_US, ERASE_LIMIT_US).await;
-        self.bus.protect(true);
-        done
+        self.done(ERASE).await
     }
 }
 

@@ -194,11 +194,7 @@ impl<N: Nand> Recorder<'_, N> {
         }
         let used = self.log.status().used;
         let ended = next >= end.min(used);
-        let read = if ended {
-            Ok([None, None])
-        } else {
-            self.log.read(next).await
-        };
+        let read = if ended { Ok([None, None]) } else { self.log.read(next) };
         let mut state = self.shared.state.borrow_mut();
         // A command may have ended or restarted the dump while the page was read.
         if state.task != (Task::Dump { next, end }) {

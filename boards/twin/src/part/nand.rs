@@ -54,6 +54,8 @@ pub enum Break {
     MarkedBad(u16),
     /// The mark's column of a good block was programmed.
     MarkWritten(PageAddress),
+    /// A program or erase was commanded sooner after WP# rose than tWW.
+    WritableTooShort,
 }
 
 /// One block.

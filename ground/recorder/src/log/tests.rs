@@ -117,7 +117,7 @@ fn a_dump_gives_what_the_image_gives() {
     block_on(async {
         log.mount().await.expect("mounts");
         for number in 0..log.status().used {
-            for record in log.read(number).await.expect("reads").into_iter().flatten() {
+            for record in log.read(number).expect("reads").into_iter().flatten() {
                 stream.extend(record::packet(record).into_iter().flatten());
                 stream.extend(dump::encode(number, record));
             }

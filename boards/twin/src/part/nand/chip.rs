@@ -34,13 +34,13 @@ impl Nand for Cells {
         self.answers()
     }
 
-    async fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
+    fn read(&mut self, at: PageAddress, bytes: &mut PageBytes) -> Result<(), NandError> {
         self.answers()?;
         *bytes = Cells::read(self, at);
         Ok(())
     }
 
-    async fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
+    fn read_spare(&mut self, at: PageAddress, bytes: &mut SpareBytes) -> Result<(), NandError> {
         self.answers()?;
         bytes.copy_from_slice(&Cells::read_spare(self, at)[MAIN_BYTES..]);
         Ok(())

@@ -6,7 +6,7 @@
 
 use emems::nand::{MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes};
 
-use super::{Cells, ERASE, Outcome, PROGRAM, READ, TEARS, Tear};
+use super::{Break, Cells, ERASE, Outcome, PROGRAM, READ, TEARS, Tear};
 use crate::part::Nanos;
 
 /// Maker and device code.
@@ -14,8 +14,8 @@ const ID: [u8; 2] = [0xEC, 0x76];
 const READY: u8 = 0x40;
 const NOT_PROTECTED: u8 = 0x80;
 const FAIL: u8 = 0x01;
-/// [ns] to give up what it was doing.
-const RESET: Nanos = 5_000;
+/// [ns] WP# high before a program or erase command, tWW at least.
+const WRITABLE_AFTER: Nanos = 100;
 
 /// What data cycles give.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -35,6 +35,17 @@ enum Work {
     Erase(u16),
 }
 
+impl Work {
+    /// [ns] to give it up, tRST at most.
+    fn reset(&self) -> Nanos {
+        match self {
+            Work::Nothing | Work::Read(_) => 5_000,
+            Work::Program(..) => 10_000,
+            Work::Erase(_) => 500_000,
+        }
+    }
+}
+
 /// The part.
 #[derive(Clone)]
 pub struct K9f1208 {
@@ -51,6 +62,8 @@ pub struct K9f1208 {
     busy_until: Nanos,
     failed: bool,
     protected: bool,
+    /// When WP# went high.
+    writable_since: Nanos,
 }
 
 impl K9f1208 {
@@ -68,6 +81,7 @@ impl K9f1208 {
             busy_until: 0,
             failed: false,
             protected: true,
+            writable_since: 0,
         }
     }
 
@@ -76,8 +90,10 @@ impl K9f1208 {
     pub fn protect(&mut self, on: bool, now: Nanos) {
         self.settle(now);
         if on && self.busy(now) {
-            self.tear(now, Tear::Half);
-            self.busy_until = now;
+            self.give_up(now);
+        }
+        if self.protected && !on {
+            self.writable_since = now;
         }
         self.protected = on;
     }
@@ -92,6 +108,9 @@ impl K9f1208 {
         self.settle(now);
         if self.busy(now) && !matches!(byte, 0x70 | 0xFF) {
             return;
+        }
+        if matches!(byte, 0x80 | 0x60) && !self.protected && now < self.writable_since + WRITABLE_AFTER {
+            self.cells.breaks.push(Break::WritableTooShort);
         }
         match byte {
             0x00 | 0x01 | 0x50 => {
@@ -124,10 +143,9 @@ impl K9f1208 {
             }
             0xFF => {
                 // Given up half-way, it is as torn as by a power cut.
-                self.tear(now, Tear::Half);
+                self.give_up(now);
                 self.output = Output::Nothing;
                 self.failed = false;
-                self.busy_until = now + RESET;
             }
             _ => {}
         }
@@ -231,6 +249,16 @@ impl K9f1208 {
             Work::Erase(block) => self.cells.erase(block),
         };
         self.failed = outcome == Outcome::Failed;
+    }
+
+    /// Leaves what is under way half done, and is busy with that for a while. Asked again meanwhile, it takes no longer.
+    fn give_up(&mut self, now: Nanos) {
+        let reset = self.work.reset();
+        let giving_up = matches!(self.work, Work::Nothing) && now < self.busy_until;
+        self.tear(now, Tear::Half);
+        if !giving_up {
+            self.busy_until = now + reset;
+        }
     }
 
     fn tear(&mut self, now: Nanos, tear: Tear) {

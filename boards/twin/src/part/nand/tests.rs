@@ -1,6 +1,6 @@
-use emems::nand::Nand;
-
 use super::*;
+
+mod driver;
 
 const AT: PageAddress = PageAddress { block: 3, page: 0 };
 const NEXT: PageAddress = PageAddress { block: 3, page: 1 };
@@ -99,89 +99,4 @@ fn worn_blocks_fail_aloud_or_in_silence() {
     assert_eq!(cells.erase(3), Outcome::Done);
     assert_eq!(cells.program(AT, &page(0)), Outcome::Done);
     assert_eq!(cells.read(AT), [0xFF; PAGE_BYTES]);
-}
-
-#[test]
-fn the_chip_behind_its_latches_is_the_chip() {
-    use emems::nand::k9f1208::{self, NandBus};
-    /// Every cycle takes its time, and so does a wait.
-    struct Pins {
-        part: latch::K9f1208,
-        now: Nanos,
-    }
-    struct Wires<'a>(&'a std::cell::RefCell<Pins>);
-    impl NandBus for Wires<'_> {
-        fn command(&mut self, byte: u8) {
-            self.0.borrow_mut().tick().command(byte);
-        }
-        fn address(&mut self, byte: u8) {
-            self.0.borrow_mut().tick().address(byte);
-        }
-        fn write(&mut self, bytes: &[u8]) {
-            bytes.iter().for_each(|byte| self.0.borrow_mut().tick().write(*byte));
-        }
-        fn read(&mut self, bytes: &mut [u8]) {
-            bytes
-                .iter_mut()
-                .for_each(|byte| *byte = self.0.borrow_mut().tick().read());
-        }
-        fn protect(&mut self, on: bool) {
-            let mut pins = self.0.borrow_mut();
-            let now = pins.now;
-            pins.part.protect(on, now);
-        }
-        fn power_good(&mut self) -> bool {
-            true
-        }
-    }
-    impl Pins {
-        fn tick(&mut self) -> &mut Self {
-            self.now += CYCLE;
-            self
-        }
-        fn command(&mut self, byte: u8) {
-            self.part.command(byte, self.now);
-        }
-        fn address(&mut self, byte: u8) {
-            self.part.address(byte, self.now);
-        }
-        fn write(&mut self, byte: u8) {
-            self.part.write(byte, self.now);
-        }
-        fn read(&mut self) -> u8 {
-            self.part.read(self.now)
-        }
-    }
-    struct Wait<'a>(&'a std::cell::RefCell<Pins>);
-    impl embedded_hal_async::delay::DelayNs for Wait<'_> {
-        async fn delay_ns(&mut self, ns: u32) {
-            self.0.borrow_mut().now += Nanos::from(ns);
-        }
-    }
-    let pins = std::cell::RefCell::new(Pins {
-        part: latch::K9f1208::new(Cells::new(4096, &[], 1)),
-        now: 0,
-    });
-    let mut chip = k9f1208::K9f1208::new(Wires(&pins), Wait(&pins));
-    let far = PageAddress { block: 4000, page: 31 };
-    embassy_futures::block_on(async {
-        assert_eq!(chip.identify().await, Ok(()));
-        assert_eq!(chip.erase(4000).await, Ok(()));
-        assert_eq!(chip.program(far, &page(0x3C)).await, Ok(()));
-        let (mut whole, mut spare) = ([0; PAGE_BYTES], [0; 16]);
-        assert_eq!(chip.read(far, &mut whole).await, Ok(()));
-        assert_eq!(whole, page(0x3C));
-        assert_eq!(chip.read_spare(far, &mut spare).await, Ok(()));
-        assert_eq!(spare, page(0x3C)[MAIN_BYTES..]);
-    });
-    assert_eq!(pins.borrow_mut().part.cells.read(far), page(0x3C));
-    pins.borrow_mut().part.cells.befalls.dead = true;
-    embassy_futures::block_on(async {
-        let before = pins.borrow().now;
-        assert_eq!(chip.erase(4000).await, Err(emems::nand::NandError::Timeout));
-        assert!(
-            pins.borrow().now - before <= 11_000_000,
-            "an erase is given up after 10 ms"
-        );
-    });
 }
