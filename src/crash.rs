@@ -51,11 +51,9 @@ pub struct CrashRecord {
 impl CrashRecord {
     /// A record with the tail of `place` that fits, cut at a character boundary.
     pub fn new(cause: CrashCause, at: u32, lr: u32, cfsr: u32, uptime_us: u64, place: &str) -> Self {
-        let mut from = place.len().saturating_sub(PLACE_BYTES);
-        while !place.is_char_boundary(from) {
-            from += 1;
-        }
-        let place = String::try_from(place.get(from..).unwrap_or("")).unwrap_or_default();
+        let first = place.len().saturating_sub(PLACE_BYTES);
+        let tail = (first..=place.len()).find_map(|from| place.get(from..)).unwrap_or("");
+        let place = String::try_from(tail).unwrap_or_default();
         CrashRecord {
             cause,
             at,
@@ -92,7 +90,9 @@ impl CrashRecord {
         bytes[12..16].copy_from_slice(&self.lr.to_le_bytes());
         bytes[16..20].copy_from_slice(&self.cfsr.to_le_bytes());
         bytes[20..28].copy_from_slice(&self.uptime_us.to_le_bytes());
-        bytes[PLACE..PLACE + self.place.len()].copy_from_slice(self.place.as_bytes());
+        for (slot, byte) in bytes[PLACE..CHECKED].iter_mut().zip(self.place.bytes()) {
+            *slot = byte;
+        }
         let crc = CRC.checksum(&bytes[..CHECKED]);
         bytes[CHECKED..].copy_from_slice(&crc.to_le_bytes());
         bytes

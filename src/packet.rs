@@ -151,17 +151,19 @@ pub fn expected_at(at: usize) -> Expected {
 
 fn put(packet: &mut [u8; PACKET_BYTES], at: usize, codes: &[i16]) {
     for (index, code) in codes.iter().enumerate() {
-        put_word(packet, at + 4 * index, *code as u16);
+        put_word(packet, at.wrapping_add(4 * index), *code as u16);
     }
 }
 
 fn put_word(packet: &mut [u8; PACKET_BYTES], at: usize, value: u16) {
-    packet[at..at + 4].copy_from_slice(&hex_digits(value));
+    if let Some(digits) = packet.get_mut(at..).and_then(<[u8]>::first_chunk_mut) {
+        *digits = hex_digits(value);
+    }
 }
 
 /// The four upper-case digits of a word.
 pub(crate) fn hex_digits(value: u16) -> [u8; 4] {
-    [12, 8, 4, 0].map(|shift| b"0123456789ABCDEF"[usize::from(value >> shift & 0xF)])
+    [value >> 12, value >> 8, value >> 4, value].map(|digit| b"0123456789ABCDEF"[usize::from(digit & 0xF)])
 }
 
 /// The value of an upper-case digit.
@@ -175,7 +177,8 @@ pub(crate) fn hex_value(digit: u8) -> Option<u16> {
 
 /// The word at an offset whose four digits have been checked.
 fn word(bytes: &[u8], at: usize) -> u16 {
-    bytes[at..at + 4]
+    let digits = bytes.get(at..).and_then(<[u8]>::first_chunk::<4>).unwrap_or(b"0000");
+    digits
         .iter()
         .fold(0, |value, digit| value << 4 | hex_value(*digit).unwrap_or(0))
 }

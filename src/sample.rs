@@ -43,7 +43,7 @@ impl fmt::Display for Sensor {
             Kind::Gyro => "gyro",
             Kind::Thermometer => "thermometer",
         };
-        write!(f, "{kind} {}", self.plate + 1)
+        write!(f, "{kind} {}", self.plate.wrapping_add(1))
     }
 }
 

@@ -63,7 +63,14 @@ impl Set {
         let mut beyond_c = 0.0;
         let mut above_c = |at_c: Option<f32>| {
             let at_c = at_c.unwrap_or(self.reference_c);
-            let valid_c = at_c.clamp(self.lowest_c, self.highest_c);
+            // Not `clamp`, which panics where the ends are not in order, and brings the formatting of floats into the image.
+            let valid_c = if at_c < self.lowest_c {
+                self.lowest_c
+            } else if at_c > self.highest_c {
+                self.highest_c
+            } else {
+                at_c
+            };
             // A sum: eight comparisons cost more.
             beyond_c += (valid_c - at_c).abs();
             valid_c - self.reference_c
@@ -115,8 +122,9 @@ fn values(axes: &[Axis], counts: &[i16], above_c: &[f32; PLATES], ends: &Ends, v
     for (((axes, counts), values), above_c) in plates.zip(values.chunks_exact_mut(a_plate)).zip(above_c) {
         for ((axis, &counts), value) in axes.iter().zip(counts).zip(values) {
             // Between the ends in one comparison.
-            let inside = counts.wrapping_sub(ends.least + 1) as u16;
-            if inside < ends.most.wrapping_sub(ends.least + 1) as u16 {
+            let first = ends.least.wrapping_add(1);
+            let inside = counts.wrapping_sub(first) as u16;
+            if inside < ends.most.wrapping_sub(first) as u16 {
                 seen.present |= bit;
                 *value = axis.value(counts, *above_c);
             } else if counts == ends.least || counts == ends.most || counts == ends.overflow {

@@ -32,14 +32,14 @@ impl Channel {
 
     /// Plate it is on, 0 to 3.
     pub fn plate(self) -> usize {
-        let k = usize::from(self.0 - first(self.kind()));
+        let k = usize::from(self.0.wrapping_sub(first(self.kind())));
         if self.kind() == Kind::Gyro { k } else { k / 3 }
     }
 }
 
 impl fmt::Display for Channel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let plate = self.plate() + 1;
+        let plate = self.plate().wrapping_add(1);
         let axis = ["x", "y", "z"][usize::from(self.0) % 3];
         match self.kind() {
             Kind::Accelerometer => write!(f, "accelerometer {plate} {axis}"),

@@ -166,11 +166,11 @@ fn conditions(set: &Set) -> Result<(), Refusal> {
         }
     }
     for plate in 0..PLATES {
-        let others = [1, 2, 3].map(|step| &set.gyro[(plate + step) % PLATES]);
+        let others = [1, 2, 3].map(|step: usize| &set.gyro[plate.wrapping_add(step) % PLATES]);
         spans(
             Sensor {
                 kind: Kind::Gyro,
-                plate: (plate + 1) % PLATES,
+                plate: plate.wrapping_add(1) % PLATES,
             },
             others,
         )?;

@@ -38,7 +38,7 @@ impl Held {
             return;
         }
         self.doubted_for = if self.doubted_for > 0 && near(self.doubted_c) {
-            self.doubted_for + 1
+            self.doubted_for.saturating_add(1)
         } else {
             1
         };

@@ -229,7 +229,7 @@ impl<SPI: SpiDevice<u16>, D: DelayNs> Adis16265<SPI, D> {
     /// Writes the low (0) or high (1) byte of a register. What the next frame answers is not defined.
     async fn write(&mut self, register: Register, byte: u16, value: u8) -> Result<(), Error<SPI::Error>> {
         self.stall.delay_us(STALL_US).await;
-        let address = (u16::from(register.address) + byte) << 8;
+        let address = u16::from(register.address).wrapping_add(byte) << 8;
         self.frame(register, WRITE | address | u16::from(value))
             .await
             .map(|_| ())
@@ -243,7 +243,8 @@ impl<SPI: SpiDevice<u16>, D: DelayNs> Adis16265<SPI, D> {
             .transfer_in_place(&mut words)
             .await
             .map_err(|e| Error::Bus(register, e))?;
-        Ok(words[0])
+        let [word] = words;
+        Ok(word)
     }
 }
 

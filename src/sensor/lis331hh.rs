@@ -189,7 +189,8 @@ impl<I2C: I2c> Lis331hh<I2C> {
             *sample = self.read().await?.counts;
         }
         let [[x0, y0, z0], [x, y, z]] = samples;
-        Ok([x - x0, y - y0, z - z0])
+        // Twelve bits each: no difference overflows.
+        Ok([x.wrapping_sub(x0), y.wrapping_sub(y0), z.wrapping_sub(z0)])
     }
 
     async fn read_from(&mut self, first: Register, bytes: &mut [u8]) -> Result<(), Error<I2C::Error>> {

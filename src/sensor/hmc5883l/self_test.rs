@@ -28,7 +28,7 @@ fn limits(gain: Gain, bias: Bias) -> (i16, i16) {
     let scaled = |counts: i32| (counts * i32::from(gain.counts_per_gauss()) / 390) as i16;
     match bias {
         Bias::Positive => (scaled(weak), scaled(strong)),
-        Bias::Negative => (-scaled(strong), -scaled(weak)),
+        Bias::Negative => (scaled(-strong), scaled(-weak)),
     }
 }
 
