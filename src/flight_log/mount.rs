@@ -317,8 +317,9 @@ impl<N: Nand> FlightLog<N> {
         Ok(())
     }
 
-    /// Whether the search is over.
+    /// Whether this block gave two by itself.
     fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
+        let (mut first_here, mut two_here) = (None, false);
         for page in (0..PAGES_PER_BLOCK).rev() {
             let at = PageAddress { block, page };
             if self.stamp(block, page)?.0 == Stamp::Blank {
@@ -332,6 +333,7 @@ impl<N: Nand> FlightLog<N> {
                 if !record::is_packet(bytes) {
                     continue;
                 }
+                two_here |= *first_here.get_or_insert(key) != key;
                 if self.carried == 0 || key > newest[0] {
                     (self.second, self.last) = (self.last, *bytes);
                     *newest = [key, newest[0]];
@@ -342,7 +344,7 @@ impl<N: Nand> FlightLog<N> {
                     self.carried = 2;
                 }
             }
-            if self.carried == 2 && page >= COPIES_OF_OLDER {
+            if two_here && page >= COPIES_OF_OLDER {
                 return Ok(true);
             }
         }

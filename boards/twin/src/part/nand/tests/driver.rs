@@ -114,7 +114,7 @@ fn a_chip_that_stays_busy_is_given_up_in_5_ms_and_an_erase_in_10() {
     let mut chip = driver(&pins);
     assert_eq!(block_on(chip.identify()), Ok(()));
     pins.borrow_mut().part.cells.befalls.dead = true;
-    let mut took = |limit: Nanos, work: &mut dyn FnMut() -> Result<(), NandError>| {
+    let took = |limit: Nanos, work: &mut dyn FnMut() -> Result<(), NandError>| {
         let before = pins.borrow().now;
         assert_eq!(work(), Err(NandError::Timeout));
         let took = pins.borrow().now - before;
