@@ -76,6 +76,8 @@ pub struct Quality {
     pub bias: f64,
     /// Which flight of these parts: they are the same in each, and their noise is another.
     pub flight: u64,
+    /// [1] by what part the periods of their clocks are off, standard deviation.
+    pub clock: f64,
 }
 
 impl Quality {
@@ -84,16 +86,25 @@ impl Quality {
         noise: 1.0,
         bias: 1.0,
         flight: 0,
+        clock: 0.0,
+    };
+    /// As the parts are, and each with its own clock: the data sheet of the ADIS16265 gives its sample rate to 3 % (Table 1),
+    /// those of the others give none. Over minutes every age passes between two conversions.
+    pub const FREE_CLOCKS: Quality = Quality {
+        clock: 0.01,
+        ..Quality::NOMINAL
     };
     /// Parts without noise or bias, for tests of everything else.
     pub const IDEAL: Quality = Quality {
         noise: 0.0,
         bias: 0.0,
         flight: 0,
+        clock: 0.0,
     };
 
     fn draw<const N: usize>(self, spread: Spread, stream: Noise) -> Specimen<N> {
-        Specimen::draw(stream, spread.noise * self.noise, spread.bias * self.bias, self.flight)
+        let specimen = Specimen::draw(stream, spread.noise * self.noise, spread.bias * self.bias, self.flight);
+        specimen.off_pace(stream, self.clock)
     }
 }
 

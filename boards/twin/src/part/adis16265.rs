@@ -72,7 +72,7 @@ impl Adis16265 {
     /// A part powered at time 0.
     pub fn new(measurand: Measurand) -> Self {
         let mut part = Adis16265 {
-            converter: Converter::start(0, measurand.rate_specimen.phase, 0, None),
+            converter: Converter::start(0, measurand.rate_specimen.pace, 0, None),
             measurand,
             registers: [0; END as usize / 2],
             new_data: [false; 3],
@@ -148,7 +148,7 @@ impl Adis16265 {
         let written = u16::from_le_bytes(bytes) & !cleared;
         *self.register(register) = written;
         if address == SMPL_PRD {
-            self.converter = Converter::start(written, self.measurand.rate_specimen.phase, now, Some(held));
+            self.converter = Converter::start(written, self.measurand.rate_specimen.pace, now, Some(held));
         }
     }
 }
@@ -204,7 +204,7 @@ impl SpiPart for Adis16265 {
         ] {
             *self.register(address) = default;
         }
-        self.converter = Converter::start(0x0007, self.measurand.rate_specimen.phase, now, None);
+        self.converter = Converter::start(0x0007, self.measurand.rate_specimen.pace, now, None);
         self.new_data = [false; 3];
         self.answers_from = now.saturating_add(START_UP_NS);
         self.frame = Frame::Empty;

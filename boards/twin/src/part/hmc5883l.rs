@@ -177,7 +177,7 @@ impl Hmc5883l {
         self.ready = false;
         self.activity = match self.mode & 3 {
             0 => {
-                let clock = ConversionClock::new(PERIOD_NS[usize::from(self.cra >> 2 & 7)], self.specimen.phase);
+                let clock = ConversionClock::paced(PERIOD_NS[usize::from(self.cra >> 2 & 7)], self.specimen.pace);
                 let latest = clock.latest(now.saturating_add(MEASUREMENT_NS));
                 Activity::Continuous { clock, latest }
             }

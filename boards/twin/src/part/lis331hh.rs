@@ -122,7 +122,7 @@ impl Lis331hh {
         match address {
             // PM and DR.
             CTRL_REG1 if (value ^ before) & 0xF8 != 0 => {
-                self.converter = Converter::start(value, self.register(CTRL_REG2), self.specimen.phase, now);
+                self.converter = Converter::start(value, self.register(CTRL_REG2), self.specimen.pace, now);
             }
             CTRL_REG2 => {
                 if let Some(converter) = &mut self.converter {

@@ -60,7 +60,7 @@ mod testing {
         /// No bias, no noise, conversions at whole periods.
         pub fn ideal() -> Self {
             let mut specimen = Specimen::draw(Noise::new(0), 0.0, 0.0, 0);
-            specimen.phase = 0.0;
+            specimen.pace.phase = 0.0;
             specimen
         }
     }

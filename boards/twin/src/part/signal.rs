@@ -25,6 +25,15 @@ pub fn seconds(instant_ns: i64) -> f64 {
     instant_ns as f64 * 1e-9
 }
 
+/// How a specimen's clock runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// [periods] phase at the unit's power-on.
+    pub phase: f64,
+    /// [1] its periods over the nominal ones.
+    pub stretch: f64,
+}
+
 /// A part's own free-running clock: conversion `k` is complete at `k` periods and a phase after the unit's power-on.
 #[derive(Clone, Copy, Debug)]
 pub struct ConversionClock {
@@ -33,6 +42,11 @@ pub struct ConversionClock {
 }
 
 impl ConversionClock {
+    /// A part's clock of nominally `period_ns`.
+    pub fn paced(period_ns: u64, pace: Pace) -> Self {
+        ConversionClock::new((period_ns as f64 * pace.stretch).round() as u64, pace.phase)
+    }
+
     /// `period_ns` at least 1; `phase` in periods.
     pub fn new(period_ns: u64, phase: f64) -> Self {
         let period_ns = signed(period_ns).max(1);
@@ -149,8 +163,8 @@ impl Noise {
 /// What one specimen of a part has of its own: the phase of its clock, a constant bias and white noise on each axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Specimen<const N: usize> {
-    /// [periods] phase of its conversion clock.
-    pub phase: f64,
+    /// Its conversion clock.
+    pub pace: Pace,
     /// [unit of the quantity] added to every conversion.
     pub bias: SVector<f64, N>,
     sigma: f64,
@@ -158,12 +172,21 @@ pub struct Specimen<const N: usize> {
 }
 
 impl<const N: usize> Specimen<N> {
+    /// With a clock whose period is off by a part drawn with this standard deviation.
+    pub fn off_pace(mut self, stream: Noise, clock_sigma: f64) -> Self {
+        self.pace.stretch += clock_sigma * stream.stream(3).normal(0);
+        self
+    }
+
     /// Draws one. `sigma` and `bias_sigma` are standard deviations in the unit of the quantity; the same specimen has another
     /// noise in each `flight`.
     pub fn draw(stream: Noise, sigma: f64, bias_sigma: f64, flight: u64) -> Self {
         let [phases, biases, noises] = [0, 1, 2].map(|index| stream.stream(index));
         Specimen {
-            phase: phases.uniform(0),
+            pace: Pace {
+                phase: phases.uniform(0),
+                stretch: 1.0,
+            },
             bias: SVector::from_fn(|axis, _| bias_sigma * biases.normal(axis as u64)),
             sigma,
             axes: core::array::from_fn(|axis| noises.stream(flight * N as u64 + axis as u64)),

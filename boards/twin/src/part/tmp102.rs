@@ -53,7 +53,7 @@ impl Tmp102 {
     pub fn new(temperature_c: Input<f64>, specimen: Specimen<1>) -> Self {
         let mut part = Tmp102 {
             temperature_c,
-            clock: ConversionClock::new(PERIOD_NS[2], specimen.phase),
+            clock: ConversionClock::paced(PERIOD_NS[2], specimen.pace),
             specimen,
             registers: [0; 4],
             pointer: 0,
@@ -96,7 +96,7 @@ impl Tmp102 {
         let one_shot = (value & ONE_SHOT != 0 && value & SHUTDOWN != 0).then(|| now.saturating_add(CONVERSION_NS));
         self.one_shot = one_shot.or(self.one_shot.filter(|_| value & SHUTDOWN != 0));
         self.registers[CONFIGURATION] = RESOLUTION | value & WRITABLE;
-        self.clock = ConversionClock::new(PERIOD_NS[usize::from(value >> 6 & 3)], self.specimen.phase);
+        self.clock = ConversionClock::paced(PERIOD_NS[usize::from(value >> 6 & 3)], self.specimen.pace);
         self.since = now.saturating_add(CONVERSION_NS);
     }
 

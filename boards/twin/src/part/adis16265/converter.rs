@@ -8,7 +8,7 @@ use nalgebra::Vector1;
 
 use super::super::{
     Input, Nanos,
-    signal::{ConversionClock, LowPass, Specimen, quantise, seconds},
+    signal::{ConversionClock, LowPass, Pace, Specimen, quantise, seconds},
 };
 
 /// [s] of the unit's nominal 12.7 Hz bandwidth.
@@ -29,7 +29,7 @@ pub struct Measurand {
     pub rate: Input<f64>,
     /// [degC] of the part.
     pub temperature_c: Input<f64>,
-    /// Of the gyro; its phase is that of the sample clock.
+    /// Of the gyro; its pace is that of the sample clock.
     pub rate_specimen: Specimen<1>,
     /// Of the thermometer.
     pub temperature_specimen: Specimen<1>,
@@ -47,9 +47,9 @@ pub struct Converter {
 impl Converter {
     /// SMPL_PRD: bit 7 selects the time base, bits 6 to 0 are one less than the multiplier. Until the first sample the
     /// rate is the one `held`.
-    pub fn start(smpl_prd: u16, phase: f64, now: Nanos, held: Option<i32>) -> Self {
+    pub fn start(smpl_prd: u16, pace: Pace, now: Nanos, held: Option<i32>) -> Self {
         let base_ns = TIME_BASE_NS[usize::from(smpl_prd >> 7 & 1)];
-        let clock = ConversionClock::new((base_ns * f64::from((smpl_prd & 0x7F) + 1)).round() as u64, phase);
+        let clock = ConversionClock::paced((base_ns * f64::from((smpl_prd & 0x7F) + 1)).round() as u64, pace);
         Converter {
             clock,
             low_pass: LowPass::new(clock, TAU_S),

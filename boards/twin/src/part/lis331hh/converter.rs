@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::super::{
     Nanos,
-    signal::{ConversionClock, LowPass, Specimen, quantise, seconds},
+    signal::{ConversionClock, LowPass, Pace, Specimen, quantise, seconds},
 };
 
 /// [m/s2] of one g, for the datasheet's mg.
@@ -36,9 +36,9 @@ pub struct Converter {
 
 impl Converter {
     /// Begins to convert at `now`; `None` in power-down.
-    pub fn start(ctrl_reg1: u8, ctrl_reg2: u8, phase: f64, now: Nanos) -> Option<Self> {
+    pub fn start(ctrl_reg1: u8, ctrl_reg2: u8, pace: Pace, now: Nanos) -> Option<Self> {
         let period_ns = period_ns(ctrl_reg1)?;
-        let clock = ConversionClock::new(period_ns, phase);
+        let clock = ConversionClock::paced(period_ns, pace);
         let mut converter = Converter {
             period_ns,
             clock,

@@ -21,7 +21,7 @@ const THERMOMETER_NS: u64 = 250_000_000;
 /// The clock of a part of the ideal plant.
 fn clock<const N: usize>(period_ns: u64, of: Spread, stream: Noise) -> ConversionClock {
     let specimen: Specimen<N> = Quality::IDEAL.draw(of, stream);
-    ConversionClock::new(period_ns, specimen.phase)
+    ConversionClock::paced(period_ns, specimen.pace)
 }
 
 /// Largest difference [counts] between what the plant's registers say and the prediction, over all 36 channels.
