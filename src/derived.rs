@@ -1,15 +1,16 @@
 //! The derived frame: what a packet has no room for.
 //!
-//! In: a [`Derived`]; out: 652 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
+//! In: a [`Derived`]; out: 902 characters `$...*CCCC\n`, and back. Its start `$` is not a packet's `@` and it holds
 //! neither `@` nor `#`, so a reader of 156-byte packets passes over it; it is off unless asked for (G_DL).
 //!
 //! Between `$` and `*` stand upper-case hexadecimal fields, fixed width, most significant digit first; `CCCC` is
 //! CRC-16/CCITT-FALSE over them. Layout, with the digits of each field:
 //!
 //! ```text
-//! version 3 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
+//! version 4 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
 //! covered_us 6 | end_us 16 | angle_b 8 x 3 | for each gyro: integral 8, least 4, most 4, count 2
 //! for each reading of the accelerometers in between: covered_us 6, after_us 5, angle_b 8 x 3, counts 4 x 12
+//! for each slice of the gyros: before_us 5, lasts_us 4, quarters of counts 4 x 4
 //! estimate_us 5 | force_b 8 x 3 | field_b_ut 8 x 3 | rate_b 8 x 3 | sensors 8 | triad_nb 8 x 4 (0: none)
 //! q_nb 8 x 4 (0: none) | covariance_n 8 x 6 | bias_b 8 x 3 | bias_sd 8 x 3
 //! ```
@@ -26,7 +27,7 @@ use crc::{CRC_16_IBM_3740, Crc};
 use crate::{
     estimate::Estimate,
     faults::SensorHealth,
-    increments::{Channel, Force, Increments, forces::READINGS},
+    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::hex_value,
     sample::{NO_SLOT, SENSOR_COUNT},
@@ -40,11 +41,12 @@ pub const DERIVED_START: u8 = b'$';
 /// Bytes of a derived frame.
 pub const DERIVED_BYTES: usize = 1 + FIELD_DIGITS + 1 + 4 + 1;
 
-const VERSION: u64 = 3;
-const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + FORCE_DIGITS + ESTIMATE_DIGITS;
+const VERSION: u64 = 4;
+const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + FORCE_DIGITS + SLICE_DIGITS + ESTIMATE_DIGITS;
 const CYCLE_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT;
 const GYRO_DIGITS: usize = 6 + 16 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
 const FORCE_DIGITS: usize = READINGS * (6 + 5 + 8 * 3 + 4 * 12);
+const SLICE_DIGITS: usize = SLICES * (5 + 4 + 4 * 4);
 const ESTIMATE_DIGITS: usize = 5 + 8 * (3 + 3 + 3 + 1 + 4 + 4 + 6 + 3 + 3);
 const NO_SLOT_CODE: u64 = 0xF_FFFF;
 
@@ -149,6 +151,13 @@ pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
             fields.put((*counts as u16).into(), 4);
         }
     }
+    for slice in &derived.increments.slices {
+        fields.put(u64::from(slice.before_us).min(0xF_FFFF), 5);
+        fields.put(slice.lasts_us.into(), 4);
+        for quarters in slice.quarters {
+            fields.put((quarters as u16).into(), 4);
+        }
+    }
     fields.put(u64::from(derived.estimate_us).min(0xF_FFFF), 5);
     let estimate = &derived.estimate;
     for vector in [&estimate.force_b, &estimate.field_b_ut, &estimate.rate_b] {
@@ -228,6 +237,11 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
                 after_us: fields.take(5) as u32,
                 angle_b: fields.reals(),
                 acc_p: core::array::from_fn(|_| core::array::from_fn(|_| fields.word() as i16)),
+            }),
+            slices: core::array::from_fn(|_| Slice {
+                before_us: fields.take(5) as u32,
+                lasts_us: fields.word(),
+                quarters: core::array::from_fn(|_| fields.word() as i16),
             }),
         },
         estimate_us: fields.take(5) as u32,

@@ -2,7 +2,7 @@
 //!
 //! In: the four gyros in counts and the instant of each fast sample; the accelerometers in counts at a few instants. Out,
 //! once a cycle: the rotation increment of b, when it ended, for each gyro the integral, smallest and largest count and how
-//! many samples, and each reading of the accelerometers with the rotation up to it ([`forces`]).
+//! many samples, and in [`slices`]; and each reading of the accelerometers with the rotation up to it ([`forces`]).
 //!
 //! A 5 Hz filter on single rate samples loses what happened between them; on increments it loses nothing. The increment
 //! is a rotation vector: `phi = sum d_k + 1/2 sum (a_{k-1} + d_{k-1}/6) x d_k` with `d_k` the angle of interval `k`
@@ -14,12 +14,16 @@
 //! With fewer than three gyros there is no rate: the interval is a gap too.
 
 pub mod forces;
+pub mod slices;
 
 use nalgebra::{SMatrix, Vector3, Vector4};
 
 use crate::{geometry::rate_from_gyros, sample::NOT_READ};
 
+use slices::Slicer;
+
 pub use forces::{Force, Forces};
+pub use slices::{SLICES, Slice};
 
 /// [s] an interval longer than this is a gap: rates between its ends are not known.
 pub const LONGEST_INTERVAL_S: f32 = 0.1;
@@ -38,6 +42,8 @@ pub struct Increments {
     pub gyro: [Channel; 4],
     /// The accelerometers, oldest reading first.
     pub forces: Forces,
+    /// The gyros slice by slice, oldest first.
+    pub slices: [Slice; SLICES],
 }
 
 /// One gyro over a cycle.
@@ -65,6 +71,7 @@ const EMPTY: Increments = Increments {
         count: 0,
     }; 4],
     forces: [Force::NONE; forces::READINGS],
+    slices: [Slice::NONE; SLICES],
 };
 
 /// The running integration.
@@ -77,6 +84,7 @@ pub struct Integrator {
     last: Option<Fast>,
     present: u8,
     rate_from_counts: Option<SMatrix<f32, 3, 4>>,
+    slicer: Slicer,
 }
 
 /// One fast sample of the four gyros.
@@ -100,6 +108,7 @@ impl Integrator {
             last: None,
             present: 0,
             rate_from_counts: None,
+            slicer: Slicer::EMPTY,
         }
     }
 
@@ -110,6 +119,7 @@ impl Integrator {
         }
         self.sum.end_us = fast.at_us;
         let Some(last) = self.last.replace(fast) else { return };
+        self.slicer.add(&last, &fast);
         let dt_s = fast.at_us.saturating_sub(last.at_us) as f32 * 1e-6;
         if dt_s <= 0.0 || dt_s > LONGEST_INTERVAL_S {
             return;
@@ -161,6 +171,7 @@ impl Integrator {
         let end_us = self.sum.end_us;
         let mut taken = core::mem::replace(&mut self.sum, Increments { end_us, ..EMPTY });
         taken.angle_b = (Vector3::from(taken.angle_b) + core::mem::take(&mut self.coning_b)).into();
+        taken.slices = self.slicer.take(end_us);
         taken
     }
 }

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use emems::{
     derived::Derived,
-    increments::{Force, forces::READINGS},
+    increments::{Force, SLICES, Slice, forces::READINGS},
     sample::{NO_SLOT, NOT_READ, Reading},
 };
 
@@ -258,6 +258,7 @@ mod tests {
                     },
                     Force::NONE,
                 ],
+                slices: [Slice::NONE; SLICES],
             },
             estimate_us: 0,
             estimate: Estimate::NOTHING,

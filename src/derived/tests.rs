@@ -43,6 +43,11 @@ fn derived() -> Derived {
                 },
                 Force::NONE,
             ],
+            slices: core::array::from_fn(|k| Slice {
+                before_us: 20_000 * k as u32,
+                lasts_us: 20_000 + k as u16,
+                quarters: [4 * 4367, -1, NOT_READ, -i16::MAX],
+            }),
         },
     }
 }
@@ -50,7 +55,7 @@ fn derived() -> Derived {
 #[test]
 fn a_frame_says_what_it_was_given() {
     assert_eq!(decode(&encode(&derived())), Ok(derived()));
-    assert_eq!(DERIVED_BYTES, 652);
+    assert_eq!(DERIVED_BYTES, 902);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     calibration::Axis,
-    increments::{Channel, Force, forces::READINGS},
+    increments::{Channel, Force, SLICES, Slice, forces::READINGS},
     sample::{NO_SLOT, NOT_READ, Reading, SENSOR_COUNT},
 };
 
@@ -51,6 +51,7 @@ fn resting(counter: u16) -> (Sample, Increments) {
         end_us: start_us - 2_500,
         gyro: [still; 4],
         forces: [Force::NONE; READINGS],
+        slices: [Slice::NONE; SLICES],
     };
     (sample, increments)
 }
@@ -168,7 +169,7 @@ prop_compose! {
         acc_p: [[i16; 3]; 4], mag_p: [[i16; 3]; 4], gyro: [i16; 4], gyro_temperature: [i16; 4], temperature: [i16; 4],
         lift_off: bool, start_us: u64, slots_us: [u32; SENSOR_COUNT], angles: [u32; 3], integrals: [u32; 4],
         ends: [(i16, i16, u8); 4], covered_us: u32, end_us: u64, sane: bool, counter in 10..40_u16,
-        between: [([[i16; 3]; 4], [u32; 3], u32, u32); READINGS],
+        between: [([[i16; 3]; 4], [u32; 3], u32, u32); READINGS], sliced: [(u32, u16, [i16; 4]); SLICES],
     ) -> (Sample, Increments) {
         let (resting, still) = resting(counter);
         let reading = Reading { acc_p, mag_p, gyro, gyro_temperature, temperature, lift_off, ..resting.reading };
@@ -178,10 +179,11 @@ prop_compose! {
         let forces = between.map(|(acc_p, angles, covered_us, after_us)| Force {
             acc_p, angle_b: angles.map(f32::from_bits), covered_us, after_us,
         });
-        let increments = Increments { angle_b: angles.map(f32::from_bits), covered_us, end_us, gyro, forces };
+        let slices = sliced.map(|(before_us, lasts_us, quarters)| Slice { before_us, lasts_us, quarters });
+        let increments = Increments { angle_b: angles.map(f32::from_bits), covered_us, end_us, gyro, forces, slices };
         // Half of them with sound times, so that they get as far as the filter.
         match sane {
-            true => (Sample { reading, ..resting }, Increments { gyro, forces, ..still }),
+            true => (Sample { reading, ..resting }, Increments { gyro, forces, slices, ..still }),
             false => (Sample { reading, start_us, slots_us }, increments),
         }
     }

@@ -42,9 +42,9 @@ pub struct Cycle {
     pub cycle_us: u32,
 }
 
-/// A reader may be busy with one while the next arrives, and a derived frame keeps a line busy for 57 ms, in which three
-/// cycles of a unit at 50 Hz come. A reader that is later than that loses the oldest.
-const CYCLES: usize = 3;
+/// A reader may be busy with one while the next arrives, and a derived frame keeps a line busy for 78 ms, in which four
+/// cycles of a unit at 50 Hz come, and packets of 14 ms take their time to be gone. A reader that is later than that loses the oldest.
+const CYCLES: usize = 5;
 const FRAMES: usize = 2;
 
 /// Of both lines, 8N1.

@@ -9,7 +9,7 @@
 use emems::{
     derived::Derived,
     geometry::rate_from_gyros,
-    increments::{Channel, Force, Increments, forces::READINGS},
+    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
     sample::{NOT_READ, Reading, SENSOR_COUNT, Sample},
     unit::Settings,
 };
@@ -125,6 +125,7 @@ impl Cycles {
             end_us,
             gyro,
             forces: [Force::NONE; READINGS],
+            slices: [Slice::NONE; SLICES],
         }
     }
 }

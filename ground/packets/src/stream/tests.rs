@@ -2,7 +2,7 @@
 
 use emems::{
     estimate::Estimate,
-    increments::{Channel, Force, Increments, forces::READINGS},
+    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::{Expected, encode},
     sample::NOT_READ,
@@ -133,6 +133,7 @@ fn derived_frame() -> [u8; DERIVED_BYTES] {
             end_us: 0,
             gyro: [silent; 4],
             forces: [Force::NONE; READINGS],
+            slices: [Slice::NONE; SLICES],
         },
         estimate_us: 0,
         estimate: Estimate::NOTHING,
@@ -161,10 +162,10 @@ fn a_damaged_derived_frame_costs_itself_only() {
     flipped[30] = b'7';
     check(
         &[flipped.as_slice(), GOLDEN, &derived_frame()[..100], GOLDEN].concat(),
-        &[(652, 1), (908, 1)],
+        &[(902, 1), (1158, 1)],
         &[
-            "offset 0, 652 bytes: begins like a derived frame, but checksum 4CFF was sent, the fields give ABC1",
-            "offset 808, 100 bytes: frame cut off after 100 of 652 bytes",
+            "offset 0, 902 bytes: begins like a derived frame, but checksum 4CFF was sent, the fields give ABC1",
+            "offset 1058, 100 bytes: frame cut off after 100 of 902 bytes",
         ],
     );
 }
