@@ -73,7 +73,11 @@ fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<(), FlyErro
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
     // An image that cannot be built must not leave an empty folder.
-    let flight = if arguments.host { board::host() } else { board::image()? };
+    let flight = if arguments.host {
+        board::host(source.site)
+    } else {
+        board::image()?
+    };
     let name = format!("{}-{}", source.name, arguments.seed);
     let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
     let progress = Progress::start(duration, arguments.real_time || arguments.console, arguments.console);

@@ -2,7 +2,7 @@
 //!
 //! Both take the same plant, faults and bench. Out: remarks on what befell the unit, as rows of the summary.
 
-use emems::unit::Settings;
+use emems::{estimate::Site, unit::Settings};
 use emulated::{Image, image::ImageError};
 use twin::{
     host,
@@ -28,10 +28,14 @@ pub enum BoardError {
     Emulated(#[from] emulated::Error),
 }
 
-/// The unit's code on this computer, in virtual time.
-pub fn host() -> Flight {
-    Box::new(|plant, faults, end, bench| {
-        let report = host::fly(plant, Settings::NOMINAL, faults, end, bench);
+/// The unit's code on this computer, in virtual time, told where it is.
+pub fn host(site: Site) -> Flight {
+    Box::new(move |plant, faults, end, bench| {
+        let settings = Settings {
+            site,
+            ..Settings::NOMINAL
+        };
+        let report = host::fly(plant, settings, faults, end, bench);
         let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
         Ok(resets.collect())
     })

@@ -5,6 +5,7 @@
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
+use emems::estimate::Site;
 use twin::{
     environment::World,
     motion::{self, LIST, Recorded},
@@ -25,6 +26,8 @@ pub struct Source {
     pub about: String,
     /// The truth.
     pub truth: Arc<dyn TruthSource>,
+    /// What the unit is told of the place.
+    pub site: Site,
 }
 
 /// Why there is nothing to fly.
@@ -48,6 +51,7 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
             name: stem(path),
             about: format!("recording of a real unit, {}", file_name(path)),
             truth: Arc::new(Recording::open(path)?),
+            site: Site::LABORATORY,
         }),
         (_, Some(path)) => Ok(Source {
             name: stem(path),
@@ -56,6 +60,7 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
                 motion: Recorded::open(path)?,
                 environment: arguments.site.environment(),
             }),
+            site: Site::LABORATORY,
         }),
         _ => by_name(arguments.motion.as_deref().unwrap_or(DEFAULT_MOTION)),
     }
@@ -78,6 +83,7 @@ fn by_name(name: &str) -> Result<Source, SourceError> {
             name: name.into(),
             about: named.about.into(),
             truth: truth.into(),
+            site: named.site,
         }),
         _ => Err(SourceError::NoSuchMotion(name.into())),
     }

@@ -10,12 +10,14 @@ mod profile;
 mod rate_table;
 mod recorded;
 mod rotation_test;
+mod rough;
 mod smooth;
 mod sounding_rocket;
 mod spline;
 mod still;
 mod tumble;
 
+use emems::estimate::{Launch, Site};
 use nalgebra::Vector3;
 
 pub use attitude::Attitude;
@@ -23,7 +25,8 @@ pub use profile::{Jet, Profile};
 pub use rate_table::{Axis, Plateau, Position, RateTable, TABLE_4_1};
 pub use recorded::Recorded;
 pub use rotation_test::RotationTest;
-pub use sounding_rocket::SoundingRocket;
+pub use rough::{Levels, Rough};
+pub use sounding_rocket::{Course, SoundingRocket};
 pub use still::Still;
 pub use tumble::Tumble;
 
@@ -77,6 +80,8 @@ pub struct Named {
     pub name: &'static str,
     /// What it is, in one line.
     pub about: &'static str,
+    /// What the unit is told of the place.
+    pub site: Site,
     truth: fn() -> Box<dyn TruthSource>,
 }
 
@@ -84,41 +89,69 @@ pub struct Named {
 const PAD_WAIT_S: f64 = 30.0;
 
 /// All motions, each at its default site.
-pub const LIST: [Named; 6] = [
+pub const LIST: [Named; 7] = [
     Named {
         name: "still",
         about: "at rest, level, in the laboratory",
+        site: Site::LABORATORY,
         truth: || laboratory(Still::level()),
     },
     Named {
         name: "rate-table",
         about: "the twelve positions of the gyro calibration (Table 4.1), 200 deg/s each way",
+        site: Site::LABORATORY,
         truth: || laboratory(RateTable::calibration()),
     },
     Named {
         name: "tumble",
         about: "10 s rest, then all three axes at once",
+        site: Site::LABORATORY,
         truth: || laboratory(Tumble::new()),
     },
     Named {
         name: "rotation-1",
         about: "rotation test 1 of chapter 6: each axis on its own",
+        site: Site::LABORATORY,
         truth: || laboratory(RotationTest::first()),
     },
     Named {
         name: "rotation-2",
         about: "rotation test 2 of chapter 6: yaw 40, pitch 35, roll 45 and -30 deg, and back",
+        site: Site::LABORATORY,
         truth: || laboratory(RotationTest::second()),
     },
     Named {
         name: "rocket",
         about: "a VSB-30 flight from Alcantara: 30 s on the pad, boost, 6 min of micro-gravity, re-entry",
+        site: Site::ALCANTARA,
         truth: || {
             let site = Environment::alcantara();
             Box::new(World {
                 motion: SoundingRocket::new(PAD_WAIT_S, site.gravity),
                 environment: site,
             })
+        },
+    },
+    Named {
+        name: "rocket-rough",
+        about: "the same with vibration, buffeting, thrust oscillation and gyros that feel force",
+        site: Site {
+            launch: match Site::ALCANTARA.launch {
+                Some(launch) => Some(Launch {
+                    bias_per_g_deg_s: 0.02,
+                    ..launch
+                }),
+                None => None,
+            },
+            ..Site::ALCANTARA
+        },
+        truth: || {
+            let site = Environment::alcantara();
+            let smooth = World {
+                motion: SoundingRocket::new(PAD_WAIT_S, site.gravity),
+                environment: site,
+            };
+            Box::new(Rough::new(smooth, PAD_WAIT_S, Levels::ROUGH, 1))
         },
     },
 ];
@@ -156,6 +189,18 @@ mod tests {
                 named.name
             );
         }
+    }
+
+    #[test]
+    fn what_the_unit_is_told_of_the_launch_site_is_so() {
+        let site = Environment::alcantara();
+        let field = Site::ALCANTARA.launch.expect("a known field");
+        let [dip, declination] =
+            [field.dip_deg, Site::ALCANTARA.declination_deg].map(|deg| f64::from(deg).to_radians());
+        let told_n = Vector3::new(dip.cos() * declination.cos(), dip.cos() * declination.sin(), dip.sin());
+        assert!((told_n * f64::from(field.norm_ut) - site.field_n_ut).norm() < 0.01);
+        assert!((f64::from(Site::ALCANTARA.gravity) - site.gravity).abs() < 1e-4);
+        assert!((f64::from(Site::ALCANTARA.latitude_deg).to_radians() - site.latitude).abs() < 1e-4);
     }
 
     #[test]

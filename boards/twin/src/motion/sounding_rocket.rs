@@ -47,9 +47,31 @@ pub struct SoundingRocket {
     temperature_c: Profile,
 }
 
+/// What may go otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    /// Turns a second when the burn is over.
+    pub turns_per_s: f64,
+    /// The yo-yo is released.
+    pub yo_yo: bool,
+}
+
+impl Course {
+    /// As it should.
+    pub const NOMINAL: Course = Course {
+        turns_per_s: 3.0,
+        yo_yo: true,
+    };
+}
+
 impl SoundingRocket {
     /// Lift-off `pad_wait_s` after power-on, under `gravity` [m/s2].
     pub fn new(pad_wait_s: f64, gravity: f64) -> Self {
+        SoundingRocket::on(Course::NOMINAL, pad_wait_s, gravity)
+    }
+
+    /// The same on a course.
+    pub fn on(course: Course, pad_wait_s: f64, gravity: f64) -> Self {
         let on_pad = |value: f64| Profile::from_rest(value).coast(pad_wait_s);
         let until = |profile: Profile, after_lift_off_s: f64| {
             let wait_s = pad_wait_s + after_lift_off_s - profile.end_s();
@@ -86,11 +108,16 @@ impl SoundingRocket {
         let cone_half_angle = until(cone_half_angle, YO_YO_S).move_to(0.06, 1.0).move_to(0.002, 12.0);
 
         // Spin motors just above the rail, then canted fins; the yo-yo takes the spin away.
-        let spin = until(on_pad(0.0), 0.6).ramp_to_rate(turns(1.0), 1.5);
-        let spin = spin.ramp_to_rate(turns(2.0), 9.5);
-        let spin = until(spin, IGNITION_2_S).ramp_to_rate(turns(3.0), BURN_OUT_2_S - IGNITION_2_S);
-        let spin = until(spin, YO_YO_S).ramp_to_rate(turns(0.1), 1.0);
-        let spin = until(spin, YO_YO_S + 4.0).ramp_to_rate(0.0, 8.0);
+        let thirds = |of: f64| turns(course.turns_per_s * of / 3.0);
+        let spin = until(on_pad(0.0), 0.6).ramp_to_rate(thirds(1.0), 1.5);
+        let spin = spin.ramp_to_rate(thirds(2.0), 9.5);
+        let spin = until(spin, IGNITION_2_S).ramp_to_rate(thirds(3.0), BURN_OUT_2_S - IGNITION_2_S);
+        let spin = if course.yo_yo {
+            let slowed = until(spin, YO_YO_S).ramp_to_rate(turns(0.1), 1.0);
+            until(slowed, YO_YO_S + 4.0).ramp_to_rate(0.0, 8.0)
+        } else {
+            spin
+        };
         let roll = until(spin, ENTRY_S).ramp_to_rate(turns(0.5), 40.0);
 
         let warmed = until(on_pad(30.0).move_to(34.0, 60.0), ENTRY_S);
