@@ -11,12 +11,15 @@
 //!                                             faults <--- gyro bias ----'
 //! ```
 //!
+//! Where a rocket spins ([`boost`]), another filter takes the cycle in place of the lower half: [`crate::spin`].
+//!
 //! The step is a function of the state and its arguments, in f32, with the arithmetic of `libm` alone: a host that is given
 //! the same cycles from the start computes the same bits as the unit did.
 //!
 //! Refuses nothing. A cycle that repeats or goes back in time gives vectors and TRIAD, and the filter leaves it out; see
 //! [`kalman`](crate::kalman) for gaps.
 
+mod boost;
 mod force;
 mod sampled;
 mod site;
@@ -24,10 +27,11 @@ mod site;
 mod tests;
 mod turn;
 
+use boost::Boost;
 use force::Averager;
 use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 
-pub use site::Site;
+pub use site::{Launch, Site};
 
 use crate::{
     attitude::{self, dcm_bn},
@@ -114,6 +118,7 @@ pub struct Estimator {
     filter: Filter,
     turn_solver: turn::Solver,
     averager: Averager,
+    boost: Boost,
     /// White variance of a component of force, in (m/s2)^2, and of field, in uT2, by all axes.
     white: [f32; 2],
     /// The step before completed a window of the filter.
@@ -137,6 +142,7 @@ impl Estimator {
             filter: Filter::new(site.params(&set)),
             turn_solver: turn::Solver::default(),
             averager: Averager::EMPTY,
+            boost: Boost::WAITING,
             closed: false,
             white: sampled::whites(&set),
             axes_n: axes_n(site),
@@ -157,6 +163,7 @@ impl Estimator {
         self.filter = Filter::new(site.params(set));
         self.turn_solver = turn::Solver::default();
         self.averager = Averager::EMPTY;
+        self.boost = Boost::WAITING;
         self.closed = false;
         self.white = sampled::whites(set);
         self.axes_n = axes_n(site);
@@ -210,6 +217,9 @@ impl Estimator {
             self.filter.spare();
         }
         let vectors = self.monitor.take(&self.set, reading, &measured, dt_s, closes);
+        if self.boost.is_on() {
+            return self.go_on_in_boost(sample, &measured, increments, &vectors);
+        }
         let believed = vectors.rate_b.used | measured.saturated.of(Kind::Gyro);
         let turned = turn::turn(
             &self.set,
@@ -254,6 +264,7 @@ impl Estimator {
         };
         self.filter.take(&step, outcome);
         self.look_at_the_covariance();
+        self.see_about_boost(sample, &measured, increments, &vectors);
         self.estimate(&vectors)
     }
 
@@ -275,15 +286,20 @@ impl Estimator {
     }
 
     fn estimate(&self, vectors: &Vectors) -> Estimate {
+        let aligned = self.filter.aligned.then(|| parts(self.filter.attitude()));
+        self.estimate_with(vectors, aligned, self.filter.bias_b)
+    }
+
+    fn estimate_with(&self, vectors: &Vectors, q_nb: Option<[f32; 4]>, bias_b: Vector3<f32>) -> Estimate {
         Estimate {
             force_b: vectors.force_b.vector_b.into(),
             field_b_ut: vectors.field_b_ut.vector_b.into(),
             rate_b: vectors.rate_b.vector_b.into(),
             sensors: vectors.health,
             triad_nb: self.triad(vectors).map(parts),
-            q_nb: self.filter.aligned.then(|| parts(self.filter.attitude())),
+            q_nb,
             covariance_n: self.covariance_n,
-            bias_b: self.filter.bias_b.into(),
+            bias_b: bias_b.into(),
             bias_sd: self.bias_sd,
         }
     }

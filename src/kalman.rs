@@ -45,6 +45,7 @@ mod field_sums;
 mod innovation;
 mod iron;
 mod joseph;
+mod known;
 mod measured;
 mod params;
 mod passage;
@@ -64,6 +65,7 @@ pub use self::{
     field::Reference,
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
     iron::HardIron,
+    known::Known,
     params::{Delays, Params, Rest},
     state::STATES,
     step::{Outcome, Refusal, Sampled, Step},

@@ -46,5 +46,6 @@ pub mod resume;
 pub mod retained;
 pub mod sample;
 pub mod sensor;
+pub mod spin;
 pub mod triad;
 pub mod unit;

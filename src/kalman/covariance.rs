@@ -201,6 +201,19 @@ impl Covariance {
         }
     }
 
+    /// The bias known with the lower right of this, and together with the attitude by its upper right.
+    pub(super) fn set_bias(&mut self, covariance: &SMatrix<f32, 6, 6>) {
+        for k in 0..GYRO_MATRIX {
+            self.forget_driver(k, 0.0);
+        }
+        for row in 0..3 {
+            for column in 0..GYRO_MATRIX {
+                self.across[row][column] = covariance[(row, 3 + column)];
+                self.drivers[row][column] = covariance[(3 + row, 3 + column)];
+            }
+        }
+    }
+
     /// Nothing known of the attitude.
     pub(super) fn forget_attitude(&mut self) {
         let unknown = square(core::f32::consts::PI);

@@ -91,6 +91,13 @@ impl Reference {
         }
     }
 
+    /// [uT] the field in n; `None` before it is known.
+    pub fn field_n_ut(&self) -> Option<Vector3<f32>> {
+        let ((sin, cos), (sin_d, cos_d)) = (sin_cos(self.dip), sin_cos(self.declination));
+        let known = self.norm_ut > 0.0;
+        known.then(|| Vector3::new(cos * cos_d, cos * sin_d, sin) * self.norm_ut)
+    }
+
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
     pub(super) fn compare(&self, params: &Params, duration_s: f32, mean: &MeanField) -> Option<Compared> {

@@ -1,0 +1,204 @@
+//! The attitude through a boost, smooth and spoilt: it says what it knows, and is right about it.
+
+use std::sync::Arc;
+
+use emems::{derived::Derived, estimate::Site, unit::Settings};
+use host_tests::{Flight, MS, S};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use twin::{
+    environment::{Environment, World},
+    host::timing::BOOT,
+    motion::{Course, Motion, SoundingRocket},
+    plant::{Plant, Quality},
+    run::Fault,
+    truth::{Truth, TruthSource},
+};
+
+/// [s] lift-off.
+const PAD_S: f64 = 30.0;
+
+fn rocket(course: Course) -> World<SoundingRocket> {
+    let environment = Environment::alcantara();
+    World {
+        motion: SoundingRocket::on(course, PAD_S, environment.gravity),
+        environment,
+    }
+}
+
+fn flight(world: impl TruthSource + 'static) -> Flight {
+    let world: Arc<dyn TruthSource> = Arc::new(world);
+    Flight {
+        plant: Plant::with(world.clone(), 7, Quality::FREE_CLOCKS),
+        settings: Settings {
+            site: Site::ALCANTARA,
+            ..Settings::NOMINAL
+        },
+        ..Flight::ideal(world)
+    }
+    .say(MS, b"G_DL")
+}
+
+/// Over a stretch of a flight.
+#[derive(Debug)]
+struct Met {
+    /// [deg] largest error.
+    worst_deg: f64,
+    /// [deg] root mean square of the error.
+    rms_deg: f64,
+    /// [deg] the same of what was said.
+    said_deg: f64,
+    /// [1] mean of the squared error in its own covariance, a degree of freedom.
+    nees: f64,
+}
+
+fn met(frames: &[Derived], motion: &SoundingRocket, from_s: f64, to_s: f64) -> Met {
+    let (mut count, mut worst, mut square, mut said, mut nees) = (0.0, 0.0_f64, 0.0, 0.0, 0.0);
+    for frame in frames {
+        let t_s = (frame.increments.end_us as f64 * 1e3 + BOOT as f64) * 1e-9;
+        if !(from_s..to_s).contains(&t_s) {
+            continue;
+        }
+        let [w, x, y, z] = frame.estimate.q_nb.expect("an attitude").map(f64::from);
+        let found = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let error_n: Vector3<f64> = (motion.at(t_s).attitude.q_nb * found.inverse()).scaled_axis();
+        let [nn, ne, nd, ee, ed, dd] = frame.estimate.covariance_n.map(f64::from);
+        let covariance_n = Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd);
+        let inverse = covariance_n.try_inverse().expect("a covariance");
+        count += 1.0;
+        worst = worst.max(error_n.norm());
+        square += error_n.norm_squared();
+        said += covariance_n.trace();
+        nees += error_n.dot(&(inverse * error_n)) / 3.0;
+    }
+    assert!(count > 4.0 * (to_s - from_s), "{count} attitudes");
+    Met {
+        worst_deg: worst.to_degrees(),
+        rms_deg: f64::sqrt(square / count).to_degrees(),
+        said_deg: f64::sqrt(said / count).to_degrees(),
+        nees: nees / count,
+    }
+}
+
+/// Most that the mean NEES of one flight's stretch may be: errors last, so that a stretch is a few independent ones of three
+/// degrees of freedom; 3.8 is chi-squared's 99 % of one.
+const HONEST: f64 = 3.8;
+
+/// [deg] what the attitude through the spin may be off by.
+const SPINNING_DEG: f64 = 3.0;
+
+fn is_right(name: &str, met: &Met, within_deg: f64) {
+    println!("{name}: {met:?}");
+    let near = met.rms_deg < within_deg && met.worst_deg < 3.0 * within_deg;
+    assert!(near && met.nees < HONEST, "{name}: {met:?}");
+}
+
+#[test]
+fn three_turns_a_second_cost_a_degree_and_not_the_attitude() {
+    let world = rocket(Course::NOMINAL);
+    let motion = world.motion.clone();
+    let flown = flight(world).fly(150 * S);
+    is_right("boost", &met(&flown.derived, &motion, 36.0, 83.0), SPINNING_DEG);
+    is_right("yo-yo", &met(&flown.derived, &motion, 83.0, 97.0), SPINNING_DEG);
+    let after = met(&flown.derived, &motion, 97.0, 150.0);
+    is_right("micro-gravity", &after, 1.5);
+    assert!(after.said_deg < 3.0, "{after:?}");
+}
+
+#[test]
+fn six_turns_a_second_are_followed_too() {
+    let world = rocket(Course {
+        turns_per_s: 6.0,
+        ..Course::NOMINAL
+    });
+    let motion = world.motion.clone();
+    let flown = flight(world).fly(110 * S);
+    is_right(
+        "six turns",
+        &met(&flown.derived, &motion, 70.0, 83.0),
+        2.0 * SPINNING_DEG,
+    );
+    is_right("after", &met(&flown.derived, &motion, 97.0, 110.0), 2.0 * SPINNING_DEG);
+}
+
+#[test]
+fn a_rocket_that_is_never_despun_keeps_its_attitude() {
+    let world = rocket(Course {
+        yo_yo: false,
+        ..Course::NOMINAL
+    });
+    let motion = world.motion.clone();
+    let flown = flight(world).fly(240 * S);
+    is_right("not despun", &met(&flown.derived, &motion, 200.0, 240.0), SPINNING_DEG);
+}
+
+/// A vehicle whose lift-off line is broken.
+struct Unannounced(World<SoundingRocket>);
+
+impl TruthSource for Unannounced {
+    fn at(&self, t_s: f64) -> Truth {
+        Truth {
+            lift_off: false,
+            ..self.0.at(t_s)
+        }
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        self.0.duration_s()
+    }
+}
+
+#[test]
+fn without_the_lift_off_line_the_spin_itself_says_so() {
+    let world = rocket(Course::NOMINAL);
+    let motion = world.motion.clone();
+    let flown = flight(Unannounced(world)).fly(100 * S);
+    is_right(
+        "no lift-off line",
+        &met(&flown.derived, &motion, 50.0, 83.0),
+        SPINNING_DEG,
+    );
+}
+
+#[test]
+fn a_plate_that_dies_in_the_boost_costs_accuracy_and_no_attitude() {
+    // Slots of plate 2: accelerometer, magnetometer, gyro.
+    let world = rocket(Course::NOMINAL);
+    let motion = world.motion.clone();
+    let flight = [1, 5, 9]
+        .into_iter()
+        .fold(flight(world), |flight, slot| flight.fault(50 * S, Fault::Silent(slot)));
+    let flown = flight.fly(110 * S);
+    is_right("a dead plate", &met(&flown.derived, &motion, 50.0, 83.0), SPINNING_DEG);
+    is_right("after", &met(&flown.derived, &motion, 97.0, 110.0), SPINNING_DEG);
+}
+
+/// Gyros that stand at their stops from the tenth second on, on a pad that does not move.
+struct Stuck(World<SoundingRocket>);
+
+impl TruthSource for Stuck {
+    fn at(&self, t_s: f64) -> Truth {
+        let mut truth = self.0.at(t_s);
+        if t_s > 10.0 {
+            // Gyros feel it; the accelerometers' places do too, as when a supply fails that both share.
+            truth.rate_b = Vector3::new(9.0, 0.0, 9.0);
+        }
+        truth
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        self.0.duration_s()
+    }
+}
+
+#[test]
+fn gyros_at_their_stops_on_the_pad_make_it_say_that_it_does_not_know() {
+    let world = rocket(Course::NOMINAL);
+    let motion = world.motion.clone();
+    let flown = flight(Stuck(world)).fly(29 * S);
+    let last = flown.derived.last().expect("frames");
+    if last.estimate.q_nb.is_some() {
+        let met = met(&flown.derived[flown.derived.len() - 40..], &motion, 21.0, 28.0);
+        println!("{met:?}");
+        assert!(met.nees < HONEST, "{met:?}");
+    }
+}

@@ -1,0 +1,58 @@
+//! What another filter hands over, and taking it.
+//!
+//! In: attitude, rate, bias and their covariance at the gyros' latest true instant. Out: this filter, going on from there. What it
+//! knows of the gyro matrix, of the iron and of the field stays; what it had gathered and not used is dropped.
+
+use nalgebra::{SMatrix, UnitQuaternion, Vector2, Vector3};
+
+use super::{Covariance, Filter, pending::Pending, window::Window};
+
+/// Attitude and bias, and how well they are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// Attitude.
+    pub q_nb: UnitQuaternion<f32>,
+    /// [rad/s] rate in b.
+    pub rate_b: Vector3<f32>,
+    /// [rad/s] gyro bias in b.
+    pub bias_b: Vector3<f32>,
+    /// Covariance of the attitude's error (\[rad\], in n) and of the bias (\[rad/s\], in b).
+    pub covariance: SMatrix<f32, 6, 6>,
+}
+
+impl Filter {
+    /// Goes on from what is known when the gyros' newest sample was stamped `at_us`.
+    pub fn go_on(&mut self, at_us: u64, known: &Known) {
+        self.q_nb = known.q_nb;
+        self.bias_b = known.bias_b;
+        self.rate_b = known.rate_b;
+        self.velocity_n = Vector2::zeros();
+        self.pending = Pending::nothing();
+        self.covariance.take_over(&known.covariance, self.params.velocity_sd);
+        self.window = Window::EMPTY;
+        self.gyro_b = None;
+        self.last_us = Some(at_us);
+        self.silent_s = 0.0;
+        self.rejected_s = [0.0; 2];
+        self.disturbed_s = 0.0;
+        self.bias_rejected_s = 0.0;
+        self.rested = false;
+        self.aligned = true;
+        self.settlements = self.settlements.wrapping_add(1);
+        self.keep_finite();
+    }
+
+    /// Forgets all but its parameters.
+    pub fn forget(&mut self) {
+        self.begin_anew();
+    }
+}
+
+impl Covariance {
+    /// Attitude and bias are known with this covariance, and independent of the rest.
+    fn take_over(&mut self, covariance: &SMatrix<f32, 6, 6>, velocity_sd: f32) {
+        self.align(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        self.forget_velocity(velocity_sd);
+        self.set_bias(covariance);
+    }
+}

@@ -1,0 +1,209 @@
+//! The covariance of the spin phase's error state, and one scalar after the other.
+//!
+//! In: how the state moves over a short step, and what a scalar sees of it. Out: the covariance, and what the scalars since
+//! the last correction add up to. Joseph's form as in [`crate::kalman`]: with `p = P h'`, `s = h p + r`, `k = p/s` and
+//! `u = p - k s/2`, `P <- P - k u' - u k'`.
+//!
+//! Refuses a scalar beyond its gate, or one that is not a number, and says by how much it was.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+/// Error states.
+pub const STATES: usize = 21;
+/// \[rad\] attitude, a rotation vector in n: `q_true = q(a) q_nb`.
+pub const ATTITUDE: usize = 0;
+/// \[rad/s\] rate about x_b.
+pub const SPIN: usize = 3;
+/// \[rad/s2\] its derivative.
+pub const SPIN_UP: usize = 4;
+/// \[rad/s\] rate across the spin, two axes that do not spin.
+pub const ACROSS: usize = 5;
+/// \[rad/s2\] its derivative.
+pub const ACROSS_UP: usize = 7;
+/// \[rad/s\] bias of each gyro.
+pub const BIAS: usize = 9;
+/// \[1\] what each gyro sees of the spin beyond its axis: scale and misalignment.
+pub const SEES_SPIN: usize = 13;
+/// \[uT\] hard iron that all magnetometers share, in b.
+pub const IRON: usize = 17;
+/// \[1\] by how much longer all levers are.
+pub const LEVER: usize = 20;
+
+/// What a scalar sees: some states and how much of each.
+pub type Row<'a> = &'a [(usize, f32)];
+
+/// Covariance and pending correction.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    p: [[f32; STATES]; STATES],
+    /// The error state that the scalars since the last correction found.
+    pub error: [f32; STATES],
+}
+
+/// Floors of the variances: below them f32 rounding is no longer small. Attitude 0.002 deg, rates 1e-5 rad/s, their derivatives,
+/// bias 1e-6 rad/s, 1e-5, 1e-3 uT, 1e-5.
+fn floor(state: usize) -> f32 {
+    match state {
+        ATTITUDE..SPIN => 1e-9,
+        SPIN | ACROSS | 6 => 1e-10,
+        SPIN_UP | ACROSS_UP | 8 => 1e-6,
+        BIAS..SEES_SPIN => 1e-12,
+        IRON..LEVER => 1e-6,
+        _ => 1e-10,
+    }
+}
+
+impl Covariance {
+    /// Independent states with these variances.
+    pub fn of(variances: &[f32; STATES]) -> Self {
+        let mut p = [[0.0; STATES]; STATES];
+        for (k, (row, variance)) in p.iter_mut().zip(variances).enumerate() {
+            row[k] = *variance;
+        }
+        Covariance {
+            p,
+            error: [0.0; STATES],
+        }
+    }
+
+    /// A block of three states, both ways.
+    pub fn set_block(&mut self, at: usize, block: &Matrix3<f32>) {
+        for row in 0..3 {
+            for column in 0..3 {
+                self.p[at + row][at + column] = block[(row, column)];
+            }
+        }
+    }
+
+    /// Of the states from `row` on with those from `column` on.
+    pub fn block<const R: usize, const C: usize>(&self, row: usize, column: usize) -> SMatrix<f32, R, C> {
+        SMatrix::from_fn(|r, c| self.p[row + r][column + c])
+    }
+
+    /// Of one state.
+    pub fn variance(&self, state: usize) -> f32 {
+        self.p[state][state]
+    }
+
+    /// More is unknown of a state.
+    pub fn open(&mut self, state: usize, variance: f32) {
+        self.p[state][state] += variance;
+    }
+
+    /// More is unknown of the attitude.
+    pub fn open_attitude(&mut self, covariance_n: &Matrix3<f32>) {
+        for row in 0..3 {
+            for column in 0..3 {
+                self.p[row][column] += covariance_n[(row, column)];
+            }
+        }
+    }
+
+    /// Over a step of `dt_s`: the attitude gains the rates' errors along `axes_n` (x_b and the two axes across that do not
+    /// spin, in n), the rates gain those of their derivatives.
+    pub fn predict(&mut self, axes_n: &[Vector3<f32>; 3], dt_s: f32) {
+        let half = 0.5 * dt_s;
+        let [x, y, z] = axes_n;
+        // By rows, `P <- F P`; then the same by columns.
+        let sources = [SPIN, ACROSS, ACROSS + 1];
+        let [with_spin, with_y, with_z] = sources.map(|k| self.p[k]);
+        let [with_spin_up, with_y_up, with_z_up] = [SPIN_UP, ACROSS_UP, ACROSS_UP + 1].map(|k| self.p[k]);
+        for column in 0..STATES {
+            let gained = [
+                dt_s * (with_spin[column] + half * with_spin_up[column]),
+                dt_s * (with_y[column] + half * with_y_up[column]),
+                dt_s * (with_z[column] + half * with_z_up[column]),
+            ];
+            for axis in 0..3 {
+                self.p[axis][column] += x[axis] * gained[0] + y[axis] * gained[1] + z[axis] * gained[2];
+            }
+            self.p[SPIN][column] += dt_s * with_spin_up[column];
+            self.p[ACROSS][column] += dt_s * with_y_up[column];
+            self.p[ACROSS + 1][column] += dt_s * with_z_up[column];
+        }
+        for row in &mut self.p {
+            let gained = [
+                dt_s * (row[SPIN] + half * row[SPIN_UP]),
+                dt_s * (row[ACROSS] + half * row[ACROSS_UP]),
+                dt_s * (row[ACROSS + 1] + half * row[ACROSS_UP + 1]),
+            ];
+            for axis in 0..3 {
+                row[axis] += x[axis] * gained[0] + y[axis] * gained[1] + z[axis] * gained[2];
+            }
+            row[SPIN] += dt_s * row[SPIN_UP];
+            row[ACROSS] += dt_s * row[ACROSS_UP];
+            row[ACROSS + 1] += dt_s * row[ACROSS_UP + 1];
+        }
+    }
+
+    /// How far a residual is off in variances, `r` being its noise's; and the residual after the scalars before it.
+    pub fn look(&self, row: Row, residual: f32, r: f32) -> (f32, f32) {
+        let (mut of_state, mut left) = (0.0, residual);
+        for &(i, a) in row {
+            left -= a * self.error[i];
+            for &(j, b) in row {
+                of_state += a * b * self.p[i][j];
+            }
+        }
+        (left * left / (of_state + r), left)
+    }
+
+    /// Takes a scalar with white variance `r`. By how many times its variance it was off, squared; used only up to `gate`.
+    pub fn update(&mut self, row: Row, residual: f32, r: f32, gate: f32) -> f32 {
+        let mut column = [0.0; STATES];
+        for &(i, a) in row {
+            for (sum, part) in column.iter_mut().zip(&self.p[i]) {
+                *sum += a * part;
+            }
+        }
+        let (mut s, mut left) = (r, residual);
+        for &(i, a) in row {
+            s += a * column[i];
+            left -= a * self.error[i];
+        }
+        let off = left * left / s;
+        // Not greater, so that NaN is refused too.
+        if !(s > 0.0 && off <= gate) {
+            return off;
+        }
+        let by_s = 1.0 / s;
+        let gain = column.map(|part| part * by_s);
+        for (error, gain) in self.error.iter_mut().zip(&gain) {
+            *error += gain * left;
+        }
+        let half = 0.5 * s;
+        let mut rest = column;
+        for (rest, gain) in rest.iter_mut().zip(&gain) {
+            *rest -= half * gain;
+        }
+        for i in 0..STATES {
+            let (k, u) = (gain[i], rest[i]);
+            for j in i..STATES {
+                self.p[i][j] -= k * rest[j] + u * gain[j];
+            }
+        }
+        for i in 1..STATES {
+            let (above, below) = self.p.split_at_mut(i);
+            for (below, above) in below[0].iter_mut().zip(above) {
+                *below = above[i];
+            }
+        }
+        off
+    }
+
+    /// Holds the variances at their floors. Whether all is finite.
+    pub fn keep_sound(&mut self) -> bool {
+        for (k, row) in self.p.iter_mut().enumerate() {
+            let least = floor(k);
+            if row[k] < least {
+                row[k] = least;
+            }
+        }
+        let sum = self
+            .p
+            .as_flattened()
+            .iter()
+            .fold(0.0, |sum, element| sum + element * 0.0);
+        sum == 0.0
+    }
+}
