@@ -1,6 +1,6 @@
 //! The whole estimation of a cycle, and two parts of it, at the unit's 5 Hz.
 //!
-//! In: nothing; a tumble and a rest of a unit with nominal parameters are computed here, in counts that flicker as those
+//! In: nothing; a tumble, a rest and a spin of a unit with nominal parameters are computed here, in counts that flicker as those
 //! of real parts do. Out: the static `CYCLES`: for each motion, ticks of calibration, of fault detection with the three
 //! vectors, of the two readings of force before a cycle, and of the whole step, for every cycle.
 
@@ -18,8 +18,8 @@ use nalgebra::{ComplexField, UnitQuaternion, Vector3};
 
 use super::counted::{motion, ticks};
 
-/// Motions: tumble, rest.
-const MOTIONS: usize = 2;
+/// Motions: tumble, rest, spin.
+const MOTIONS: usize = 3;
 /// Calibration, faults, readings of force, whole.
 const PARTS: usize = 4;
 /// Cycles of each: thirty seconds, after twenty in which the field is learnt.
@@ -35,10 +35,23 @@ const READ_AT: [usize; 2] = [5, 12];
 static CYCLES: [AtomicU32; MOTIONS * PARTS * CYCLES_COUNTED] =
     [const { AtomicU32::new(0) }; MOTIONS * PARTS * CYCLES_COUNTED];
 
-/// A unit that turns, or does not.
+/// How a unit moves.
+#[derive(Clone, Copy, PartialEq)]
+enum Moves {
+    Tumbles,
+    Rests,
+    /// After [`SETTLING`] cycles it lifts off, and spins up by half a turn a second in a second to three.
+    Spins,
+}
+
+/// [rad/s] three turns a second, and [rad/s2] how it gets there.
+const SPIN: f32 = 18.85;
+const SPIN_UP: f32 = 3.14;
+
+/// A unit that moves, or does not.
 struct Unit {
     set: Set,
-    turns: bool,
+    moves: Moves,
     fast: usize,
     q_nb: UnitQuaternion<f32>,
     random: u32,
@@ -46,10 +59,10 @@ struct Unit {
 }
 
 impl Unit {
-    fn new(turns: bool) -> Self {
+    fn new(moves: Moves) -> Self {
         let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
         Unit {
-            turns,
+            moves,
             fast: 0,
             q_nb: UnitQuaternion::identity(),
             random: 1,
@@ -74,10 +87,17 @@ impl Unit {
         let (mut force_b, mut field_b) = (Vector3::zeros(), Vector3::zeros());
         let (mut rate_b, mut before_b) = (Vector3::zeros(), Vector3::zeros());
         for fast in 0..FAST {
-            if self.turns {
+            before_b = rate_b;
+            match self.moves {
                 // A step of the motion is 20 ms; taken for 10, it tumbles twice as fast.
-                before_b = rate_b;
-                rate_b = motion(self.fast, &mut self.q_nb).rate_b * 2.0;
+                Moves::Tumbles => rate_b = motion(self.fast, &mut self.q_nb).rate_b * 2.0,
+                Moves::Rests => {}
+                Moves::Spins => {
+                    let spun_s = self.fast.saturating_sub(SETTLING * FAST) as f32 * (FAST_US as f32 * 1e-6);
+                    rate_b.x = (SPIN_UP * spun_s).min(SPIN);
+                    self.q_nb *= UnitQuaternion::from_scaled_axis(rate_b * (FAST_US as f32 * 1e-6));
+                    self.q_nb.renormalize();
+                }
             }
             force_b = self.q_nb.inverse_transform_vector(&super::counted::FORCE_N);
             field_b = self.q_nb.inverse_transform_vector(&super::counted::FIELD_N_UT);
@@ -107,6 +127,7 @@ impl Unit {
             gyro: gyro.map(|axis| self.counts(&axis, &rate_b)),
             gyro_temperature: [0; 4],
             temperature: [400; 4],
+            lift_off: self.moves == Moves::Spins && self.fast > SETTLING * FAST,
             ..Reading::unread((self.fast / FAST) as u16)
         };
         let sample = Sample {
@@ -118,17 +139,17 @@ impl Unit {
     }
 }
 
-/// Counts every cycle of both motions.
+/// Counts every cycle of all motions.
 #[inline(never)]
 pub fn count() {
-    for (n, turns) in [true, false].into_iter().enumerate() {
-        of(turns, &CYCLES[n * PARTS * CYCLES_COUNTED..][..PARTS * CYCLES_COUNTED]);
+    for (n, moves) in [Moves::Tumbles, Moves::Rests, Moves::Spins].into_iter().enumerate() {
+        of(moves, &CYCLES[n * PARTS * CYCLES_COUNTED..][..PARTS * CYCLES_COUNTED]);
     }
 }
 
 #[inline(never)]
-fn of(turns: bool, costs: &[AtomicU32]) {
-    let mut unit = Unit::new(turns);
+fn of(moves: Moves, costs: &[AtomicU32]) {
+    let mut unit = Unit::new(moves);
     let mut temperatures = Temperatures::default();
     let mut monitor = Monitor::new(&unit.set);
     let mut estimator = Estimator::of(&Settings::NOMINAL);

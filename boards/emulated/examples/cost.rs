@@ -20,6 +20,8 @@ type Row = (&'static str, Option<u32>);
 /// Instructions that a filter step with force and field may take, and a whole estimation.
 const STEP_CEILING: u32 = 6_000;
 const WHOLE_CEILING: u32 = 20_000;
+/// And a whole estimation while a rocket spins: 2 % of the processor.
+const SPIN_CEILING: u32 = 600_000;
 
 /// As in the image, in its order.
 const FILTERS: [Row; 4] = [
@@ -31,7 +33,7 @@ const FILTERS: [Row; 4] = [
 const UPDATES: usize = 600;
 
 /// As in the image, in its order.
-const PARTS: [Row; 8] = [
+const PARTS: [Row; 12] = [
     ("tumble: calibration", None),
     ("tumble: fault detection and the three vectors", None),
     ("tumble: two readings of force before it", None),
@@ -40,6 +42,10 @@ const PARTS: [Row; 8] = [
     ("rest: fault detection and the three vectors", None),
     ("rest: two readings of force before it", None),
     ("rest: whole estimation of a cycle", Some(WHOLE_CEILING)),
+    ("spin: calibration", None),
+    ("spin: fault detection and the three vectors", None),
+    ("spin: two readings of force before it", None),
+    ("spin: whole estimation of a cycle", Some(SPIN_CEILING)),
 ];
 const CYCLES: usize = 150;
 
