@@ -17,6 +17,8 @@ mod spline;
 mod still;
 mod tumble;
 
+use std::sync::Arc;
+
 use emems::estimate::{Launch, Site};
 use nalgebra::Vector3;
 
@@ -74,6 +76,23 @@ pub trait Motion: Send + Sync {
     }
 }
 
+impl Motion for Arc<dyn Motion> {
+    fn at(&self, t_s: f64) -> Pose {
+        (**self).at(t_s)
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        (**self).duration_s()
+    }
+
+    fn position_n(&self, t_s: f64) -> Vector3<f64> {
+        (**self).position_n(t_s)
+    }
+}
+
+/// A motion of any kind, somewhere on Earth.
+pub type AnyWorld = World<Arc<dyn Motion>>;
+
 /// A motion the command line offers.
 pub struct Named {
     /// What to type.
@@ -82,7 +101,9 @@ pub struct Named {
     pub about: &'static str,
     /// What the unit is told of the place.
     pub site: Site,
-    truth: fn() -> Box<dyn TruthSource>,
+    /// Whether the flight shakes the unit, beyond what the motion says.
+    is_rough: bool,
+    world: fn() -> AnyWorld,
 }
 
 /// [s] on the pad before lift-off, long enough for alignment and gyro bias at rest.
@@ -94,43 +115,43 @@ pub const LIST: [Named; 7] = [
         name: "still",
         about: "at rest, level, in the laboratory",
         site: Site::LABORATORY,
-        truth: || laboratory(Still::level()),
+        is_rough: false,
+        world: || laboratory(Still::level()),
     },
     Named {
         name: "rate-table",
         about: "the twelve positions of the gyro calibration (Table 4.1), 200 deg/s each way",
         site: Site::LABORATORY,
-        truth: || laboratory(RateTable::calibration()),
+        is_rough: false,
+        world: || laboratory(RateTable::calibration()),
     },
     Named {
         name: "tumble",
         about: "10 s rest, then all three axes at once",
         site: Site::LABORATORY,
-        truth: || laboratory(Tumble::new()),
+        is_rough: false,
+        world: || laboratory(Tumble::new()),
     },
     Named {
         name: "rotation-1",
         about: "rotation test 1 of chapter 6: each axis on its own",
         site: Site::LABORATORY,
-        truth: || laboratory(RotationTest::first()),
+        is_rough: false,
+        world: || laboratory(RotationTest::first()),
     },
     Named {
         name: "rotation-2",
         about: "rotation test 2 of chapter 6: yaw 40, pitch 35, roll 45 and -30 deg, and back",
         site: Site::LABORATORY,
-        truth: || laboratory(RotationTest::second()),
+        is_rough: false,
+        world: || laboratory(RotationTest::second()),
     },
     Named {
         name: "rocket",
         about: "a VSB-30 flight from Alcantara: 30 s on the pad, boost, 6 min of micro-gravity, re-entry",
         site: Site::ALCANTARA,
-        truth: || {
-            let site = Environment::alcantara();
-            Box::new(World {
-                motion: SoundingRocket::new(PAD_WAIT_S, site.gravity),
-                environment: site,
-            })
-        },
+        is_rough: false,
+        world: alcantara,
     },
     Named {
         name: "rocket-rough",
@@ -145,29 +166,41 @@ pub const LIST: [Named; 7] = [
             },
             ..Site::ALCANTARA
         },
-        truth: || {
-            let site = Environment::alcantara();
-            let smooth = World {
-                motion: SoundingRocket::new(PAD_WAIT_S, site.gravity),
-                environment: site,
-            };
-            Box::new(Rough::new(smooth, PAD_WAIT_S, Levels::ROUGH, 1))
-        },
+        is_rough: true,
+        world: alcantara,
     },
 ];
 
 /// The motion of that name at its default site; `None` if there is none.
 pub fn by_name(name: &str) -> Option<Box<dyn TruthSource>> {
-    LIST.iter()
-        .find(|named| named.name == name)
-        .map(|named| (named.truth)())
+    let named = LIST.iter().find(|named| named.name == name)?;
+    let world = (named.world)();
+    Some(match named.is_rough {
+        true => Box::new(Rough::new(world, PAD_WAIT_S, Levels::ROUGH, 1)),
+        false => Box::new(world),
+    })
 }
 
-fn laboratory<M: Motion + 'static>(motion: M) -> Box<dyn TruthSource> {
-    Box::new(World {
-        motion,
+/// The same, motion and site apart.
+pub fn world_by_name(name: &str) -> Option<AnyWorld> {
+    LIST.iter()
+        .find(|named| named.name == name)
+        .map(|named| (named.world)())
+}
+
+fn alcantara() -> AnyWorld {
+    let site = Environment::alcantara();
+    World {
+        motion: Arc::new(SoundingRocket::new(PAD_WAIT_S, site.gravity)),
+        environment: site,
+    }
+}
+
+fn laboratory<M: Motion + 'static>(motion: M) -> AnyWorld {
+    World {
+        motion: Arc::new(motion),
         environment: Environment::laboratory(),
-    })
+    }
 }
 
 #[cfg(test)]
