@@ -4,6 +4,7 @@ pub mod effect;
 pub mod environment;
 pub mod geometry;
 pub mod host;
+pub mod keys;
 pub mod motion;
 pub mod part;
 pub mod plant;

@@ -16,6 +16,8 @@ use nalgebra::{Unit, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::keys::meant;
+
 /// What a channel measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -217,7 +219,7 @@ impl UnitDescription {
     pub fn read(text: &str, file: &str) -> Result<Self, UnitError> {
         let mut unit: UnitDescription = toml::from_str(text).map_err(|error| UnitError::Format {
             file: file.to_owned(),
-            reason: error.to_string().trim_end().to_owned(),
+            reason: meant(error.to_string().trim_end()),
         })?;
         if unit.channels.is_empty() {
             return Err(UnitError::NoChannel { file: file.to_owned() });

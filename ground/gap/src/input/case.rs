@@ -88,6 +88,7 @@ pub enum Kind {
 
 /// `case.toml` as written.
 #[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CaseFile {
     /// `gap-case/1`.
     pub format: String,
@@ -110,12 +111,26 @@ pub struct CaseFile {
     /// How well the truth instrument knows.
     #[serde(default)]
     pub reference: ReferenceSigmas,
+    /// What is too small to care about.
+    #[serde(default)]
+    pub matters: Matters,
     /// What is fitted and what only judges.
     pub windows: WindowPairs,
 }
 
+/// `[matters]`; of the format, and not used yet.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Matters {
+    /// [deg] of attitude.
+    pub attitude_deg: Option<f64>,
+    /// [sigma] of the gap.
+    pub gap_sigma: Option<f64>,
+}
+
 /// `[environment]`.
 #[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Surroundings {
     /// [m/s2] local gravity.
     pub gravity_m_s2: Option<f64>,
@@ -126,16 +141,25 @@ pub struct Surroundings {
     /// [uT] how well that field is known and how uniform it is.
     #[serde(default)]
     pub field_sigma_ut: f64,
+    /// [uT] how much it changes during the log; of the format, and not used: what the field does is searched for.
+    pub field_wander_sigma_ut: Option<f64>,
+    /// [s] over which it stays alike; of the format, and not used.
+    pub field_correlation_s: Option<f64>,
+    /// [uT/m] how much it changes with the place; of the format, and not used.
+    pub field_gradient_sigma_ut_m: Option<f64>,
     /// [degC] temperature at which the nominal parameters hold.
     pub temperature_c: Option<f64>,
 }
 
 /// `[reference]`.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ReferenceSigmas {
     /// [rad] of its attitude.
     #[serde(default)]
     pub attitude_sigma_rad: f64,
+    /// [s] over which its error stays alike; of the format, and not used: a second is taken for all.
+    pub attitude_correlation_s: Option<f64>,
     /// [m] of its position.
     #[serde(default)]
     pub position_sigma_m: f64,
@@ -143,6 +167,7 @@ pub struct ReferenceSigmas {
 
 /// `[windows]` as written: pairs of seconds, or for a table sequence numbers.
 #[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct WindowPairs {
     /// The cause is fitted on these.
     pub fit: Vec<Edge>,

@@ -7,6 +7,7 @@ use std::{
 };
 
 use flate2::read::MultiGzDecoder;
+use twin::keys::meant;
 
 use super::CaseError;
 
@@ -41,5 +42,5 @@ pub fn read_bytes(file: &Path) -> Result<Vec<u8>, CaseError> {
 /// A TOML error as file, line and what is wrong.
 pub fn toml_problem(file: &Path, error: &toml::de::Error) -> CaseError {
     let place = error.to_string().lines().next().unwrap_or("TOML").to_owned();
-    CaseError::key(file, place, error.message().to_owned())
+    CaseError::key(file, place, meant(error.message()))
 }
