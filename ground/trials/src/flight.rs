@@ -1,7 +1,9 @@
 //! The unit flown on the host board: packets out, and the instants at which its sensors sampled.
 //!
 //! In: a plant. Out: readings by packet, or for [`instants`] the time of each channel's sample after its packet's time
-//! zero. Those are found by listening at the parts: a view that writes down when it is asked hears every conversion.
+//! zero. Those are found by listening at the parts: a view that writes down when it is asked hears every conversion that is
+//! read. A part with a low-pass asks for more: the newest instant of a read first, then the past, as far as nobody has asked for
+//! it before. So what is later than all before it is a conversion, and the rest is none.
 
 use std::sync::{Arc, Mutex};
 
@@ -33,8 +35,10 @@ const TRANSFER_S: f64 = 1e-3;
 /// When the unit's samples are made.
 #[derive(Clone, Debug)]
 pub struct Instants {
-    /// [s] after power-on at which packet 0 has its time zero.
+    /// [s] after power-on at which packet 0 has its time zero: its oldest sample.
     pub zero_s: f64,
+    /// [s] after that at which its cycle begins.
+    pub lead_s: f64,
     /// [s] each channel's sampling instant after its packet's time zero; at least zero.
     pub slots_s: [f64; CHANNEL_COUNT],
 }
@@ -117,6 +121,7 @@ pub fn instants(seed: u64) -> Option<Instants> {
     let earliest = slots_s.iter().copied().fold(f64::MAX, f64::min);
     Some(Instants {
         zero_s: packet_zero_s + earliest,
+        lead_s: -earliest,
         slots_s: slots_s.map(|slot_s| slot_s - earliest),
     })
 }
@@ -124,7 +129,9 @@ pub fn instants(seed: u64) -> Option<Instants> {
 fn listened<T: 'static>(view: &Input<T>, asked: &Arc<Mutex<Vec<f64>>>) -> Input<T> {
     let (view, asked) = (view.clone(), asked.clone());
     Arc::new(move |t_s| {
-        if let Ok(mut asked) = asked.lock() {
+        if let Ok(mut asked) = asked.lock()
+            && asked.last().is_none_or(|newest| t_s > *newest)
+        {
             asked.push(t_s);
         }
         view(t_s)
@@ -141,6 +148,39 @@ mod tests {
 
     /// [s] a set of a magnetometer at 75 Hz or an accelerometer at 50 Hz is at most this old, and reading all takes 5 ms.
     const OLDEST: f64 = 0.026;
+
+    #[test]
+    fn an_accelerometer_reads_a_ramp_as_of_the_instant_it_is_said_to_sample_at() {
+        /// [m/s2] a second; six seconds are within the range, and a count is 2 ms.
+        const SLOPE: f64 = 15.0;
+        /// [s] of its low-pass of 25 Hz.
+        const TAU_S: f64 = 1.0 / (std::f64::consts::TAU * 25.0);
+        for seed in 1..9 {
+            let instants = instants(seed).expect("derived frames");
+            let source: Arc<dyn twin::truth::TruthSource> = motion::by_name("still").expect("a motion").into();
+            let mut views = Views::of(&source);
+            let ramp: Input<nalgebra::Vector3<f64>> =
+                Arc::new(|t_s| nalgebra::Vector3::repeat(SLOPE * (t_s - 1.0).max(0.0)));
+            views.force_p = std::array::from_fn(|_| ramp.clone());
+            let quality = Quality {
+                noise: 0.0,
+                bias: 0.0,
+                ..Quality::NOMINAL
+            };
+            let readings = fly(Plant::seeing(&views, source, seed, quality), 4.0);
+            let reading = readings.iter().find(|reading| reading.counter == 12).expect("a packet");
+            for plate in 0..4 {
+                let felt = Quantity::SpecificForce.si(reading.acc_p[plate][0]);
+                let seen_s = 1.0 + felt / SLOPE + TAU_S;
+                let said_s = instants.zero_s + instants.slots_s[3 * plate] + 12.0 * CYCLE_S;
+                // Half a count, and a nanosecond.
+                assert!(
+                    (seen_s - said_s).abs() < 1.1e-3,
+                    "seed {seed}, plate {plate}: {seen_s} {said_s}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn samples_are_a_little_older_than_their_reading_and_differ_between_units() {
