@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
+use packets::channel::Quantity;
 use twin::part::signal::Noise;
 
 /// A stream of draws.
@@ -10,9 +11,29 @@ use twin::part::signal::Noise;
 pub struct Draw {
     noise: Noise,
     drawn: u64,
+    asked: Option<Asked>,
+}
+
+/// The sensors that are to be struck, where nothing is to be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Of this plate.
+    pub plate: usize,
+    /// Of this kind; `None` for whatever the disturbance strikes.
+    pub quantity: Option<Quantity>,
 }
 
 impl Draw {
+    /// The same stream, but this is struck.
+    pub fn asking(self, asked: Option<Asked>) -> Self {
+        Draw { asked, ..self }
+    }
+
+    /// What is to be struck; drawn where it is none.
+    pub fn asked(&self) -> Option<Asked> {
+        self.asked
+    }
+
     /// The stream of a seed. Seeds are spread first (the finaliser of SplitMix64; Steele, Lea and Flood 2014), for what is
     /// drawn by neighbouring seeds would be the same numbers in another order.
     pub fn new(seed: u64) -> Self {
@@ -21,6 +42,7 @@ impl Draw {
         Draw {
             noise: Noise::new(mixed ^ (mixed >> 31)),
             drawn: 0,
+            asked: None,
         }
     }
 
@@ -29,6 +51,7 @@ impl Draw {
         Draw {
             noise: self.noise.stream(index),
             drawn: 0,
+            asked: self.asked,
         }
     }
 

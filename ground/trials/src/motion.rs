@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use twin::motion::{Attitude, Jet, Motion, Pose, Profile};
 
-use crate::draw::Draw;
+use crate::{draw::Draw, followed::Followed};
 
 /// Sinusoids of one angle.
 const TONES: usize = 3;
@@ -78,16 +78,6 @@ impl Wander {
         }
     }
 
-    /// [m] the centre in n.
-    pub fn position_n(&self, t_s: f64) -> Vector3<f64> {
-        Vector3::from_fn(|axis, _| self.place(axis, t_s).value)
-    }
-
-    /// [rad] turned about the vertical since the start, whole turns counted.
-    pub fn heading_rad(&self, t_s: f64) -> f64 {
-        self.angle(0, t_s).value
-    }
-
     fn place(&self, axis: usize, t_s: f64) -> Jet {
         let (amplitude_m, rate) = self.path[axis];
         self.envelope.at(t_s) * Jet::sine(amplitude_m, rate, t_s)
@@ -120,6 +110,16 @@ impl Motion for Wander {
 
     fn duration_s(&self) -> Option<f64> {
         Some(self.duration_s)
+    }
+
+    fn position_n(&self, t_s: f64) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| self.place(axis, t_s).value)
+    }
+}
+
+impl Followed for Wander {
+    fn heading_rad(&self, t_s: f64) -> f64 {
+        self.angle(0, t_s).value
     }
 }
 

@@ -17,7 +17,7 @@ use twin::{
     truth::TruthSource,
 };
 
-use crate::{answer::Size, draw::Draw, motion::Wander, unit::kind};
+use crate::{answer::Size, deal::DURATION_S, draw::Draw, followed::Followed, motion::Wander, unit::kind};
 
 /// [s] step of the tables of slow filters.
 const STEP_S: f64 = 2e-3;
@@ -31,7 +31,9 @@ pub type Transit = Box<dyn Fn(&mut Vec<Reading>) + Send + Sync>;
 /// A trial before it is flown.
 pub struct Scene {
     /// How the unit really moves.
-    pub motion: Arc<Wander>,
+    pub motion: Arc<dyn Followed>,
+    /// [s] for how long.
+    pub duration_s: f64,
     /// Where.
     pub site: Environment,
     /// Truth at the centre.
@@ -46,9 +48,37 @@ pub struct Scene {
     pub claimed: Environment,
     /// Sizes of what is wrong that verdicts state too.
     pub sizes: Vec<Size>,
+    /// How large what is wrong is on the whole, where no verdict states it; in SI, field in uT.
+    pub magnitude: Option<f64>,
 }
 
 impl Scene {
+    /// A unit whose parts see this of a motion; nothing is wrong with it.
+    pub fn of(motion: Arc<dyn Followed>, duration_s: f64, site: Environment, views: Views) -> Self {
+        let source: Arc<dyn TruthSource> = Arc::new(World {
+            motion: motion.clone() as Arc<dyn Motion>,
+            environment: site,
+        });
+        let followed = motion.clone();
+        Scene {
+            motion,
+            duration_s,
+            site,
+            source,
+            views,
+            transit: Vec::new(),
+            record: Arc::new(move |t_s| (followed.at(t_s).attitude.q_nb, followed.position_n(t_s))),
+            claimed: site,
+            sizes: Vec::new(),
+            magnitude: None,
+        }
+    }
+
+    /// How much longer it is than a dealt case: what happens at drawn instants happens within it.
+    pub fn pace(&self) -> f64 {
+        self.duration_s / DURATION_S
+    }
+
     /// The undisturbed unit of a draw: scales and axes off by their sigmas.
     pub fn new(motion: Wander, site: Environment, draw: &mut Draw) -> Self {
         let motion = Arc::new(motion);
@@ -68,20 +98,7 @@ impl Scene {
             let tilt = tilt - axis_b * axis_b.dot(&tilt);
             views.rate[plate] = Arc::new(move |t_s| scale * (axis_b + tilt).dot(&source.at(t_s).rate_b));
         }
-        let record: Record = {
-            let motion = motion.clone();
-            Arc::new(move |t_s| (motion.at(t_s).attitude.q_nb, motion.position_n(t_s)))
-        };
-        Scene {
-            motion,
-            site,
-            source,
-            views,
-            transit: Vec::new(),
-            record,
-            claimed: site,
-            sizes: Vec::new(),
-        }
+        Scene::of(motion, DURATION_S, site, views)
     }
 
     /// Notes a size that all channels touched have.

@@ -6,7 +6,6 @@ use twin::geometry;
 
 use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
 use crate::{
-    deal::DURATION_S,
     draw::Draw,
     scene::{Scene, changed, rubbed, shifted, slow},
 };
@@ -84,13 +83,14 @@ fn scale_temperature(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<u
 fn misalignment(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
-        let skew = Matrix3::from_fn(|row, column| {
+        let skew: Matrix3<f64> = Matrix3::from_fn(|row, column| {
             if row == column {
                 0.0
             } else {
                 strength * 0.008 * draw.normal()
             }
         });
+        scene.magnitude.get_or_insert(skew.norm());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| force + skew * force);
     }
     channels(SpecificForce, &plates)
@@ -114,7 +114,8 @@ fn hysteresis(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (plates, way) = (plates(draw), draw.log_uniform(0.3, 3.0));
     for &plate in &plates {
         let behind = strength * 5.0 * MG * draw.vector().abs();
-        let lean = rubbed(&scene.views.force_p[plate], way, DURATION_S + 2.0);
+        scene.magnitude.get_or_insert(behind.norm());
+        let lean = rubbed(&scene.views.force_p[plate], way, scene.duration_s + 2.0);
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
             force - behind.component_mul(&lean(t))
         });
@@ -128,6 +129,7 @@ fn vibration_rectification(scene: &mut Scene, draw: &mut Draw, strength: f64) ->
     let plates = plates(draw);
     for &plate in &plates {
         let (k, source) = (strength * 2.0 * MG * draw.vector(), scene.source.clone());
+        scene.magnitude.get_or_insert(k.norm());
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| {
             let shaking = source.at(t).rate_b.norm_squared();
             force + k * (shaking / (1.0 + 0.005 * shaking))
@@ -165,7 +167,7 @@ fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 fn high_pass(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let (plates, tau_s) = (plates(draw), draw.log_uniform(0.5, 3.0));
     for &plate in &plates {
-        let slow = slow(&scene.views.force_p[plate], tau_s, DURATION_S + 2.0);
+        let slow = slow(&scene.views.force_p[plate], tau_s, scene.duration_s + 2.0);
         scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |t, force| force - slow(t));
     }
     channels(SpecificForce, &plates)

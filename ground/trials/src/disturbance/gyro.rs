@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use packets::channel::Quantity::Rate;
-use twin::{geometry, motion::Motion, part::signal::Noise, plant::Views};
+use twin::{geometry, part::signal::Noise, plant::Views};
 
 use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
 use crate::{
-    deal::DURATION_S,
     draw::Draw,
     scene::{Scene, changed, lagged, shifted},
 };
@@ -117,6 +116,7 @@ fn nonlinearity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
     let plates = plates(draw);
     for &plate in &plates {
         let a = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.004;
+        scene.magnitude.get_or_insert(a);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| {
             rate + a * rate.powi(3) * (1.0 - 0.02 * rate * rate)
         });
@@ -130,6 +130,7 @@ fn misalignment(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
         let axis_b = geometry::gyro_axis_b(plate);
         // A turned axis, so its component along itself shrinks too.
         let turn = nalgebra::Rotation3::new(strength * draw.uniform(0.5, 1.5) * 0.01 * axis_b.cross(&draw.direction()));
+        scene.magnitude.get_or_insert(turn.angle());
         let (source, turned_b) = (scene.source.clone(), turn * axis_b);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
             rate + (turned_b - axis_b).dot(&source.at(t).rate_b)
@@ -142,6 +143,7 @@ fn g_sensitivity(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
     let plates = plates(draw);
     for &plate in &plates {
         let k = strength * 0.05 * DEG / 9.8 * draw.vector();
+        scene.magnitude.get_or_insert(k.norm());
         let source = scene.source.clone();
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
             rate + k.dot(&source.at(t).force_b)
@@ -156,6 +158,7 @@ fn g2(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     for &plate in &plates {
         let k = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.02 * DEG / (9.8 * 9.8);
+        scene.magnitude.get_or_insert(k);
         let (soft_p, force_p) = (draw.direction(), Views::of(&scene.source).force_p[plate].clone());
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
             let force = force_p(t);
@@ -170,17 +173,19 @@ fn g2(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 fn supply(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let is_load = draw.chance(0.5);
     let (onset_s, tau_s, slow) = (
-        draw.uniform(60.0, 240.0),
-        draw.uniform(5.0, 30.0),
+        scene.pace() * draw.uniform(60.0, 240.0),
+        scene.pace() * draw.uniform(5.0, 30.0),
         draw.uniform(0.05, 0.2),
     );
+    let whole_s = scene.duration_s;
     let sag_v = move |t: f64| match is_load {
         true if t < onset_s => 0.0,
         true => 0.25 * (1.0 - slow * (-(t - onset_s) / tau_s).exp()),
-        false => 0.25 * t / DURATION_S * (1.0 + slow * (t / DURATION_S - 1.0)),
+        false => 0.25 * t / whole_s * (1.0 + slow * (t / whole_s - 1.0)),
     };
     for plate in ALL_PLATES {
         let k = strength * draw.sign() * draw.uniform(0.5, 1.5) * 0.5 * DEG;
+        scene.magnitude.get_or_insert(k);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| rate - k * sag_v(t));
     }
     channels(Rate, &ALL_PLATES)
@@ -206,18 +211,19 @@ fn latency(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 /// Steps of a second, joined by lines.
 fn bias_walk(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    const STEPS: usize = 1200;
+    let steps = (scene.duration_s as usize + 1).max(1200);
     let plates = plates(draw);
+    scene.magnitude.get_or_insert(strength * 0.01 * DEG);
     for &plate in &plates {
         let noise = Noise::new(draw.uniform(0.0, 1e15) as u64);
         let mut walk = vec![0.0];
-        for step in 0..STEPS {
+        for step in 0..steps {
             let last = walk.last().copied().unwrap_or(0.0);
             walk.push(last + strength * 0.01 * DEG * noise.normal(step as u64));
         }
         let walk = Arc::new(walk);
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |t, rate| {
-            let at = t.clamp(0.0, STEPS as f64 - 1.0);
+            let at = t.clamp(0.0, steps as f64 - 1.0);
             let (whole, part) = (at.floor() as usize, at.fract());
             rate + walk[whole] * (1.0 - part) + walk[whole + 1] * part
         });
@@ -228,6 +234,7 @@ fn bias_walk(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 fn saturation(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     let most = draw.uniform(0.6, 1.0);
+    scene.magnitude.get_or_insert(most);
     for &plate in &plates {
         scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| rate.clamp(-most, most));
     }

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 use packets::channel::Quantity::Field;
-use twin::{geometry, motion::Motion};
+use twin::geometry;
 
-use super::{ALL_PLATES, Disturbance, channels, graded, gross, plates, warm};
+use super::{ALL_PLATES, Disturbance, channels, graded, gross, plate, plates, warm};
 use crate::{
     draw::Draw,
     scene::{Scene, changed, lagged, shifted},
@@ -31,6 +31,7 @@ pub const ALL: &[Disturbance] = &[
 /// A magnet in the unit: one field in b, and a dipole's difference from plate to plate.
 fn hard_iron(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let common_b = strength * 0.6 * draw.vector();
+    scene.magnitude.get_or_insert(common_b.norm());
     for plate in ALL_PLATES {
         let own_b = common_b + strength * 0.15 * draw.vector();
         let own_p = geometry::dcm_bp(plate).transpose() * own_b;
@@ -42,7 +43,8 @@ fn hard_iron(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 /// Iron in the unit: symmetric, the same in b for all plates.
 fn soft_iron(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let half = Matrix3::from_fn(|_, _| strength * 0.01 * draw.normal());
-    let soft_b = half + half.transpose();
+    let soft_b: Matrix3<f64> = half + half.transpose();
+    scene.magnitude.get_or_insert(soft_b.norm());
     for plate in ALL_PLATES {
         let dcm_bp = geometry::dcm_bp(plate);
         let soft_p = dcm_bp.transpose() * soft_b * dcm_bp;
@@ -85,6 +87,7 @@ fn cross_field(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> 
     let plates = plates(draw);
     for &plate in &plates {
         let k = strength * 6e-4 * draw.uniform(0.6, 1.4) * draw.sign();
+        scene.magnitude.get_or_insert(k);
         scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |_, field| {
             field + k * Vector3::new(field.x * field.y, field.y * field.z, field.z * field.x)
         });
@@ -94,9 +97,10 @@ fn cross_field(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> 
 
 /// Permed at an instant: offset and gain jump.
 fn set_reset(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    let plate = draw.below(4);
-    let onset_s = draw.uniform(60.0, 200.0);
+    let plate = plate(draw);
+    let onset_s = scene.pace() * draw.uniform(60.0, 200.0);
     let (gain, offset) = (strength * draw.sign() * 0.02, strength * 0.5 * draw.vector());
+    scene.magnitude.get_or_insert(offset.norm());
     scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
         if t < onset_s {
             field
@@ -112,6 +116,7 @@ fn current_field(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
     let (period_s, share) = (draw.uniform(25.0, 60.0), draw.uniform(0.3, 0.6));
     for plate in ALL_PLATES {
         let field_p = strength * 0.5 * draw.vector();
+        scene.magnitude.get_or_insert(field_p.norm());
         scene.views.field_p_ut[plate] = changed(&scene.views.field_p_ut[plate], move |t, field| {
             if (t / period_s).fract() < share {
                 field + field_p
@@ -138,6 +143,7 @@ fn eddy_current(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
 fn mains_alias(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let hz = 60.0 * (1.0 + 3e-5 * draw.normal()) + 0.01 * draw.normal();
     let [in_phase_n, behind_n] = [0.5, 0.1].map(|size_ut| strength * size_ut * draw.vector());
+    scene.magnitude.get_or_insert(in_phase_n.norm());
     let third = draw.uniform(0.0, 0.1);
     for plate in ALL_PLATES {
         let (dcm_pb, motion) = (geometry::dcm_bp(plate).transpose(), scene.motion.clone());
@@ -166,7 +172,8 @@ fn field_gradient(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usiz
     // Free of sources and curl: symmetric and without trace [uT/m].
     let half = Matrix3::from_fn(|_, _| strength * 4.0 * draw.normal());
     let gradient_n = half + half.transpose();
-    let gradient_n = gradient_n - Matrix3::identity() * (gradient_n.trace() / 3.0);
+    let gradient_n: Matrix3<f64> = gradient_n - Matrix3::identity() * (gradient_n.trace() / 3.0);
+    scene.magnitude.get_or_insert(gradient_n.norm());
     for plate in ALL_PLATES {
         let (dcm_bp, place_b) = (geometry::dcm_bp(plate), geometry::accelerometer_place_b(plate));
         let motion = scene.motion.clone();

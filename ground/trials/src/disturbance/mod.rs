@@ -80,11 +80,18 @@ pub fn named() -> Vec<Disturbance> {
 /// The plates a disturbance of single sensors strikes: mostly one, else all.
 fn plates(draw: &mut Draw) -> Vec<usize> {
     let one = draw.below(PLATES);
-    if draw.chance(0.6) {
-        vec![one]
-    } else {
-        (0..PLATES).collect()
+    let is_one = draw.chance(0.6);
+    match draw.asked() {
+        Some(asked) => vec![asked.plate],
+        None if is_one => vec![one],
+        None => (0..PLATES).collect(),
     }
+}
+
+/// The plate a disturbance of one plate strikes.
+fn plate(draw: &mut Draw) -> usize {
+    let one = draw.below(PLATES);
+    draw.asked().map_or(one, |asked| asked.plate)
 }
 
 /// Channels of a quantity on some plates.

@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use packets::channel::Quantity::{Field, Rate, SpecificForce};
 use twin::{geometry, plant::Views};
 
-use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving};
+use super::{ALL_PLATES, Disturbance, channels, graded, gross, moving, plate};
 use crate::{
     draw::Draw,
     scene::{Scene, changed, shifted},
@@ -31,8 +31,9 @@ pub const ALL: &[Disturbance] = &[
 
 /// A plate screwed on askew turns its three sensors together.
 fn plate_rotation(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    let plate = draw.below(4);
+    let plate = plate(draw);
     let turn_b = nalgebra::Rotation3::new(strength * 0.01 * draw.direction());
+    scene.magnitude.get_or_insert(0.01 * strength);
     let dcm_bp = geometry::dcm_bp(plate);
     let turn_p = dcm_bp.transpose() * turn_b.matrix() * dcm_bp;
     scene.views.force_p[plate] = changed(&scene.views.force_p[plate], move |_, force| turn_p * force);
@@ -49,10 +50,11 @@ fn plate_rotation(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usiz
 /// A plate on stand-offs yields to what presses on its face, and a tenth as much to what pulls along it, and turns its
 /// sensors by that: by its weight, for in all motions here the pull of a turn is a fiftieth of that.
 fn plate_flexing(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    let plate = draw.below(4);
+    let plate = plate(draw);
     let hinge = draw.uniform(0.0, std::f64::consts::TAU);
     // [rad s2/m] 0.17 deg at one g.
     let yielding = strength * draw.uniform(0.5, 1.5) * 0.003 / 9.8;
+    scene.magnitude.get_or_insert(yielding);
     let along_p = 0.1 * draw.direction();
     let load_p = Views::of(&scene.source).force_p[plate].clone();
     let turn_p = move |t: f64| {
@@ -79,7 +81,7 @@ fn plate_flexing(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 
 /// Two plates' connectors are exchanged: all that is on one is read for the other.
 fn plate_swap(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
-    let one = draw.below(4);
+    let one = plate(draw);
     let other = (one + 1 + draw.below(3)) % 4;
     scene.views.force_p.swap(one, other);
     scene.views.field_p_ut.swap(one, other);
@@ -108,6 +110,7 @@ fn gravity_value(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize
 /// The table stands askew: everything the record says is turned by a rotation fixed in n about a level axis.
 fn table_tilt(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let way = draw.uniform(0.0, std::f64::consts::TAU);
+    scene.magnitude.get_or_insert(0.005 * strength);
     let tilt = UnitQuaternion::from_scaled_axis(strength * 0.005 * Vector3::new(way.cos(), way.sin(), 0.0));
     let record = scene.record.clone();
     scene.record = Arc::new(move |t| {
@@ -120,6 +123,7 @@ fn table_tilt(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 /// The unit sits askew on what is measured: the record is turned by a rotation fixed in b.
 fn mounting(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let askew = UnitQuaternion::from_scaled_axis(strength * 0.01 * draw.direction());
+    scene.magnitude.get_or_insert(0.01 * strength);
     let record = scene.record.clone();
     scene.record = Arc::new(move |t| {
         let (q_nb, place_n) = record(t);

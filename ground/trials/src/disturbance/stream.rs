@@ -38,6 +38,10 @@ fn noise_level(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> 
     let plates = plates(draw);
     let white = white(draw.uniform(0.0, 1e15));
     let quantity = if draw.chance(0.5) { Field } else { SpecificForce };
+    let quantity = draw.asked().and_then(|asked| asked.quantity).unwrap_or(quantity);
+    scene
+        .magnitude
+        .get_or_insert(strength * if quantity == Field { 0.2 } else { 0.12 });
     for &plate in &plates {
         let noise = move |t: f64| Vector3::from_fn(|axis, _| white(t, (8 * plate + axis) as u64));
         match quantity {
@@ -60,6 +64,7 @@ fn noise_level(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> 
 /// A motor's line, seen by every accelerometer and, a little, by every gyro.
 fn vibration(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (rate, direction_b) = (draw.uniform(2.0 * 3.1, 9.0 * 3.1), draw.direction());
+    scene.magnitude.get_or_insert(0.12 * strength);
     for plate in ALL_PLATES {
         let swing_p =
             strength * 0.12 * draw.uniform(0.7, 1.3) * (twin::geometry::dcm_bp(plate).transpose() * direction_b);
@@ -72,7 +77,8 @@ fn vibration(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 
 /// Taps: short decaying strokes on the whole unit, some a minute.
 fn shock(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
-    let taps: Vec<(f64, Vector3<f64>)> = (0..60)
+    scene.magnitude.get_or_insert(20.0 * strength);
+    let taps: Vec<(f64, Vector3<f64>)> = (0..(0.1 * scene.duration_s).ceil() as u32)
         .map(|k| {
             (
                 10.0 * f64::from(k) + draw.uniform(0.0, 10.0),
@@ -100,6 +106,7 @@ fn shock(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 /// The instant of each packet is off by a draw of its own; a packet's fast samples share it.
 fn sampling_jitter(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let white = white(draw.uniform(0.0, 1e15));
+    scene.magnitude.get_or_insert(0.003 * strength);
     let when = move |t: f64| t + strength * 0.003 * white((t / 0.2).floor() * 0.2, 0);
     for plate in ALL_PLATES {
         scene.views.force_p[plate] = shifted(&scene.views.force_p[plate], when);
@@ -125,6 +132,7 @@ fn codes(reading: &mut Reading, index: usize) -> Option<&mut i16> {
 fn some_sensors(draw: &mut Draw) -> Vec<Vec<usize>> {
     let plates = plates(draw);
     let quantity = [SpecificForce, Field, Rate][draw.below(3)];
+    let quantity = draw.asked().and_then(|asked| asked.quantity).unwrap_or(quantity);
     plates.into_iter().map(|plate| channels(quantity, &[plate])).collect()
 }
 
@@ -132,6 +140,7 @@ fn some_sensors(draw: &mut Draw) -> Vec<Vec<usize>> {
 fn stale_sample(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
     let (sensors, noise) = (some_sensors(draw), Noise::new(draw.uniform(0.0, 1e15) as u64));
     let share = (0.02 * strength).min(0.5);
+    scene.magnitude.get_or_insert(share);
     let touched = sensors.concat();
     scene.transit.push(Box::new(move |readings| {
         for at in 1..readings.len() {
@@ -154,7 +163,7 @@ fn stale_sample(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize>
 /// Packets that are lost and not counted: what comes after is early.
 fn packet_loss(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let lost: Vec<u16> = (0..1 + draw.below(3))
-        .map(|_| draw.uniform(200.0, 2400.0) as u16)
+        .map(|_| (scene.pace() * draw.uniform(200.0, 2400.0)) as u16)
         .collect();
     scene.transit.push(Box::new(move |readings| {
         readings.retain(|reading| !lost.contains(&reading.counter));
@@ -198,7 +207,10 @@ fn bit_fault(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
 fn stuck_channel(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let sensor = some_sensors(draw).swap_remove(0);
     let channel = sensor[draw.below(sensor.len())];
-    let (onset, value) = (draw.uniform(100.0, 600.0) as usize, (draw.normal() * 30.0) as i16);
+    let (onset, value) = (
+        (scene.pace() * draw.uniform(100.0, 600.0)) as usize,
+        (draw.normal() * 30.0) as i16,
+    );
     each(
         scene,
         &[channel],
