@@ -1,7 +1,7 @@
 //! `ground gap`: what the twin of a unit lacks, from a case.
 //!
-//! A thin shell: it reads the case, shows how far the work is, prints the verdict and writes `verdict.json`, the page and
-//! the twin's updated `unit.toml`.
+//! A thin shell: it reads the case, shows how far the work is, keeps what is said ([`crate::kept`]), prints it, and writes the
+//! twin with the effect in beside the case.
 
 use std::{
     io,
@@ -13,8 +13,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use twin::predict::UnitDescription;
 
 use crate::{
+    against::against,
     diagnose::{Diagnosis, diagnose},
     input::case::{CaseError, Subject},
+    kept::{self, Analysis, Kept},
     library::hypotheses::Library,
     null::problem::Problem,
     report::{page, terminal, verdict::Verdict},
@@ -25,17 +27,22 @@ use crate::{
 ///
 /// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
 /// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
+/// The twin with the effect in and, where the unit can correct the cause, the calibration set go into CASE/corrected; what was
+/// said is kept in CASE/analysis until a byte of the case changes.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground gap cases/flight-7\n  ground gap limits cases/flight-7\n  ground gap cases/flight-7 --out verdicts/flight-7"
+    after_help = "Examples:\n  ground gap flights/tumble-1\n  ground gap limits flights/tumble-1\n  ground gap flights/tumble-1 --against flights/rotation-1-1\n  ground gap flights/tumble-1 --out verdicts/flight-7"
 )]
 pub struct Arguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
     #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
     pub words: Vec<String>,
-    /// Write verdict.json, index.html, unit.toml and, where the unit can correct the cause, calibration.toml in DIR
+    /// Write verdict.json, index.html, unit.toml and, where the unit can correct the cause, calibration.toml in DIR too
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Hold the corrected twin against another case of the same unit: the gap before and after, on data that neither has seen
+    #[arg(long, value_name = "CASE")]
+    pub against: Option<PathBuf>,
     /// Leave an effect out of the library; may be given several times
     #[arg(long, value_name = "EFFECT")]
     pub withhold: Vec<String>,
@@ -43,6 +50,17 @@ pub struct Arguments {
     #[arg(long)]
     pub json: bool,
 }
+
+/// Where the corrected twin goes, in the folder of its case.
+pub const CORRECTED: &str = "corrected";
+/// The verdict for programs.
+pub const VERDICT: &str = "verdict.json";
+/// The verdict as a page.
+pub const PAGE: &str = "index.html";
+/// The twin with the effect in.
+pub const UNIT: &str = "unit.toml";
+/// The calibration set.
+pub const SET: &str = "calibration.toml";
 
 /// Why there is no verdict.
 #[derive(Debug, thiserror::Error)]
@@ -95,13 +113,76 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     {
         return Err(GapError::Effect(stranger.clone()));
     }
-    let subject = Subject::open(Path::new(case))?;
+    let case = Path::new(case);
+    let (kept, analysis) = asked(case, &arguments.withhold)?;
+    let name = if arguments.json {
+        VERDICT.to_owned()
+    } else {
+        format!("{word}.txt")
+    };
+    print!("{}", kept::text(&analysis, &name).unwrap_or_default());
+    if word == "all" && arguments.withhold.is_empty() && !arguments.json {
+        let unit = beside(&kept, CORRECTED).join(UNIT);
+        println!("{}\n{}", unit.display(), kept.folder().join(PAGE).display());
+    }
+    if let Some(other) = &arguments.against {
+        let unit = kept::text(&analysis, UNIT).unwrap_or_default();
+        let unit = UnitDescription::read(unit, UNIT).map_err(CaseError::from)?;
+        let compared = against(other, &unit)?;
+        print!("{}", compared.text(&other.display().to_string()));
+    }
+    if let Some(folder) = &arguments.out {
+        make(folder)?;
+        for name in [VERDICT, PAGE] {
+            put(folder, name, kept::text(&analysis, name).unwrap_or_default())?;
+        }
+        write_twin(folder, &analysis)?;
+        println!("{}", folder.join(PAGE).display());
+    }
+    Ok(())
+}
+
+/// Every text of a case: as it was kept, or by a diagnosis, which is kept then. The twin with what was found in stands in the
+/// case's folder after that.
+///
+/// # Errors
+/// When the case cannot be judged.
+pub fn asked(case: &Path, withheld: &[String]) -> Result<(Kept, Analysis), GapError> {
+    let kept = Kept::of(case, withheld)?;
+    let (analysis, written) = match kept.read() {
+        Some(analysis) => (analysis, Ok(())),
+        None => {
+            let analysis = analysed(case, withheld)?;
+            let written = kept.write(&analysis).map_err(|source| GapError::Write {
+                file: kept.folder().into(),
+                source,
+            });
+            (analysis, written)
+        }
+    };
+    let written = match withheld {
+        [] => written.and_then(|()| write_twin(&beside(&kept, CORRECTED), &analysis)),
+        _ => written,
+    };
+    if let Err(error) = written {
+        // What was found is worth saying all the same.
+        eprintln!("warning: {error}");
+    }
+    Ok((kept, analysis))
+}
+
+/// Diagnoses a case on a terminal; every text of it.
+///
+/// # Errors
+/// When the case cannot be judged.
+pub fn analysed(case: &Path, withheld: &[String]) -> Result<Analysis, GapError> {
+    let subject = Subject::open(case)?;
     let bar = ProgressBar::new(100).with_style(
         ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     bar.enable_steady_tick(Duration::from_millis(100));
-    let diagnosis = diagnose(&subject, &arguments.withhold, &|what, share| {
+    let diagnosis = diagnose(&subject, withheld, &|what, share| {
         bar.set_message(what);
         bar.set_position((100.0 * share) as u64);
     });
@@ -109,20 +190,50 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     let advice = diagnosis.advice(&subject);
     bar.finish_and_clear();
     let verdict = serde_json::to_string_pretty(&Verdict::new(&subject, &diagnosis, advice.clone()))?;
-    let said = match word {
-        _ if arguments.json => format!("{verdict}\n"),
-        "where" => terminal::places(&subject, &diagnosis),
-        "why" => terminal::why(&subject, &diagnosis),
-        "shrink" => terminal::shrink(&subject, &diagnosis),
-        "next" => format!("{advice}\n"),
-        "limits" => terminal::limits(&diagnosis),
-        _ => terminal::screen(&subject, &diagnosis, &advice),
-    };
-    print!("{said}");
-    if let Some(folder) = &arguments.out {
-        write_folder(folder, &subject, &diagnosis, &advice, &verdict)?;
+    let mut texts = vec![
+        (VERDICT, format!("{verdict}\n")),
+        ("all.txt", terminal::screen(&subject, &diagnosis, &advice)),
+        ("where.txt", terminal::places(&subject, &diagnosis)),
+        ("why.txt", terminal::why(&subject, &diagnosis)),
+        ("shrink.txt", terminal::shrink(&subject, &diagnosis)),
+        ("next.txt", format!("{advice}\n")),
+        ("limits.txt", terminal::limits(&diagnosis)),
+        (PAGE, page::html(&subject, &diagnosis, &advice)?),
+        (UNIT, taught(&subject, &diagnosis).text()),
+    ];
+    if let Some(correction) = &diagnosis.correction {
+        texts.push((SET, correction.set(&subject.twin)?));
     }
-    Ok(())
+    Ok(texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect())
+}
+
+/// A folder of this name beside the analysis.
+fn beside(kept: &Kept, name: &str) -> PathBuf {
+    kept.folder().with_file_name(name)
+}
+
+/// Writes the twin with the effect in, and the calibration set where there is one.
+fn write_twin(folder: &Path, analysis: &Analysis) -> Result<(), GapError> {
+    make(folder)?;
+    put(folder, UNIT, kept::text(analysis, UNIT).unwrap_or_default())?;
+    match kept::text(analysis, SET) {
+        Some(set) => put(folder, SET, set),
+        // One of an earlier analysis would be taken for this one's.
+        None => match std::fs::remove_file(folder.join(SET)) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => Err(GapError::Write {
+                file: folder.join(SET),
+                source,
+            }),
+            _ => Ok(()),
+        },
+    }
+}
+
+fn make(folder: &Path) -> Result<(), GapError> {
+    std::fs::create_dir_all(folder).map_err(|source| GapError::Write {
+        file: folder.to_path_buf(),
+        source,
+    })
 }
 
 /// Judges a case as [`run`] does and leaves verdict.json in its folder, silently: the analyst's part in a challenge.
@@ -140,7 +251,10 @@ pub fn write_verdict(case: &Path) -> Result<(), GapError> {
 /// The unit as it is now believed to be: with its effects, and the noise that effects on the scatter give it.
 pub fn taught(subject: &Subject, diagnosis: &Diagnosis) -> UnitDescription {
     let mut unit = subject.twin.unit().clone();
-    unit.effects.extend(diagnosis.known.iter().cloned());
+    // What stands in the model and is not said may stand in for something else.
+    let is_said = |name: &str| diagnosis.causes.iter().any(|cause| cause.effect == name);
+    let known = diagnosis.known.iter().filter(|known| is_said(&known.effect));
+    unit.effects.extend(known.cloned());
     for (channel, louder) in unit.channels.iter_mut().zip(&diagnosis.louder) {
         let grown = channel.sigma().powi(2) * (louder * louder - 1.0);
         channel.noise_sigma = (channel.noise_sigma.powi(2) + grown).max(0.0).sqrt();
@@ -202,25 +316,4 @@ pub fn write_baselines(case: &Path, effects: Option<&[String]>) -> Result<(), Ga
 fn put(folder: &Path, name: &str, text: &str) -> Result<(), GapError> {
     let file = folder.join(name);
     std::fs::write(&file, text).map_err(|source| GapError::Write { file, source })
-}
-
-fn write_folder(
-    folder: &Path,
-    subject: &Subject,
-    diagnosis: &Diagnosis,
-    advice: &str,
-    verdict: &str,
-) -> Result<(), GapError> {
-    std::fs::create_dir_all(folder).map_err(|source| GapError::Write {
-        file: folder.to_path_buf(),
-        source,
-    })?;
-    put(folder, "verdict.json", verdict)?;
-    put(folder, "index.html", &page::html(subject, diagnosis, advice)?)?;
-    put(folder, "unit.toml", &taught(subject, diagnosis).text())?;
-    if let Some(correction) = &diagnosis.correction {
-        put(folder, "calibration.toml", &correction.set(&subject.twin)?)?;
-    }
-    println!("{}", folder.join("index.html").display());
-    Ok(())
 }

@@ -16,15 +16,20 @@
 //! | 9 | [`advise`] | what should be measured next, and what would not have been seen? | advice, sets, limits |
 //! | 10 | [`report`] | how is it told? | `verdict.json`, a screen, a page |
 //!
+//! Beside the rooms, and only for [`command`] and other programs: [`kept`] keeps what was said beside the case, [`against`] holds a
+//! corrected twin against another case.
+//!
 //! `tests/rooms.rs` holds the order and the lock: no room needs a later one, and only [`holdout`] opens the held-out samples.
 //! `tests/golden.rs` holds what is said.
 
 pub mod advise;
+pub mod against;
 pub mod command;
 pub mod correct;
 pub mod diagnose;
 pub mod holdout;
 pub mod input;
+pub mod kept;
 pub mod library;
 pub mod null;
 pub mod probability;

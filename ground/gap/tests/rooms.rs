@@ -8,8 +8,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The ten rooms in the order of the steps, and around the last the conductor and the shell.
-const ORDER: [&str; 12] = [
+/// The ten rooms in the order of the steps, around the last the conductor, what is kept and held against another case, and the
+/// shell.
+const ORDER: [&str; 14] = [
     "input",
     "null",
     "library",
@@ -21,6 +22,8 @@ const ORDER: [&str; 12] = [
     "advise",
     "diagnose",
     "report",
+    "kept",
+    "against",
     "command",
 ];
 

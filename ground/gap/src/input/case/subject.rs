@@ -63,8 +63,17 @@ impl Subject {
     /// # Errors
     /// When anything of it cannot be read or does not fit the rest.
     pub fn open(path: &Path) -> Result<Self, CaseError> {
+        Subject::open_with(path, |_| ())
+    }
+
+    /// Reads a case whose unit is believed to be otherwise than its file says.
+    ///
+    /// # Errors
+    /// When anything of it cannot be read or does not fit the rest.
+    pub fn open_with(path: &Path, believed: impl FnOnce(&mut UnitDescription)) -> Result<Self, CaseError> {
         let opened = Opened::open(path)?;
-        let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
+        let mut unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
+        believed(&mut unit);
         if opened.text.kind == super::Kind::Table {
             return Subject::of_table(opened, unit);
         }
