@@ -4,23 +4,33 @@
 //! (the emulated board or the host one) is a [`board::Flight`]; everything here is the same for both.
 
 pub mod board;
-mod interrupt;
+pub mod case;
+mod disturb;
+pub mod interrupt;
 pub mod plan;
 mod progress;
 pub mod site;
 pub mod source;
+mod taught;
+mod transit;
 pub mod watch;
 
-use std::{io, thread, time::Duration};
+use std::{io, path::PathBuf, thread, time::Duration};
 
-use twin::{plant::Plant, run::Bench};
+use twin::{
+    plant::{Plant, Quality},
+    run::Bench,
+};
 
 use self::{
     board::{BoardError, Remark},
+    case::{CaseError, Flown},
+    disturb::{DisturbError, Prepared, prepare},
     interrupt::Interrupt,
     plan::{Arguments, PlanError},
     progress::Progress,
     source::{Source, SourceError},
+    transit::Through,
     watch::{Seen, Watch},
 };
 use packets::stream::sequence::CYCLE_S;
@@ -39,6 +49,12 @@ pub enum FlyError {
     /// What was asked for makes no flight.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// What is to be flown, or how it is to be disturbed.
+    #[error(transparent)]
+    Disturb(#[from] DisturbError),
+    /// The case in the folder.
+    #[error(transparent)]
+    Case(#[from] CaseError),
     /// The board.
     #[error(transparent)]
     Board(#[from] BoardError),
@@ -64,14 +80,35 @@ pub enum FlyError {
 /// # Errors
 /// See [`FlyError`].
 pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
-    fly_until(arguments, &Interrupt::listen()?)
+    let landed = fly_until(arguments, &Interrupt::listen()?)?;
+    if !arguments.quiet {
+        print!("{}", folder::text_of(&landed.rows));
+    }
+    println!("{}", landed.folder.join("index.html").display());
+    Ok(())
 }
 
-fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<(), FlyError> {
+/// A flight that is over.
+pub struct Landed {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its summary.
+    pub rows: Vec<Remark>,
+}
+
+/// Flies until the end or an interrupt.
+///
+/// # Errors
+/// See [`FlyError`].
+pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
     let source = source::open(arguments)?;
     let duration = plan::duration_of(arguments.duration, source.truth.duration_s());
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
+    let mut prepared = prepare(arguments, source.world.as_ref(), &source.truth, duration.as_secs_f64())?;
+    for warning in prepared.iter().flat_map(|prepared| &prepared.warnings) {
+        eprintln!("warning: {warning}");
+    }
     // An image that cannot be built must not leave an empty folder.
     let flight = if arguments.host {
         board::host(source.site)
@@ -80,18 +117,78 @@ fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<(), FlyErro
     };
     let name = format!("{}-{}", source.name, arguments.seed);
     let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
-    let progress = Progress::start(duration, arguments.real_time || arguments.console, arguments.console);
-    let plant = Plant::new(source.truth.clone(), arguments.seed);
+    let is_paced = arguments.real_time || arguments.console;
+    let progress = Progress::start(duration, is_paced, arguments.console || arguments.quiet);
+    let quality = Quality {
+        flight: arguments.flight.into(),
+        ..Quality::NOMINAL
+    };
+    let plant = match &prepared {
+        Some(prepared) => Plant::seeing(&prepared.scene.views, source.truth.clone(), arguments.seed, quality),
+        None => Plant::with(source.truth.clone(), arguments.seed, quality),
+    };
+    let transit = prepared
+        .as_mut()
+        .map(|prepared| std::mem::take(&mut prepared.scene.transit));
+    let flight = move |watch: &mut dyn Bench| {
+        let mut through = Through::new(watch, transit.unwrap_or_default());
+        let remarks = flight(plant, &faults, end, &mut through)?;
+        through.finish();
+        Ok(remarks)
+    };
     let (seen, remarks) = if arguments.console {
-        beside_the_console(arguments, folder, progress, interrupt, move |watch| {
-            flight(plant, &faults, end, watch)
-        })?
+        beside_the_console(arguments, folder, progress, interrupt, flight)?
     } else {
         let mut watch = Watch::new(folder, progress, None, arguments.derived, interrupt.clone());
-        let remarks = flight(plant, &faults, end, &mut watch)?;
+        let remarks = flight(&mut watch)?;
         (watch.finish()?, remarks)
     };
-    report(arguments, &source, duration, seen, remarks)
+    let (case, trouble) = written(arguments, &source, prepared.as_ref(), &seen);
+    let landed = report(arguments, &source, duration, seen, [remarks, vec![case]].concat())?;
+    trouble.map_or(Ok(landed), |trouble| Err(trouble.into()))
+}
+
+/// Makes the folder a case; a row of the summary, and what went wrong with it that is not the flight's nature.
+fn written(
+    arguments: &Arguments,
+    source: &Source,
+    prepared: Option<&Prepared>,
+    seen: &Seen,
+) -> (Remark, Option<CaseError>) {
+    let Some(prepared) = prepared else {
+        return (
+            (
+                "gap case",
+                "none: a recording of sensors does not say how the unit was turned".into(),
+            ),
+            None,
+        );
+    };
+    let flown = Flown {
+        scene: &prepared.scene,
+        struck: &prepared.struck,
+        unit: prepared.unit.as_ref(),
+        about: &source.about,
+        seed: arguments.seed,
+        flight: arguments.flight.into(),
+        flown_s: seen.flown.as_secs_f64(),
+        instrument: arguments.reference,
+    };
+    let path = seen.folder.path();
+    match flown.write(path) {
+        Ok(()) if prepared.struck.is_empty() => (("gap case", "this folder".into()), None),
+        Ok(()) => (
+            (
+                "gap case",
+                format!("this folder; what was done to the unit is in {}", case::ANSWER),
+            ),
+            None,
+        ),
+        Err(why @ (CaseError::TooShort(_) | CaseError::Unseen(_) | CaseError::NoInstants(_))) => {
+            (("gap case", format!("none: {why}")), None)
+        }
+        Err(trouble) => (("gap case", "none: it could not be written".into()), Some(trouble)),
+    }
 }
 
 /// Flies in a thread of its own while the user has the terminal; ends when both do.
@@ -117,14 +214,14 @@ fn beside_the_console(
     Ok(seen)
 }
 
-/// Writes the page and prints the summary.
+/// Writes the page and the summary.
 fn report(
     arguments: &Arguments,
     source: &Source,
     planned: Duration,
     seen: Seen,
     remarks: Vec<Remark>,
-) -> Result<(), FlyError> {
+) -> Result<Landed, FlyError> {
     let board = if arguments.host {
         "host, virtual time"
     } else {
@@ -140,12 +237,10 @@ fn report(
     rows.extend(remarks);
     rows.extend(seen.summary.rows());
     let title = format!("{} flight, unit {}", source.name, arguments.seed);
-    let path = seen
+    let folder = seen
         .folder
         .finish(&title, &source.about, &rows, &seen.summary, &seen.envelope)?;
-    print!("{}", folder::text_of(&rows));
-    println!("{}", path.join("index.html").display());
-    Ok(())
+    Ok(Landed { folder, rows })
 }
 
 fn flight_rows(

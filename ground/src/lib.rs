@@ -1,8 +1,11 @@
 //! The ground side as a library.
 
+pub mod case;
 pub mod console;
 pub mod decode;
+pub mod demo;
 pub mod digest;
+pub mod effects;
 pub mod envelope;
 pub mod fly;
 pub mod folder;

@@ -11,6 +11,11 @@ enum Command {
     Fly(ground::fly::plan::Arguments),
     /// Lists the motions that can be flown
     Sources,
+    /// Makes a gap case of a real unit's log, and says what a case lacks
+    #[command(subcommand)]
+    Case(ground::case::Step),
+    Demo(ground::demo::Arguments),
+    Effects(ground::effects::Arguments),
     Decode(ground::decode::Arguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
@@ -59,6 +64,9 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
         Command::Fly(arguments) => ground::fly::fly(&arguments)?,
         Command::Sources => print!("{}", ground::fly::source::list()),
+        Command::Case(step) => ground::case::case(&step)?,
+        Command::Demo(arguments) => ground::demo::demo(&arguments)?,
+        Command::Effects(arguments) => print!("{}", ground::effects::effects(&arguments)?),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Gap(arguments) => gap(&arguments)?,

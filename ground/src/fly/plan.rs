@@ -6,13 +6,14 @@
 use std::{path::PathBuf, time::Duration};
 
 use emems::sample::SENSOR_COUNT;
+use trials::strike::Wish;
 use twin::{
     part::Nanos,
     run::{Fault, Scheduled},
 };
 
 use super::site;
-use crate::table::SLOT_NAMES;
+use crate::{case::instrument::Instrument, table::SLOT_NAMES};
 
 /// How long a motion without an end is flown.
 const ENDLESS_S: f64 = 60.0;
@@ -21,8 +22,9 @@ const ENDLESS_S: f64 = 60.0;
 ///
 /// Sensors, buses and lines are modelled at register level; what they measure comes from a motion or a recording. The
 /// telemetry is decoded as it comes and everything kept in a new folder: packets.txt, counts.csv, si.csv, log.txt,
-/// umbilical.txt, summary.txt, and plots of every sensor in index.html. The same arguments give the same packets. Ctrl-C
-/// ends the flight; what was flown is kept.
+/// umbilical.txt, summary.txt, and plots of every sensor in index.html. The folder is a gap case too, for `ground gap`:
+/// motion.csv is the motion as a reference instrument saw it, unit.toml the unit as described, case.toml the windows. The
+/// same arguments give the same packets. Ctrl-C ends the flight; what was flown is kept.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   ground fly                                       a sounding rocket, from the pad to re-entry
@@ -30,6 +32,8 @@ const ENDLESS_S: f64 = 60.0;
   ground fly --recording 07_fast_rotation.csv.gz   what a real unit felt
   ground fly --motion-file turns.csv --latitude-deg -2.37 --field-n-ut 24.2,-9.2,-4.1
   ground fly --motion tumble --silent a2@10s..20s --silent g4@15s
+  ground fly --motion tumble --duration 3min --with gyro-scale=0.01@g2 --with vibration@20s..80s
+  ground fly --motion rotation-1 --unit flights/tumble-1/corrected/unit.toml
   ground fly --console                             and talk to it; type G_HE")]
 pub struct Arguments {
     /// Motion to fly; `ground sources` lists them [default: rocket]
@@ -65,6 +69,22 @@ pub struct Arguments {
     /// Silence a sensor (a1..a4, m1..m4, g1..g4, t1..t4) from a time on, or for a while: a2@10s, g1@10s..20s
     #[arg(long, value_name = "SENSOR@TIME", value_parser = silence)]
     pub silent: Vec<Silence>,
+    /// Disturb the unit: NAME[=SIZE][@SENSOR][@FROM..TO], such as hard-iron, gyro-scale=0.01@g2, accel-bias=3x@a1,
+    /// vibration@20s..80s; `ground effects` lists them. What was done is written to answer.toml
+    #[arg(long, value_name = "EFFECT")]
+    pub with: Vec<Wish>,
+    /// Fly the unit that this description says, with the effects it is known to have (a unit.toml)
+    #[arg(long, value_name = "FILE")]
+    pub unit: Option<PathBuf>,
+    /// What records the motion in motion.csv
+    #[arg(long, value_enum, default_value_t)]
+    pub reference: Instrument,
+    /// Which flight of this specimen: another one has other noise
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub flight: u32,
+    /// Say nothing but where the page is
+    #[arg(long)]
+    pub quiet: bool,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
     pub site: site::Arguments,

@@ -6,17 +6,33 @@
 use std::{borrow::Cow, path::Path, sync::Arc};
 
 use emems::estimate::Site;
+use gap::input::{case::Opened, reference::used};
+use trials::{
+    draw::Draw,
+    motion::{Style, Wander},
+};
 use twin::{
-    environment::World,
-    motion::{self, LIST, Recorded},
+    environment::{Environment, World},
+    motion::{self, AnyWorld, LIST, Recorded},
     recording::{FileError, Recording},
     truth::TruthSource,
 };
 
 use super::plan::Arguments;
+use crate::case::CASE;
 
 /// Flown when nothing is named.
 const DEFAULT_MOTION: &str = "rocket";
+
+/// The motion of the trials that turns and moves about: the one that brings out most of what a unit may have.
+const HAND: (&str, &str) = (
+    "hand",
+    "carried about by hand: turns about all axes, ways of decimetres, rests between",
+);
+
+/// [s] it lasts, and the draw it is of.
+const HAND_S: f64 = 600.0;
+const HAND_DRAW: u64 = 1;
 
 /// A source of truth.
 pub struct Source {
@@ -28,6 +44,20 @@ pub struct Source {
     pub truth: Arc<dyn TruthSource>,
     /// What the unit is told of the place.
     pub site: Site,
+    /// Motion and place apart; a recording of sensors has none.
+    pub world: Option<AnyWorld>,
+}
+
+impl Source {
+    fn of(name: String, about: String, world: AnyWorld, site: Site) -> Self {
+        Source {
+            name,
+            about,
+            truth: Arc::new(world.clone()),
+            world: Some(world),
+            site,
+        }
+    }
 }
 
 /// Why there is nothing to fly.
@@ -52,18 +82,31 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
             about: format!("recording of a real unit, {}", file_name(path)),
             truth: Arc::new(Recording::open(path)?),
             site: Site::LABORATORY,
+            world: None,
         }),
-        (_, Some(path)) => Ok(Source {
-            name: stem(path),
-            about: format!("recorded motion, {}, at {}", file_name(path), arguments.site.about()),
-            truth: Arc::new(World {
-                motion: Recorded::open(path)?,
+        (_, Some(path)) => Ok(Source::of(
+            stem(path),
+            format!("recorded motion, {}, at {}", file_name(path), arguments.site.about()),
+            World {
+                motion: Arc::new(recorded(path)?),
                 environment: arguments.site.environment(),
-            }),
-            site: Site::LABORATORY,
-        }),
+            },
+            Site::LABORATORY,
+        )),
         _ => by_name(arguments.motion.as_deref().unwrap_or(DEFAULT_MOTION)),
     }
+}
+
+/// The motion of a file. One whose case says that it is the record of an instrument that errs is smoothed as the diagnosis smooths
+/// it: differentiated as it is, a camera's noise would shake the unit.
+fn recorded(path: &Path) -> Result<Recorded, FileError> {
+    let record = Recorded::open(path)?;
+    let case = Opened::open(&path.with_file_name(CASE));
+    let errs = case.is_ok_and(|case| {
+        let named = case.text.motion.as_deref().and_then(Path::file_name);
+        named == path.file_name() && case.text.reference.attitude_sigma_rad > 0.0
+    });
+    Ok(if errs { used(&record) } else { record })
 }
 
 /// `ground sources`: the motions, a line each.
@@ -73,17 +116,25 @@ pub fn list() -> String {
         let lasts = lasts.map_or("no end".into(), |lasts_s| format!("{lasts_s:.0} s"));
         format!("{:12}{lasts:>8}  {}\n", named.name, named.about)
     };
-    LIST.iter().map(line).collect()
+    let hand = format!("{:12}{HAND_S:>6.0} s  {}\n", HAND.0, HAND.1);
+    LIST.iter().map(line).chain([hand]).collect()
 }
 
 fn by_name(name: &str) -> Result<Source, SourceError> {
+    if name == HAND.0 {
+        let wander = Wander::draw(Style::Hand, false, HAND_S, &mut Draw::new(HAND_DRAW));
+        let world = World {
+            motion: Arc::new(wander) as Arc<dyn motion::Motion>,
+            environment: Environment::laboratory(),
+        };
+        return Ok(Source::of(name.into(), HAND.1.into(), world, Site::LABORATORY));
+    }
     let named = LIST.iter().find(|named| named.name == name);
-    match (named, motion::by_name(name)) {
-        (Some(named), Some(truth)) => Ok(Source {
-            name: name.into(),
-            about: named.about.into(),
+    match (named, motion::world_by_name(name), motion::by_name(name)) {
+        (Some(named), Some(world), Some(truth)) => Ok(Source {
+            // What shakes the unit is no motion of its centre.
             truth: truth.into(),
-            site: named.site,
+            ..Source::of(name.into(), named.about.into(), world, named.site)
         }),
         _ => Err(SourceError::NoSuchMotion(name.into())),
     }
@@ -101,7 +152,7 @@ fn stem(path: &Path) -> String {
 }
 
 fn names() -> String {
-    LIST.map(|named| named.name).join(", ")
+    [&LIST.map(|named| named.name)[..], &[HAND.0]].concat().join(", ")
 }
 
 #[cfg(test)]
@@ -136,7 +187,7 @@ mod tests {
 
     #[test]
     fn every_motion_is_listed() {
-        assert_eq!(list().lines().count(), LIST.len());
+        assert_eq!(list().lines().count(), LIST.len() + 1);
         assert!(list().contains("no end"));
     }
 }

@@ -1,0 +1,183 @@
+//! `ground case check`: what a case has, and what it lacks.
+//!
+//! In: a case's folder. Out: a line a point: `ok`, `look` (it can be diagnosed, and the verdict may mislead) or `missing` (it cannot).
+//! Looked at are the files and keys (as the diagnosis reads them), the packets, the clocks along the case ([`super::clock`]), whether
+//! windows hold the same kinds of motion, and the sigmas of the calibration.
+
+use std::path::Path;
+
+use gap::{input::case::Subject, null::problem::Problem};
+use nalgebra::Vector3;
+use twin::predict::Kind;
+
+use super::clock;
+
+/// Sigmas from which a clock is off.
+const OFF: f64 = 4.0;
+
+/// [s] below which nobody minds: what a gyro at 100 deg/s turns in it is a tenth of a degree.
+const MINDED_S: f64 = 1e-3;
+
+/// One half of what the windows hold over the other from which they differ.
+const DIFFER: f64 = 3.0;
+
+/// Gap beyond which a unit is rather misread than off: ten sigma in every channel.
+const MISREAD: f64 = 10.0;
+
+/// What was found; whether the case can be diagnosed.
+pub struct Checked {
+    /// A line a point.
+    pub text: String,
+    /// Nothing is missing.
+    pub is_whole: bool,
+}
+
+/// Checks a case.
+pub fn checked(folder: &Path) -> Checked {
+    let mut lines = Vec::new();
+    let subject = match Subject::open(folder) {
+        Ok(subject) => subject,
+        Err(error) => {
+            return Checked {
+                text: format!("missing  {error}\n"),
+                is_whole: false,
+            };
+        }
+    };
+    let unit = subject.twin.unit();
+    let rows = subject.twin.starts_s().len();
+    lines.push(format!(
+        "ok       {} channels, {rows} rows in the windows, keys and files as the format has them",
+        unit.channels.len()
+    ));
+    stream(&subject, rows, &mut lines);
+    clocks(&subject, &mut lines);
+    windows(&subject, &mut lines);
+    sigmas(&subject, &mut lines);
+    gap_of(&subject, &mut lines);
+    Checked {
+        text: lines.join("\n") + "\n",
+        is_whole: true,
+    }
+}
+
+fn stream(subject: &Subject, rows: usize, lines: &mut Vec<String>) {
+    let stream = subject.stream;
+    let spoilt = stream.lost + stream.rejected + stream.repeated;
+    let mark = if spoilt * 50 > rows as u64 { "look " } else { "ok   " };
+    lines.push(format!(
+        "{mark}    packets lost {}, repeated {}, not packets {}; samples unseen by the reference {}",
+        stream.lost, stream.repeated, stream.rejected, subject.unseen
+    ));
+    for (channel, masked) in subject.twin.unit().channels.iter().zip(&subject.masked) {
+        let left_out = masked.missing + masked.clipped;
+        if left_out * 10 > rows {
+            lines.push(format!(
+                "look     {}: {} samples missing, {} at the end of the range",
+                channel.name, masked.missing, masked.clipped
+            ));
+        }
+    }
+}
+
+fn clocks(subject: &Subject, lines: &mut Vec<String>) {
+    if subject.opened.text.motion.is_none() {
+        return;
+    }
+    match clock::error(subject) {
+        None => lines.push("look     no gyro turns: nothing tells whether the clocks are one".to_owned()),
+        Some(offset) => {
+            let is_off = offset.seconds.abs() > OFF * offset.sigma_s && offset.seconds.abs() > MINDED_S;
+            lines.push(format!(
+                "{}    clocks: by the gyros the reference is {:+.4} +- {:.4} s off the log{}",
+                if is_off { "look " } else { "ok   " },
+                offset.seconds,
+                offset.sigma_s,
+                if is_off {
+                    "; take that off its t_s, or it shows as latency or reference-lag"
+                } else {
+                    ""
+                }
+            ));
+        }
+    }
+}
+
+/// What each half of the windows excites.
+fn windows(subject: &Subject, lines: &mut Vec<String>) {
+    let feels = subject.twin.feels(0);
+    let starts_s = subject.twin.starts_s();
+    let of = |spans: &[gap::input::windows::Span], what: &dyn Fn(usize) -> f64| {
+        let rows = (0..starts_s.len()).filter(|row| spans.iter().any(|span| span.contains(starts_s[*row])));
+        rows.map(what).fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
+    let windows = &subject.opened.windows;
+    let mut differ = Vec::new();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let rate = |row: usize| feels[row].rate_b[axis];
+        let (fit, hold) = (of(windows.fit(), &rate), of(windows.hold(), &rate));
+        if fit.max(hold) > 0.05 && fit.max(hold) > DIFFER * fit.min(hold) {
+            differ.push(format!("rates about {name} ({fit:.2} and {hold:.2} rad/s at most)"));
+        }
+        let tilt = |row: usize| feels[row].to_b(Vector3::z())[axis];
+        let (fit, hold) = (of(windows.fit(), &tilt), of(windows.hold(), &tilt));
+        if fit.max(hold) > 0.3 && fit.max(hold) > DIFFER * fit.min(hold) {
+            differ.push(format!("tilts along {name}"));
+        }
+    }
+    match differ.is_empty() {
+        true => lines.push("ok       fit and hold hold the same kinds of motion".to_owned()),
+        false => lines.push(format!(
+            "look     fit and hold differ in {}: what only one excites cannot be judged",
+            differ.join(", ")
+        )),
+    }
+}
+
+fn sigmas(subject: &Subject, lines: &mut Vec<String>) {
+    let sensed = subject
+        .twin
+        .unit()
+        .channels
+        .iter()
+        .filter(|channel| channel.sensor != Kind::Thermometer);
+    let exact: Vec<&str> = sensed
+        .filter(|channel| channel.bias_sigma == 0.0 || channel.scale_sigma == 0.0 || channel.axis_sigma_rad == 0.0)
+        .map(|channel| channel.name.as_str())
+        .collect();
+    match exact.is_empty() {
+        true => lines.push("ok       every channel says how well its calibration knew it".to_owned()),
+        false => lines.push(format!(
+            "look     {}: bias_sigma, scale_sigma or axis_sigma_rad is 0, so any unit has a gap; take them from the set's covariance",
+            exact.join(" ")
+        )),
+    }
+    let text = &subject.opened.text;
+    if text.motion.is_some() && text.reference.attitude_sigma_rad == 0.0 {
+        lines.push(
+            "look     [reference] is absent: the reference is taken for exact, as a table's or a simulation's"
+                .to_owned(),
+        );
+    }
+}
+
+/// Channels that are off by so much that they are rather misread.
+fn gap_of(subject: &Subject, lines: &mut Vec<String>) {
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let predicted = subject.twin.predict(&[]);
+    for (index, channel) in subject.twin.unit().channels.iter().enumerate() {
+        let series = &subject.fit.channels[index];
+        let square = |(row, value): (&u32, &f64)| {
+            let row = *row as usize;
+            ((value - predicted[index][row]) / problem.sigmas[index][row]).powi(2)
+        };
+        let sum: f64 = series.rows.iter().zip(&series.values).map(square).sum();
+        let gap = (sum / series.rows.len().max(1) as f64).sqrt();
+        if gap > MISREAD {
+            lines.push(format!(
+                "look     {}: {gap:.0} sigma off; rather its unit, axis, sign or zero than an effect",
+                channel.name
+            ));
+        }
+    }
+}
