@@ -33,9 +33,9 @@ use crate::fly::{self, board, case::ANSWER, interrupt::Interrupt, plan};
 
 /// What may be wrong: a few of the effects that a unit most often has, each large enough to matter for its attitude.
 const DECK: [&str; 8] = [
-    "hard-iron=3",
-    "soft-iron=0.08",
     "gyro-scale=0.02",
+    "soft-iron=0.08",
+    "hard-iron=3",
     "gyro-bias=0.01",
     "accel-bias=0.4",
     "accel-scale=0.03",
@@ -43,9 +43,9 @@ const DECK: [&str; 8] = [
     "plate-rotation=0.03",
 ];
 
-/// The motions of the first flight, that is diagnosed, and of the second.
-const FIRST: &str = "--motion tumble --duration 150s";
-const SECOND: &str = "--motion hand --duration 120s --flight 1";
+/// The first flight, on a rate table, which is diagnosed; and the second, by hand, which judges.
+const FIRST: &str = "--motion tumble --duration 150s --reference table";
+const SECOND: &str = "--motion hand --duration 120s --flight 1 --reference exact";
 
 /// Names probable from here on.
 const SURE: f64 = 0.5;
@@ -153,7 +153,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
         }
     }
     let place = new_folder(&arguments.out, &format!("demo-{}", arguments.seed))?;
-    let with = format!("--with {} --reference optical", withheld(arguments.seed));
+    let with = format!("--with {}", withheld(arguments.seed));
     let flight = |words: &str| flown(words, arguments.seed, host, &place);
     let board = if host { "this computer" } else { "the emulated board" };
     say(&format!(
