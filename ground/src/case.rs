@@ -17,7 +17,7 @@ use std::{fmt::Write, path::PathBuf};
 
 use twin::environment::Environment;
 
-use self::windows::{Parted, Spans};
+use self::windows::Parted;
 
 /// File names in a case's folder.
 pub const CASE: &str = "case.toml";
@@ -138,7 +138,7 @@ impl Text<'_> {
     }
 }
 
-fn spans(spans: &Spans) -> String {
+fn spans(spans: &[[f64; 2]]) -> String {
     let pairs: Vec<String> = spans.iter().map(|[from, to]| format!("[{from:?}, {to:?}]")).collect();
     format!("[{}]", pairs.join(", "))
 }

@@ -42,8 +42,14 @@ pub struct Against {
     /// The gap, in total and by kind; then attitudes.
     pub pairs: Vec<Pair>,
     /// Attitude error [deg] against time [s], by the filter, before and after.
-    pub errors_deg: [Vec<(f64, f64)>; 2],
+    pub errors_deg: [Errors; 2],
 }
+
+/// Attitude errors [deg] against time [s].
+pub type Errors = Vec<(f64, f64)>;
+
+/// Attitudes, row by row.
+type Attitudes = Vec<Option<UnitQuaternion<f64>>>;
 
 /// Kinds with their names.
 const KINDS: [(Kind, &str); 4] = [
@@ -158,7 +164,7 @@ fn pair(name: &str, squares: [&Vec<(f64, f64)>; 2], of: impl Fn(usize) -> bool) 
 }
 
 /// Attitude errors, and the filter's against time.
-fn attitudes(subject: &Subject, after: &Twin) -> (Vec<Pair>, [Vec<(f64, f64)>; 2]) {
+fn attitudes(subject: &Subject, after: &Twin) -> (Vec<Pair>, [Errors; 2]) {
     let twin = &subject.twin;
     let rows = twin.starts_s().len();
     let (without, with) = (twin.predict(&[]), after.predict(&[]));
@@ -179,23 +185,18 @@ fn attitudes(subject: &Subject, after: &Twin) -> (Vec<Pair>, [Vec<(f64, f64)>; 2
     let tracks = [measured, cleaned].map(|readings| estimation.track(&readings, &nominal));
     let reference = estimation.reference();
     let t_s: Vec<f64> = estimation.rows().iter().map(|row| twin.starts_s()[*row]).collect();
-    let errors = |of: &dyn Fn(&Track) -> Vec<Option<UnitQuaternion<f64>>>| {
-        tracks.each_ref().map(|track| {
-            let found = of(track).into_iter().zip(&reference).zip(&t_s);
-            let error = |((found, truth), t_s): ((Option<UnitQuaternion<f64>>, &UnitQuaternion<f64>), &f64)| {
-                Some((*t_s, found?.angle_to(truth).to_degrees()))
-            };
-            found.filter_map(error).collect::<Vec<(f64, f64)>>()
+    let errors = |of: fn(&Track) -> &Attitudes| {
+        tracks.each_ref().map(|track| -> Errors {
+            let found = of(track);
+            let error = |at: usize| Some((t_s[at], found[at]?.angle_to(&reference[at]).to_degrees()));
+            (0..found.len()).filter_map(error).collect()
         })
     };
-    let rms = |errors: &Vec<(f64, f64)>| {
+    let rms = |errors: &Errors| {
         (errors.iter().map(|(_, error)| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt()
     };
-    let [triad, filter] = [
-        errors(&|track| track.triad.clone()),
-        errors(&|track| track.filter.clone()),
-    ];
-    let pair = |name: &str, errors: &[Vec<(f64, f64)>; 2]| Pair {
+    let [triad, filter] = [errors(|track| &track.triad), errors(|track| &track.filter)];
+    let pair = |name: &str, errors: &[Errors; 2]| Pair {
         name: name.to_owned(),
         unit: "deg",
         before: rms(&errors[0]),

@@ -24,6 +24,9 @@ const FEWEST: usize = 50;
 /// How far from one the norm of a quaternion may be.
 const NORM: f64 = 0.1;
 
+/// Cells of a row to the four numbers of a quaternion, where all are there.
+type Attitude = Box<dyn Fn(&[Option<f64>]) -> Option<[f64; 4]>>;
+
 /// Why a reference cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {why}")]
@@ -165,7 +168,7 @@ impl Told {
             &["tx", "ty", "tz"],
             &["x", "y", "z"],
         ]);
-        let attitude: Box<dyn Fn(&[Option<f64>]) -> Option<[f64; 4]>> = match (&quaternion, &angles) {
+        let attitude: Attitude = match (&quaternion, &angles) {
             (Some((places, names)), _) => {
                 taken.push(format!("attitude: quaternion {names}, scalar first"));
                 let places = places.clone();

@@ -52,7 +52,7 @@ pub fn parted(
     [from_s, to_s]: [f64; 2],
 ) -> Result<Parted, TooShort> {
     let length_s = (to_s - from_s) / BLOCKS as f64;
-    if !(length_s >= SHORTEST_S) {
+    if length_s.is_nan() || length_s < SHORTEST_S {
         return Err(TooShort(to_s - from_s));
     }
     let edge = |block: usize| from_s + length_s * block as f64;
@@ -75,7 +75,7 @@ pub fn parted(
         .map_or(0b0110_1001, |(_, mask)| *mask);
     let spans = |wanted: bool| {
         let mut spans = Spans::new();
-        for block in (0..BLOCKS).filter(|block| (chosen >> block & 1 == 1) == wanted) {
+        for block in (0..BLOCKS).filter(|block| ((chosen >> block) & 1 == 1) == wanted) {
             let (from, to) = (rounded(edge(block)), rounded(edge(block + 1)));
             match spans.last_mut() {
                 Some(last) if last[1] == from => last[1] = to,
@@ -130,7 +130,7 @@ fn spreads(features: &[Features]) -> Features {
 /// Root mean square over the features of what the halves differ by, in spreads.
 fn difference(features: &[Features], spreads: &Features, mask: u32) -> f64 {
     let of_feature = |(at, spread): (usize, &f64)| {
-        let side = |block: usize| if mask >> block & 1 == 1 { 1.0 } else { -1.0 };
+        let side = |block: usize| if (mask >> block) & 1 == 1 { 1.0 } else { -1.0 };
         let sum: f64 = features
             .iter()
             .enumerate()
@@ -151,7 +151,7 @@ mod tests {
 
     use super::*;
 
-    fn seconds(spans: &Spans) -> f64 {
+    fn seconds(spans: &[[f64; 2]]) -> f64 {
         spans.iter().map(|[from, to]| to - from).sum()
     }
 
