@@ -11,11 +11,12 @@
 //!
 //! **State**, with errors in the order of [`covariance`]: `q_nb`; the spin `w_x` and its derivative; the rate across the spin `u` in
 //! two axes that do not spin, and its derivative, because a cone of half a turn a second is slow there and at the spin's rate in b;
-//! each gyro's bias, and what it sees of the spin beyond its axis; the hard iron; the levers' scale. With `phi` the angle spun,
+//! each gyro's bias, what it sees of the spin beyond its axis, and by how much each g along x_b moves its bias, since it was learnt
+//! under the one of the pad; the hard iron; the levers' scale. With `phi` the angle spun,
 //!
 //! ```text
 //! w_b = (w_x, T u),  T = [c s; -s c],  dphi/dt = w_x          q <- q exp((0, T u) dt) exp(x w_x dt), less the Earth's rate
-//! gyro   z_i = n_i . (w_x, g T u) + sees_i w_x + b_i          g: what low-pass and slice leave of a rate that turns with the spin
+//! gyro   z_i = n_i . (w_x, g T u) + sees_i w_x + b_i + l_i load          g: what low-pass and slice leave of a rate that turns with the spin
 //! force  see [`forces`]
 //! field  y_k = h_k . (C_bn m + iron)
 //! ```
@@ -39,7 +40,9 @@ pub mod pad;
 use nalgebra::{ComplexField, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use self::{
-    covariance::{ACROSS, ACROSS_UP, ATTITUDE, BIAS, Covariance, IRON, LEVER, Row, SEES_SPIN, SPIN, SPIN_UP, STATES},
+    covariance::{
+        ACROSS, ACROSS_UP, ATTITUDE, BIAS, BY_LOAD, Covariance, IRON, LEVER, Row, SEES_SPIN, SPIN, SPIN_UP, STATES,
+    },
     forces::{Believed, EQUATIONS},
     pad::Pad,
 };
@@ -88,10 +91,14 @@ const USUAL: f32 = 20.0;
 const ROUGH: f32 = 150.0;
 /// [s] longest time without a slice.
 const LONGEST_GAP_S: f32 = 1.0;
+/// [rad/s] and [1] what noise of the gyros and usual residual of the force equations it begins with: a lift-off shakes before it
+/// can have shown by how much.
+const BEGINS_ROUGH: f32 = 0.01;
+const BEGINS_USUAL: f32 = 10.0;
 /// Packets whose field is refused before the angle about the spin is opened, and before all is.
 const SHUT: [u8; 2] = [3, 10];
-/// [m/s2] a change of force that is worth a look at the biases: a third of a g.
-const LOAD: f32 = 3.0;
+/// [m/s2] of the data sheet's g.
+const STANDARD_GRAVITY: f32 = 9.806_65;
 /// [us] what is stamped later is not of this flight.
 const FAR_US: u64 = 2_000_000;
 
@@ -131,8 +138,8 @@ pub struct Place {
     pub field_sd: f32,
     /// [rad/s] rate of the Earth, in n.
     pub earth_rate_n: Vector3<f32>,
-    /// [rad/s for each m/s2] by how much force moves a gyro's bias.
-    pub bias_by_force: f32,
+    /// [rad/s for each g] by how much force moves a gyro's bias, standard deviation.
+    pub bias_per_g: f32,
     /// How late the sensors are.
     pub delays: Delays,
 }
@@ -168,8 +175,10 @@ pub struct Spin {
     refused: u8,
     /// The force before, and when.
     force: Option<(u64, Vector3<f32>)>,
-    /// [m/s2] the force for which the biases are known.
-    load_b: Option<Vector3<f32>>,
+    /// [rad/s for each g] ...
+    by_load: [f32; PLATES],
+    /// [m/s2] ... more along x_b than on the pad.
+    pad_force: f32,
     /// [us] instant of the latest slice.
     slice_us: u64,
 }
@@ -221,6 +230,9 @@ impl Spin {
             .place_b
             .iter()
             .fold(f32::MAX, |least, place| least.min(place.norm()));
+        for variance in &mut variances[BY_LOAD..] {
+            *variance = square(start.place.bias_per_g);
+        }
         variances[LEVER] = square(set.place_sigma / shortest.max(1e-3));
         let mut covariance = Covariance::of(&variances);
         covariance.set_block(ATTITUDE, &start.covariance_n);
@@ -244,13 +256,14 @@ impl Spin {
             } else {
                 [0.0; TRIAD_AXES]
             },
-            rough: 0.0,
-            usual: 1.0,
+            rough: square(BEGINS_ROUGH),
+            usual: BEGINS_USUAL,
             seen: true,
             surprised_s: 0.0,
             refused: 0,
             force: None,
-            load_b: None,
+            by_load: [0.0; PLATES],
+            pad_force: start.pad.along_x,
             slice_us: start.at_us,
         }
     }
@@ -347,8 +360,16 @@ impl Spin {
         let dt_s = seconds_between(self.at_us, at_us);
         let least_squares = least_squares(set);
         let mut covariance = SMatrix::<f32, 6, 6>::zeros();
-        let with_bias = self.covariance.block::<3, PLATES>(ATTITUDE, BIAS) * least_squares.transpose();
-        let of_bias = least_squares * self.covariance.block::<PLATES, PLATES>(BIAS, BIAS) * least_squares.transpose();
+        // What follows flies on under the force of now.
+        let load = self.load();
+        let block = |row, column| self.covariance.block::<PLATES, PLATES>(row, column);
+        let crossed = block(BIAS, BY_LOAD) * load;
+        let of_gyros = block(BIAS, BIAS) + crossed + crossed.transpose() + block(BY_LOAD, BY_LOAD) * (load * load);
+        let with_gyros = self.covariance.block::<3, PLATES>(ATTITUDE, BIAS)
+            + self.covariance.block::<3, PLATES>(ATTITUDE, BY_LOAD) * load;
+        let with_bias = with_gyros * least_squares.transpose();
+        let of_bias = least_squares * of_gyros * least_squares.transpose();
+        let bias = nalgebra::Vector4::from_fn(|k, _| self.bias[k] + self.by_load[k] * load);
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.covariance_n());
         covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&with_bias);
         covariance
@@ -358,7 +379,7 @@ impl Spin {
         Known {
             q_nb: self.carried(dt_s).0,
             rate_b: self.rate_b(),
-            bias_b: least_squares * nalgebra::Vector4::from(self.bias),
+            bias_b: least_squares * bias,
             covariance,
         }
     }
@@ -436,6 +457,7 @@ impl Spin {
         let lag = self.spin * GYRO_TAU_S;
         let (_, cos) = sin_cos(self.spin * 0.5e-6 * f32::from(lasts_us));
         let left = 0.5 * (1.0 + cos) / ComplexField::sqrt(1.0 + lag * lag);
+        let load = self.load();
         let gives = |quarters: &&i16| **quarters != NOT_READ && quarters.unsigned_abs() != BEYOND.unsigned_abs();
         self.seen = quarters.iter().filter(gives).count() >= 3;
         for (k, (quarters, axis)) in quarters.iter().zip(&set.gyro).enumerate() {
@@ -443,14 +465,16 @@ impl Spin {
                 continue;
             }
             let sees = axis.axis_b.x + self.sees_spin[k];
-            let row: [(usize, f32); 5] = [
+            let row: [(usize, f32); 6] = [
                 (SPIN, sees),
                 (ACROSS, left * axis.axis_b.dot(&across_b[0])),
                 (ACROSS + 1, left * axis.axis_b.dot(&across_b[1])),
                 (BIAS + k, 1.0),
                 (SEES_SPIN + k, self.spin),
+                (BY_LOAD + k, load),
             ];
-            let believed = sees * self.spin + left * axis.axis_b.dot(&turning_b) + self.bias[k];
+            let believed =
+                sees * self.spin + left * axis.axis_b.dot(&turning_b) + self.bias[k] + self.by_load[k] * load;
             let above_c = measured.gyros_above_c[k];
             let value = |counts: f32| axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c));
             let sampled = SLICE_NOISE * axis.noise * axis.noise;
@@ -517,7 +541,6 @@ impl Spin {
             }
             _ => first,
         };
-        self.mind_the_load(&found.force_b);
         let rows = |k: usize| -> [(usize, f32); forces::SEEN] {
             let [spin, spin_up, y, z, y_up, z_up, lever] = found.rows[k];
             [
@@ -558,17 +581,11 @@ impl Spin {
         }
     }
 
-    /// A gyro's bias moves with the force; what is known of it holds for a force.
-    fn mind_the_load(&mut self, force_b: &Vector3<f32>) {
-        let load_b = self.load_b.get_or_insert(*force_b);
-        let change = (force_b - *load_b).norm();
-        if change > LOAD {
-            *load_b = *force_b;
-            for gyro in 0..PLATES {
-                self.covariance
-                    .open(BIAS + gyro, square(self.place.bias_by_force * change));
-            }
-        }
+    /// [g] force along x_b beyond that of the pad.
+    fn load(&self) -> f32 {
+        self.force.map_or(0.0, |(_, force_b)| {
+            (force_b.x - self.pad_force) * (1.0 / STANDARD_GRAVITY)
+        })
     }
 
     /// The field of a plate; whether it was taken, `None` if it was not read whole.
@@ -659,6 +676,7 @@ impl Spin {
         for k in 0..PLATES {
             self.bias[k] += error[BIAS + k];
             self.sees_spin[k] += error[SEES_SPIN + k];
+            self.by_load[k] += error[BY_LOAD + k];
         }
         self.iron_b += Vector3::new(error[IRON], error[IRON + 1], error[IRON + 2]);
         self.lever += error[LEVER];
@@ -670,7 +688,12 @@ impl Spin {
             + self.spin_up
             + self.phase
             + self.across.iter().chain(&self.across_up).sum::<f32>()
-            + self.bias.iter().chain(&self.sees_spin).sum::<f32>()
+            + self
+                .bias
+                .iter()
+                .chain(&self.sees_spin)
+                .chain(&self.by_load)
+                .sum::<f32>()
             + self.iron_b.sum()
             + self.lever;
         sum.is_finite() && self.spin.abs() < FASTEST

@@ -87,7 +87,10 @@ impl Estimator {
                     let axis = &self.set.acc[k];
                     axis.value(counts[k], 0.0) - axis.axis_b.dot(&vectors.force_b.vector_b)
                 };
-                core::array::from_fn::<f32, TRIAD_AXES, _>(of)
+                (
+                    vectors.force_b.vector_b.x,
+                    core::array::from_fn::<f32, TRIAD_AXES, _>(of),
+                )
             });
             let above_c = &measured.gyros_above_c;
             self.boost.pad.take(&self.set, above_c, increments, beyond);
@@ -141,7 +144,7 @@ impl Estimator {
             field_n_ut: self.filter.reference.field_n_ut()?,
             field_sd: params.heading_sd,
             earth_rate_n: params.earth_rate_n,
-            bias_by_force: params.bias_by_force,
+            bias_per_g: params.bias_per_g,
             delays,
         })
     }

@@ -55,9 +55,6 @@ const FLIGHT_ANGLE_NOISE: f32 = 0.0003;
 /// [rad/s/sqrt(s)] walk of the bias: a quarter of the data sheet's 0.007 deg/s of in-run stability in six minutes.
 const FLIGHT_BIAS_WALK: f32 = 1.5e-6;
 
-/// [m/s2] of the data sheet's g.
-const STANDARD_GRAVITY: f32 = 9.806_65;
-
 /// How late the parts are: the time constant of the unit's low-pass and half a conversion (ADIS16265, 12.7 Hz, 3.9 ms;
 /// LIS331HH, 25 Hz, 20 ms; HMC5883L, 13.3 ms).
 const DELAYS: Delays = Delays {
@@ -120,7 +117,7 @@ impl Site {
         Params {
             angle_noise: FLIGHT_ANGLE_NOISE,
             bias_walk: FLIGHT_BIAS_WALK,
-            bias_by_force: launch.bias_per_g_deg_s.to_radians() / STANDARD_GRAVITY,
+            bias_per_g: launch.bias_per_g_deg_s.to_radians(),
             heading_sd: sd,
             start_field_sd: sd,
             dip_sd: sd,

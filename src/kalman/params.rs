@@ -19,8 +19,8 @@ pub struct Params {
     pub bias_sd: f32,
     /// [rad/s/sqrt(s)] bias random walk. Small: a drifting bias is followed late; large: the bias takes up disturbances.
     pub bias_walk: f32,
-    /// [rad/s for each m/s2] by how much force moves a gyro's bias: for who carries on through a boost.
-    pub bias_by_force: f32,
+    /// [rad/s for each g] by how much force moves a gyro's bias: for who carries on through a boost.
+    pub bias_per_g: f32,
     /// [1] scale and misalignment of the gyros at the start, standard deviation. Zero keeps them out of the filter.
     pub gyro_matrix_sd: f32,
     /// [1/sqrt(s)] random walk of scale and misalignment.
@@ -133,7 +133,7 @@ impl Params {
         turn_noise: 3.5e-4,
         bias_sd: 0.5 * DEG,
         bias_walk: 6e-4 * DEG,
-        bias_by_force: 0.0,
+        bias_per_g: 0.0,
         gyro_matrix_sd: 2e-3,
         gyro_matrix_walk: 5e-5,
         velocity_sd: 0.034,

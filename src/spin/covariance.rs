@@ -9,7 +9,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// Error states.
-pub const STATES: usize = 21;
+pub const STATES: usize = 25;
 /// \[rad\] attitude, a rotation vector in n: `q_true = q(a) q_nb`.
 pub const ATTITUDE: usize = 0;
 /// \[rad/s\] rate about x_b.
@@ -28,6 +28,8 @@ pub const SEES_SPIN: usize = 13;
 pub const IRON: usize = 17;
 /// \[1\] by how much longer all levers are.
 pub const LEVER: usize = 20;
+/// \[rad/s for each g\] by how much force along the spin axis moves each gyro's bias, against that on the pad.
+pub const BY_LOAD: usize = 21;
 
 /// What a scalar sees: some states and how much of each.
 pub type Row<'a> = &'a [(usize, f32)];
@@ -49,6 +51,9 @@ fn floor(state: usize) -> f32 {
         SPIN_UP | ACROSS_UP | 8 => 1e-6,
         BIAS..SEES_SPIN => 1e-12,
         IRON..LEVER => 1e-6,
+        LEVER => 1e-10,
+        // A gyro that is told to feel no force stays so.
+        BY_LOAD..STATES => 0.0,
         _ => 1e-10,
     }
 }

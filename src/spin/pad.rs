@@ -31,6 +31,8 @@ pub struct Pad {
     pub rate: [f32; PLATES],
     /// [m/s2] each accelerometer axis beyond the force found.
     pub force: [f32; TRIAD_AXES],
+    /// [m/s2] force along x_b.
+    pub along_x: f32,
     /// Cycles in the means.
     pub cycles: f32,
     counts: [f32; PLATES],
@@ -41,6 +43,7 @@ impl Pad {
     pub const EMPTY: Pad = Pad {
         rate: [0.0; PLATES],
         force: [0.0; TRIAD_AXES],
+        along_x: 0.0,
         cycles: 0.0,
         counts: [0.0; PLATES],
     };
@@ -52,13 +55,13 @@ impl Pad {
         (self.cycles >= 5.0).then(|| noise * noise / (20.0 * self.cycles) + CHANGED * CHANGED)
     }
 
-    /// Takes a cycle: its gyros, and what each accelerometer axis had beyond the force found, if all were used.
+    /// Takes a cycle: its gyros, and if all accelerometers were used the force along x_b and what each axis had beyond it.
     pub fn take(
         &mut self,
         set: &Set,
         above_c: &[f32; PLATES],
         increments: &Increments,
-        beyond: Option<[f32; TRIAD_AXES]>,
+        force: Option<(f32, [f32; TRIAD_AXES])>,
     ) {
         let covered_s = increments.covered_us as f32 * 1e-6;
         if covered_s <= 0.0 || increments.gyro.iter().any(|gyro| gyro.count < 10) {
@@ -81,7 +84,8 @@ impl Pad {
             let axis = &set.gyro[k];
             self.rate[k] = axis.scale_at(above_c[k]) * (self.counts[k] - axis.bias_counts_at(above_c[k]));
         }
-        if let Some(beyond) = beyond {
+        if let Some((along_x, beyond)) = force {
+            self.along_x += (along_x - self.along_x) * part;
             for (mean, now) in self.force.iter_mut().zip(beyond) {
                 *mean += (now - *mean) * part;
             }
