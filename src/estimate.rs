@@ -213,7 +213,8 @@ impl Estimator {
         let dt_s = since_us.map_or(0.0, seconds);
         // The step that completes a window leaves what can wait to the next one, and that leaves its own to the one after.
         let closes = self.filter.closes_at(increments.end_us);
-        if core::mem::replace(&mut self.closed, closes) {
+        let closed = core::mem::replace(&mut self.closed, closes);
+        if closed {
             self.filter.spare();
         }
         let vectors = self.monitor.take(&self.set, reading, &measured, dt_s, closes);
@@ -264,7 +265,10 @@ impl Estimator {
         };
         self.filter.take(&step, outcome);
         self.look_at_the_covariance();
-        self.see_about_boost(sample, &measured, increments, &vectors);
+        if !(closes || closed || sample.reading.lift_off) {
+            self.learn_on_pad(sample, &measured, increments, &vectors);
+        }
+        self.see_about_boost(sample.reading.lift_off, increments, &vectors);
         self.estimate(&vectors)
     }
 

@@ -69,43 +69,51 @@ fn stopped(slice: &Slice) -> (usize, i16) {
 }
 
 impl Estimator {
-    /// A cycle outside the spin: what it tells of the pad, and whether the spin begins.
+    /// A cycle before lift-off: what it tells of each sensor.
     #[inline(never)]
-    pub(super) fn see_about_boost(
+    pub(super) fn learn_on_pad(
         &mut self,
         sample: &Sample,
         measured: &Measured,
         increments: &Increments,
         vectors: &Vectors,
     ) {
-        let lift_off = sample.reading.lift_off;
+        let force = (vectors.force_b.used == 0xFFF).then(|| {
+            let counts = sample.reading.acc_p.as_flattened();
+            let beyond = |k: usize| {
+                let axis = &self.set.acc[k];
+                axis.value(counts[k], 0.0) - axis.axis_b.dot(&vectors.force_b.vector_b)
+            };
+            let each = core::array::from_fn::<f32, TRIAD_AXES, _>(beyond);
+            (vectors.force_b.vector_b.x, each)
+        });
+        self.boost
+            .pad
+            .take(&self.set, &measured.gyros_above_c, increments, force);
+    }
+
+    /// A cycle outside the spin: whether the spin begins.
+    pub(super) fn see_about_boost(&mut self, lift_off: bool, increments: &Increments, vectors: &Vectors) {
         let lifts = lift_off && !core::mem::replace(&mut self.boost.lifted, lift_off);
-        if !lift_off {
-            let beyond = (vectors.force_b.used == 0xFFF).then(|| {
-                let counts = sample.reading.acc_p.as_flattened();
-                let of = |k: usize| {
-                    let axis = &self.set.acc[k];
-                    axis.value(counts[k], 0.0) - axis.axis_b.dot(&vectors.force_b.vector_b)
-                };
-                (
-                    vectors.force_b.vector_b.x,
-                    core::array::from_fn::<f32, TRIAD_AXES, _>(of),
-                )
-            });
-            let above_c = &measured.gyros_above_c;
-            self.boost.pad.take(&self.set, above_c, increments, beyond);
+        let rate_b = vectors.rate_b.vector_b - self.filter.bias_b;
+        let [along, across] = [rate_b.x * rate_b.x, rate_b.y * rate_b.y + rate_b.z * rate_b.z];
+        let spins = along > BEGINS * BEGINS && along > MOSTLY * MOSTLY * across;
+        if lift_off || spins {
+            self.begin_boost(lifts || spins, lift_off, &rate_b, increments);
         }
+    }
+
+    /// Begins if it spins or lifts off, or has lifted off and spins too fast for the gyros.
+    #[inline(never)]
+    fn begin_boost(&mut self, seen: bool, lift_off: bool, rate_b: &Vector3<f32>, increments: &Increments) {
         let [first, ..] = &increments.slices;
         if !self.filter.aligned || first.is_none() || increments.covered_us > LONGEST_US {
             return;
         }
-        let rate_b = vectors.rate_b.vector_b - self.filter.bias_b;
-        let across = Vector3::new(0.0, rate_b.y, rate_b.z).norm();
-        let spins = rate_b.x.abs() > BEGINS && rate_b.x.abs() > MOSTLY * across;
         let latest = increments.slices.iter().rfind(|slice| !slice.is_none());
         let (stopped, sign) = latest.map(stopped).unwrap_or_default();
         let unseen = lift_off && stopped >= 2;
-        if !(lifts || spins || unseen) {
+        if !(seen || unseen) {
             return;
         }
         let delays = self.filter.params.delays;
@@ -119,7 +127,7 @@ impl Estimator {
             let spin = if sign > 0 { -UNSEEN[0] } else { UNSEEN[0] };
             (Vector3::new(spin, 0.0, 0.0), UNSEEN[1], covariance_n + lost)
         } else {
-            (rate_b, RATE_SD, covariance_n)
+            (*rate_b, RATE_SD, covariance_n)
         };
         let start = Start {
             at_us,
