@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use emems::{
     derived::Derived,
-    increments::{Force, SLICES, Slice, forces::READINGS},
+    increments::{Force, forces::READINGS},
     sample::{NO_SLOT, NOT_READ, Reading},
 };
 
@@ -189,7 +189,7 @@ mod tests {
     use emems::{
         derived::Health,
         estimate::Estimate,
-        increments::{Channel, Increments},
+        increments::{Channel, Increments, SLICES, Slice},
         mode::Mode,
         packet,
     };
