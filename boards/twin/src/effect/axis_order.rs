@@ -1,6 +1,6 @@
 //! Axis order: the magnetometer's registers come as X, Z, Y, and its gain has eight settings; either is easily mistaken.
 
-use super::{Effect, Nature, Page, Scope, Site};
+use super::{CorrectedAs, Effect, Nature, Page, Scope, Site};
 use crate::predict::{Chain, Kind};
 
 /// `mag-axis-order`.
@@ -26,6 +26,7 @@ const PAGE: Page = Page {
     scope: Scope::Plate,
     common: true,
     sensors: &[Kind::Magnetometer],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

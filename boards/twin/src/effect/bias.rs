@@ -1,6 +1,6 @@
 //! Zero shift since the calibration: the sensor reads `b` where there is nothing to read.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -34,6 +34,7 @@ pub const GYRO: Page = Page {
     confirm_by: "Rest in two attitudes at one temperature: the shift is the same in both.",
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("b", "rad/s", 0.01)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 
@@ -53,5 +54,6 @@ pub const ACCEL: Page = Page {
     confirm_by: "The six faces up and down: the mean of opposite readings is the shift.",
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("b", "m/s^2", 0.1)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };

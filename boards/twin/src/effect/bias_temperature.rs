@@ -2,7 +2,7 @@
 //! proportion.
 
 use super::{
-    Effect, Page, Site, Symbol,
+    CorrectedAs, Effect, Page, Site, Symbol,
     bend::{self, bent},
 };
 use crate::predict::{Chain, Kind};
@@ -51,6 +51,7 @@ pub const GYRO: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("k", "rad/s/degC", 3e-4)],
+    corrected_as: Some(CorrectedAs::BiasPerKelvin),
     ..Page::SMOOTH
 };
 
@@ -66,6 +67,7 @@ pub const ACCEL: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("k", "m/s^2/degC", 4e-3)],
+    corrected_as: Some(CorrectedAs::BiasPerKelvin),
     ..Page::SMOOTH
 };
 
@@ -81,5 +83,6 @@ pub const MAG: Page = Page {
     common: false,
     sensors: &[Kind::Magnetometer],
     parameters: &[Symbol::signed("k", "uT/degC", 0.03)],
+    corrected_as: Some(CorrectedAs::BiasPerKelvin),
     ..Page::SMOOTH
 };

@@ -6,9 +6,9 @@
 use core::f64::consts::PI;
 
 use super::spread::View;
-use super::{Effect, Likelihood, Nature, Page, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Likelihood, Nature, Page, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// Terms looked at.
 const TERMS: usize = 48;
@@ -43,6 +43,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::positive("s", "rad/s/sqrt(s)", 1e-4)],
+    texture: Texture::Walk,
     ..Page::SMOOTH
 };
 

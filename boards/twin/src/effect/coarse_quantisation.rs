@@ -2,8 +2,8 @@
 
 use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page};
-use crate::part::signal::Noise;
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `coarse-quantisation`.
 pub struct CoarseQuantisation;

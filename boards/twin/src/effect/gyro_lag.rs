@@ -1,6 +1,6 @@
 //! Lag: another first-order low-pass, or filter taps nobody counted.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `gyro-lag`.
@@ -17,6 +17,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("tau", "s", 0.015)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `hard-iron`.
@@ -33,6 +33,7 @@ const PAGE: Page = Page {
     passes: true,
     // A magnet at a centimetre makes more than the Earth; the sigma is of screws, batteries and connectors.
     largest: 100.0,
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

@@ -1,6 +1,6 @@
 //! Latency: what is logged at `t` is what was there at `t - tau`.
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -41,6 +41,7 @@ pub const ALL: Page = Page {
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[DELAY],
+    corrected_as: Some(CorrectedAs::Delay),
     ..Page::SMOOTH
 };
 
@@ -57,6 +58,7 @@ pub const GYRO: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[DELAY],
+    corrected_as: Some(CorrectedAs::Delay),
     ..Page::SMOOTH
 };
 
@@ -73,6 +75,7 @@ pub const ACCEL: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer],
     parameters: &[DELAY],
+    corrected_as: Some(CorrectedAs::Delay),
     ..Page::SMOOTH
 };
 
@@ -89,5 +92,6 @@ pub const MAG: Page = Page {
     common: true,
     sensors: &[Kind::Magnetometer],
     parameters: &[DELAY],
+    corrected_as: Some(CorrectedAs::Delay),
     ..Page::SMOOTH
 };

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `lever-arm`.
@@ -25,6 +25,7 @@ const PAGE: Page = Page {
         Symbol::signed("dy", "m", 0.01),
         Symbol::signed("dz", "m", 0.01),
     ],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

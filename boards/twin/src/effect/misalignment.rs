@@ -1,6 +1,6 @@
 //! Misalignment: the sensitive axis does not point where the description has it.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -28,6 +28,7 @@ pub const GYRO: Page = Page {
     confirm_by: "Turn about an axis across the gyro's: what it reads is the tilt.",
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("a1", "rad", 0.01), Symbol::signed("a2", "rad", 0.01)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 
@@ -42,5 +43,6 @@ pub const ACCEL: Page = Page {
     confirm_by: "A dozen attitudes at rest: one axis must answer to gravity across it.",
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("a1", "rad", 0.01), Symbol::signed("a2", "rad", 0.01)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };

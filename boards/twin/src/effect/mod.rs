@@ -82,13 +82,13 @@ mod vibration_rectification;
 mod warm_up;
 
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
-pub use page::{Nature, Page, Scope, Symbol};
+pub use page::{CorrectedAs, Nature, Needs, Page, Scope, Symbol, Texture};
 pub use site::Site;
 pub use spread::{Beneath, View, logged_step, most_likely, sigma_of};
 
+use crate::predict::{Chain, Feel, UnitDescription};
 use crate::environment::Environment;
 use crate::part::signal::Noise;
-use crate::predict::{Chain, Feel, UnitDescription};
 
 /// All effects: gyros, accelerometers, magnetometers, reference and environment, timing, noise and bits.
 pub const LIBRARY: &[&dyn Effect] = &[

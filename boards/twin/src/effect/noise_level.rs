@@ -1,9 +1,9 @@
 //! Noise level: the white noise is stronger or weaker than described.
 
 use super::spread::{Beneath, View};
-use super::{Effect, Nature, Page, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Nature, Page, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `noise-level`.
 pub struct NoiseLevel;
@@ -20,6 +20,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
     parameters: &[Symbol::signed("a", "1", 0.5)],
+    texture: Texture::Louder,
     ..Page::SMOOTH
 };
 

@@ -1,9 +1,9 @@
 //! Corruption: a damaged packet passes for a whole one, and a value is anything.
 
 use super::spread::{Beneath, View, mixture, unusual_part};
-use super::{Effect, Nature, Page, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Nature, Page, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `packet-corruption`.
 pub struct PacketCorruption;
@@ -20,6 +20,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
     parameters: &[Symbol::positive("p", "1", 0.01)],
+    texture: Texture::Shapeless,
     ..Page::SMOOTH
 };
 

@@ -3,7 +3,7 @@
 //! Losses that the counter shows are gaps, not errors. The step is free, so that a pause of any length is found; a lost
 //! packet makes it a multiple of the cycle.
 
-use super::{Effect, Page, Scope, Site, Symbol, onsets};
+use super::{Effect, Needs, Page, Scope, Site, Symbol, onsets};
 use crate::predict::{Chain, Kind};
 
 /// `packet-loss`.
@@ -20,6 +20,7 @@ const PAGE: Page = Page {
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer, Kind::Thermometer],
     parameters: &[Symbol::signed("dt", "s", 0.2)],
+    needs: Some(Needs::Counter),
     ..Page::SMOOTH
 };
 

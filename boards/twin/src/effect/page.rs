@@ -13,6 +13,59 @@ pub enum Nature {
     Spread,
 }
 
+/// How a unit's own calibration corrects an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CorrectedAs {
+    /// As what it does to the channel's chain: bias, axis, scale or place.
+    Chain,
+    /// As a bias per kelvin.
+    BiasPerKelvin,
+    /// As a scale per kelvin.
+    ScalePerKelvin,
+    /// As a delay, the same for every channel touched.
+    Delay,
+    /// As a delay that grows with the place in the reading order.
+    Skew,
+}
+
+/// What an effect on the scatter looks like to a test that does not ask for its law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Texture {
+    /// White noise that is louder: nothing but its size is another.
+    Louder,
+    /// White noise of which every sample has its own size. A reference that errs makes the same.
+    Shapeless,
+    /// White noise with a few samples far out.
+    Outliers,
+    /// A line in the spectrum, of which neither energy nor neighbours say anything.
+    Line,
+    /// A walk: slow, of no shape in particular.
+    Walk,
+    /// Its own: nothing else looks like it.
+    Own,
+}
+
+impl Texture {
+    /// Whether every sample only scatters more: errors of a reference do so too.
+    pub fn is_shapeless(self) -> bool {
+        matches!(self, Texture::Louder | Texture::Shapeless)
+    }
+
+    /// Whether it stands for white noise, for its outliers, or for errors of each sample's own.
+    pub fn is_white(self) -> bool {
+        self.is_shapeless() || self == Texture::Outliers
+    }
+}
+
+/// What a unit must have, or an effect cannot be in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// A gyro of light: one that sends codes of its own is a vibrating one, whose answer has no Sagnac phase.
+    Light,
+    /// Cycles of one length, counted: rows that bring their own time leave a hole when they are lost, and nothing late.
+    Counter,
+}
+
 /// What shares one block of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
@@ -90,6 +143,12 @@ pub struct Page {
     /// [prior sigmas] size beyond which it more likely stands for something else; a unit that was badly calibrated is off by
     /// ten times the usual, a thing that is not this effect at all by any number.
     pub largest: f64,
+    /// How the unit's own calibration corrects it; `None` for what is not the unit's to correct.
+    pub corrected_as: Option<CorrectedAs>,
+    /// What it looks like, of an effect on the scatter.
+    pub texture: Texture,
+    /// What a unit must have for it.
+    pub needs: Option<Needs>,
 }
 
 impl Page {
@@ -109,5 +168,8 @@ impl Page {
         parameters: &[],
         passes: false,
         largest: 20.0,
+        corrected_as: None,
+        texture: Texture::Own,
+        needs: None,
     };
 }

@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `plate-rotation`.
@@ -26,6 +26,7 @@ const PAGE: Page = Page {
         Symbol::signed("rz", "rad", 0.02),
     ],
     passes: true,
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

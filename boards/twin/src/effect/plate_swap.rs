@@ -1,6 +1,6 @@
 //! Swapped plates: two plates, or the same part of two plates, are wired to each other's place.
 
-use super::{Effect, Nature, Page, Scope, Site};
+use super::{CorrectedAs, Effect, Nature, Page, Scope, Site};
 use crate::predict::{Chain, Kind};
 
 /// `plate-swap`.
@@ -17,6 +17,7 @@ const PAGE: Page = Page {
     nature: Nature::Discrete,
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

@@ -1,6 +1,6 @@
 //! Read skew: the sensors are read one after the other, further apart or closer than the description has it.
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `read-skew`.
@@ -24,6 +24,7 @@ const PAGE: Page = Page {
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[Symbol::signed("delta", "s", 3e-3)],
+    corrected_as: Some(CorrectedAs::Skew),
     ..Page::SMOOTH
 };
 

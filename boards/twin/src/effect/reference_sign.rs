@@ -8,8 +8,8 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Effect, Nature, Page, Scope, Site};
-use crate::environment::Environment;
 use crate::predict::{Chain, Feel, Kind};
+use crate::environment::Environment;
 
 /// `reference-sign`.
 pub struct ReferenceSign;

@@ -3,9 +3,9 @@
 //! Each reading may be late by itself, or a cycle as a whole: then one number explains what 28 channels read.
 
 use super::spread::{Beneath, View};
-use super::{Effect, Likelihood, Nature, Page, Scope, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Likelihood, Nature, Page, Scope, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// [physical unit/s] of the prediction at each sample. Central differences: at a few samples a second they are short of the
 /// true slope where it changes, and the jitter comes out that much larger.
@@ -56,6 +56,7 @@ const PAGE: Page = Page {
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[Symbol::positive("sigma_t", "s", 2e-3)],
+    texture: Texture::Shapeless,
     ..Page::SMOOTH
 };
 

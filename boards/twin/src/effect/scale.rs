@@ -1,6 +1,6 @@
 //! Scale error: the sensor answers `1 + s` for one.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
@@ -33,6 +33,7 @@ pub const GYRO: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("s", "1", 0.01)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 
@@ -54,5 +55,6 @@ pub const ACCEL: Page = Page {
     common: false,
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("s", "1", 0.01)],
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };

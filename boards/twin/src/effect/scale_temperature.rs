@@ -1,7 +1,7 @@
 //! Temperature coefficient of the scale.
 
 use super::{
-    Effect, Page, Site, Symbol,
+    CorrectedAs, Effect, Page, Site, Symbol,
     bend::{self, bent},
 };
 use crate::predict::{Chain, Kind};
@@ -45,6 +45,7 @@ pub const GYRO: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::signed("k", "1/degC", 1e-4)],
+    corrected_as: Some(CorrectedAs::ScalePerKelvin),
     ..Page::SMOOTH
 };
 
@@ -60,6 +61,7 @@ pub const ACCEL: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer],
     parameters: &[Symbol::signed("k", "1/degC", 2e-4)],
+    corrected_as: Some(CorrectedAs::ScalePerKelvin),
     ..Page::SMOOTH
 };
 
@@ -75,5 +77,6 @@ pub const MAG: Page = Page {
     common: true,
     sensors: &[Kind::Magnetometer],
     parameters: &[Symbol::signed("k", "1/degC", 3e-3)],
+    corrected_as: Some(CorrectedAs::ScalePerKelvin),
     ..Page::SMOOTH
 };

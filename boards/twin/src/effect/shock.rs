@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::spread::{Beneath, View, mixed, mixture, unusual_part};
-use super::{Effect, Likelihood, Nature, Page, Scope, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Likelihood, Nature, Page, Scope, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `shock`.
 pub struct Shock;
@@ -22,6 +22,7 @@ const PAGE: Page = Page {
     scope: Scope::Unit,
     sensors: &[Kind::Accelerometer, Kind::Gyro],
     parameters: &[Symbol::positive("p", "1", 0.01)],
+    texture: Texture::Outliers,
     ..Page::SMOOTH
 };
 

@@ -2,7 +2,7 @@
 //!
 //! `sin(B u)/B` is smooth in `kappa = B^2`, which is the parameter, at zero and (as a hyperbolic sine) below it.
 
-use super::{Effect, Page, Site, Symbol};
+use super::{Effect, Needs, Page, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// sin(B u)/B for kappa = B^2. Near zero the quotient is its series, where sine and root lose digits.
@@ -30,6 +30,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Gyro],
     parameters: &[Symbol::positive("kappa", "s^2/rad^2", 10.0)],
+    needs: Some(Needs::Light),
     ..Page::SMOOTH
 };
 

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use crate::environment::Environment;
 use crate::predict::{Channel, Kind, UnitDescription};
+use crate::environment::Environment;
 
 /// A channel among the others, at a place on Earth, in a log.
 #[derive(Clone, Copy)]

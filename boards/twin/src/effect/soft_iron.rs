@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
 use crate::predict::{Chain, Kind};
 
 /// `soft-iron`.
@@ -28,6 +28,7 @@ const PAGE: Page = Page {
         Symbol::signed("syz", "1", 0.02),
     ],
     passes: true,
+    corrected_as: Some(CorrectedAs::Chain),
     ..Page::SMOOTH
 };
 

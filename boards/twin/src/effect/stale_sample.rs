@@ -2,8 +2,8 @@
 
 use super::spread::{Beneath, View, mixture, unusual_part};
 use super::{Effect, Likelihood, Nature, Page, Symbol};
-use crate::part::signal::Noise;
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `stale-sample`.
 pub struct StaleSample;

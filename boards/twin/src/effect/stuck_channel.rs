@@ -2,8 +2,8 @@
 
 use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page, onsets};
-use crate::part::signal::Noise;
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// `stuck-channel`.
 pub struct StuckChannel;

@@ -272,7 +272,7 @@ fn a_unit_that_is_known_to_have_an_effect_is_predicted_with_it() {
 #[test]
 fn what_a_unit_cannot_have_is_refused() {
     let mut unit = emems(thesis_slot_s);
-    let known = |effect: &str, locality: &str, theta: &[f64]| crate::predict::KnownEffect {
+    let known = |effect: &str, locality: &str, theta: &[f64]| crate::channel::KnownEffect {
         effect: effect.to_owned(),
         locality: locality.to_owned(),
         variant: 0.0,

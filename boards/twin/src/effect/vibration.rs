@@ -11,9 +11,9 @@ use core::f64::consts::{PI, TAU};
 
 use super::line::{BLOCKS, Block, first_bin, mean_of, spectra, summed};
 use super::spread::{View, mixed};
-use super::{Effect, Likelihood, Nature, Page, Symbol};
-use crate::part::signal::Noise;
+use super::{Effect, Likelihood, Nature, Page, Symbol, Texture};
 use crate::predict::Kind;
+use crate::part::signal::Noise;
 
 /// Steps a bin in which the frequency is sought: between two of them a line loses a hundredth of its power.
 const FINE: usize = 8;
@@ -58,6 +58,7 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[Symbol::positive("a", "1", 1.0)],
+    texture: Texture::Line,
     ..Page::SMOOTH
 };
 

@@ -5,7 +5,8 @@
 //!
 //! Bias, axis, scale and place are read off the effect's own action on the channel's chain; a temperature coefficient is
 //! the effect's parameter with its bend, which a scale has none of in the set; a delay or a lag is a delay. What is not
-//! always on, what changes the scatter, and what is the reference's fault is not the unit's to correct and is left out.
+//! always on, what changes the scatter, and what is the reference's fault is not the unit's to correct and is left out: each
+//! effect's page says so ([`CorrectedAs`]).
 //!
 //! The set's format has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
 //! passes over: the first belongs into the estimator's `Delays`, the second into the unit's `place_b`.
@@ -13,53 +14,11 @@
 use bench::set::{Entry, Set, SetError};
 use nalgebra::{Matrix3, Vector3};
 use twin::{
-    effect::{Active, Site},
+    effect::{Active, CorrectedAs, Site},
     predict::{Chain, Channel, Kind, Twin},
 };
 
 use crate::{holdout::attitude::Response, null::problem::Component};
-
-/// How an effect enters a calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
-    /// As bias, axis, scale or place.
-    Chain,
-    /// As a bias per kelvin.
-    BiasPerK,
-    /// As a scale per kelvin.
-    ScalePerK,
-    /// As a delay, the same for every channel touched.
-    Delay,
-    /// As a delay that grows with the place in the reading order.
-    Skew,
-}
-
-const WAYS: [(&str, Way); 24] = [
-    ("gyro-bias", Way::Chain),
-    ("accel-bias", Way::Chain),
-    ("hard-iron", Way::Chain),
-    ("gyro-scale", Way::Chain),
-    ("accel-scale", Way::Chain),
-    ("gyro-misalignment", Way::Chain),
-    ("accel-misalignment", Way::Chain),
-    ("soft-iron", Way::Chain),
-    ("plate-rotation", Way::Chain),
-    ("plate-swap", Way::Chain),
-    ("mag-axis-order", Way::Chain),
-    ("lever-arm", Way::Chain),
-    ("gyro-lag", Way::Chain),
-    ("gyro-bias-temperature", Way::BiasPerK),
-    ("accel-bias-temperature", Way::BiasPerK),
-    ("mag-offset-temperature", Way::BiasPerK),
-    ("gyro-scale-temperature", Way::ScalePerK),
-    ("accel-scale-temperature", Way::ScalePerK),
-    ("mag-scale-temperature", Way::ScalePerK),
-    ("latency", Way::Delay),
-    ("gyro-latency", Way::Delay),
-    ("accel-latency", Way::Delay),
-    ("mag-latency", Way::Delay),
-    ("read-skew", Way::Skew),
-];
 
 /// What the unit's calibration needs.
 #[derive(Clone, Debug)]
@@ -83,13 +42,13 @@ impl Correction {
         };
         for component in components.iter().filter(|component| component.span.is_none()) {
             let active = &component.active;
-            let name = active.cause.effect.page().name;
-            let Some((_, way)) = WAYS.iter().find(|(known, _)| *known == name) else {
+            let page = active.cause.effect.page();
+            let Some(way) = page.corrected_as else {
                 continue;
             };
-            correction.effects.push(name);
+            correction.effects.push(page.name);
             for index in active.cause.channels(unit) {
-                add(*way, active, twin, index, &mut correction.responses[index]);
+                add(way, active, twin, index, &mut correction.responses[index]);
                 correction.channels.push(index);
             }
         }
@@ -136,7 +95,7 @@ impl Correction {
 }
 
 /// Adds an effect to the response of one channel that it touches.
-fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Response) {
+fn add(way: CorrectedAs, active: &Active, twin: &Twin, index: usize, response: &mut Response) {
     let unit = twin.unit();
     let channel = &unit.channels[index];
     let starts_s = twin.starts_s();
@@ -153,7 +112,7 @@ fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Resp
     let own = (0..active.theta.len()).find(|parameter| active.cause.touched_by(*parameter, unit).contains(&index));
     let theta = own.map_or(0.0, |parameter| active.theta[parameter]);
     match way {
-        Way::Chain => {
+        CorrectedAs::Chain => {
             let mut chain = Chain::of(channel);
             active.act(&site, &mut chain);
             response.sensitivity_b += chain.aim.axis_b - channel.axis_b;
@@ -161,13 +120,13 @@ fn add(way: Way, active: &Active, twin: &Twin, index: usize, response: &mut Resp
             response.lever_m += chain.aim.lever_m - channel.lever_m;
             response.delay_s += chain.lag_s;
         }
-        Way::BiasPerK => {
+        CorrectedAs::BiasPerKelvin => {
             response.bias_per_k += theta;
             response.bias_per_k2 += theta * bend(active, starts_s);
         }
-        Way::ScalePerK => response.scale_per_k += theta * (1.0 + bend(active, starts_s) * skew_k(twin)),
-        Way::Delay => response.delay_s += theta,
-        Way::Skew => response.delay_s -= theta * site.read_position() as f64,
+        CorrectedAs::ScalePerKelvin => response.scale_per_k += theta * (1.0 + bend(active, starts_s) * skew_k(twin)),
+        CorrectedAs::Delay => response.delay_s += theta,
+        CorrectedAs::Skew => response.delay_s -= theta * site.read_position() as f64,
     }
 }
 

@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 use twin::{
-    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter, onsets},
+    effect::{Active, Cause, LIBRARY, Locality, Nature, Needs, Page, Parameter, onsets},
     predict::Kind,
 };
 
@@ -103,21 +103,21 @@ impl Library {
         for column in problem.reference_columns() {
             library.products.push(problem, column);
         }
-        // A gyro that sends codes of its own is a vibrating one, whose answer has no Sagnac phase to be the sine of.
         let of_light = unit
             .channels
             .iter()
             .any(|channel| channel.sensor == Kind::Gyro && channel.bits.is_none());
-        // Rows that bring their own time leave a hole when they are lost, and nothing late.
-        let is_counted = unit.cycle_s.is_some();
-        let is_offered = |name: &str| {
-            withheld.iter().all(|withheld| withheld != name)
-                && (of_light || name != "gyro-sine-response")
-                && (is_counted || name != "packet-loss")
+        let is_offered = |page: &Page| {
+            let is_possible = match page.needs {
+                None => true,
+                Some(Needs::Light) => of_light,
+                Some(Needs::Counter) => unit.cycle_s.is_some(),
+            };
+            is_possible && withheld.iter().all(|withheld| withheld != page.name)
         };
         let offered: Vec<_> = LIBRARY
             .iter()
-            .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page().name))
+            .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page()))
             .collect();
         for (done, effect) in offered.iter().enumerate() {
             let (localities, variants) = (effect.localities(unit), effect.variants(starts_s));

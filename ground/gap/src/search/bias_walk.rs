@@ -13,7 +13,7 @@ use std::f64::consts::{PI, SQRT_2};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::{
-    effect::{Effect, LIBRARY},
+    effect::{Effect, LIBRARY, Texture},
     predict::Kind,
 };
 
@@ -24,9 +24,6 @@ use crate::{
     },
     search::scatter::Scatter,
 };
-
-/// The effect's name.
-pub const NAME: &str = "gyro-bias-walk";
 
 /// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods
 /// under 19 s.
@@ -58,8 +55,8 @@ pub struct Walk {
 impl Walk {
     /// The likeliest beside these effects as they are; `None` where none is, or where it is withheld.
     pub fn beside(problem: &Problem, components: &[Component], withheld: &[String]) -> Option<Self> {
-        let effect = LIBRARY.iter().find(|effect| effect.page().name == NAME)?;
-        if withheld.iter().any(|name| name == NAME) {
+        let effect = LIBRARY.iter().find(|effect| effect.page().texture == Texture::Walk)?;
+        if withheld.iter().any(|name| name == effect.page().name) {
             return None;
         }
         let unit = problem.twin.unit();

@@ -8,7 +8,7 @@
 //! a gyro's walk everything else is searched with the walk open, until both stay what they are.
 
 use nalgebra::DVector;
-use twin::part::signal::Noise;
+use twin::{effect::Texture, part::signal::Noise};
 
 use crate::{
     library::hypotheses::Library,
@@ -39,9 +39,6 @@ const MOST_CAUSES: usize = 3;
 
 /// Part of the gain of all from which an effect counts among them.
 const LEAST_PART: f64 = 0.02;
-
-/// The effect on the scatter that changes nothing but its size.
-const LOUDER: &str = "noise-level";
 
 /// Searches beside a walk until it stays what it is.
 const WALKS: usize = 4;
@@ -89,7 +86,7 @@ impl Explanation {
         let is_alone = alone.is_some();
         let mut wanders = alone
             .as_ref()
-            .is_some_and(|alone| alone.effect.page().name == bias_walk::NAME);
+            .is_some_and(|alone| alone.effect.page().texture == Texture::Walk);
         if is_alone {
             found.chosen.clear();
             scatter = alone;
@@ -169,10 +166,12 @@ impl Explanation {
     /// units already.
     pub fn disturb<'a>(&'a self, problem: &'a Problem) -> Option<impl Fn(&mut [DVector<f64>], u64) + 'a> {
         let scatter = self.scatter.as_ref()?;
-        (scatter.effect.page().name != LOUDER).then_some(move |residuals: &mut [DVector<f64>], seed: u64| {
-            (residuals.iter_mut().zip(&self.louder)).for_each(|(residual, louder)| *residual /= *louder);
-            scatter.disturb(problem, &self.beneath, residuals, Noise::new(seed));
-        })
+        (scatter.effect.page().texture != Texture::Louder).then_some(
+            move |residuals: &mut [DVector<f64>], seed: u64| {
+                (residuals.iter_mut().zip(&self.louder)).for_each(|(residual, louder)| *residual /= *louder);
+                scatter.disturb(problem, &self.beneath, residuals, Noise::new(seed));
+            },
+        )
     }
 
     /// Energy that it takes off what calibration and noise leave, in squares of noise.
@@ -184,7 +183,9 @@ impl Explanation {
         };
         match &self.scatter {
             // Louder noise takes in whatever is there, and a walk whatever is slow: that it does is no sign of its law.
-            Some(scatter) if [LOUDER, bias_walk::NAME].contains(&scatter.effect.page().name) => by_readings(scatter),
+            Some(scatter) if [Texture::Louder, Texture::Walk].contains(&scatter.effect.page().texture) => {
+                by_readings(scatter)
+            }
             Some(scatter) => by_readings(scatter) + 2.0 * scatter.gain,
             None => self.energy_without(quiet, &[]),
         }
@@ -273,7 +274,7 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 /// everything.
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-    let is_walk = scatter.effect.page().name == bias_walk::NAME;
+    let is_walk = scatter.effect.page().texture == Texture::Walk;
     !scatter.beneath.is_empty()
         || is_walk
             && scatter

@@ -71,3 +71,18 @@ fn every_page_is_written_and_its_siblings_exist() {
         );
     }
 }
+
+#[test]
+fn what_a_page_says_of_corrections_and_textures_suits_its_nature() {
+    for effect in LIBRARY {
+        let page = effect.page();
+        let is_spread = page.nature == Nature::Spread;
+        assert!(is_spread || page.texture == Texture::Own, "{}", page.name);
+        assert!(!is_spread || page.corrected_as.is_none(), "{}", page.name);
+    }
+    let textures = [Texture::Louder, Texture::Line, Texture::Walk, Texture::Outliers];
+    for texture in textures {
+        let count = LIBRARY.iter().filter(|effect| effect.page().texture == texture).count();
+        assert_eq!(count, 1, "{texture:?}");
+    }
+}

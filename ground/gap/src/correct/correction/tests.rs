@@ -33,11 +33,6 @@ fn component(effect: &str, locality: Locality, theta: &[f64]) -> Component {
 }
 
 #[test]
-fn every_way_is_of_an_effect_in_the_library() {
-    assert!(WAYS.iter().all(|(name, _)| by_name(name).is_some()));
-}
-
-#[test]
 fn the_set_of_hard_iron_and_a_scale_is_read_back_by_the_bench_and_the_unit() {
     let twin = twin();
     let iron = component("hard-iron", Locality::Common, &[1.0, -2.0, 0.5]);

@@ -1,21 +1,15 @@
 //! Channels that an effect on the scatter may be in together, by what shares its parameters.
 
 use twin::{
-    effect::{Effect, Scope},
+    effect::{Effect, Scope, Texture},
     predict::Kind,
 };
 
 use crate::null::problem::Problem;
 
-/// Effects that only make a sample scatter more: a reference that errs does so too.
-const SHAPELESS: [&str; 3] = ["noise-level", "sampling-jitter", "packet-corruption"];
-
-/// Stands in a spectrum where neither energy nor neighbours say anything of it.
-const LINE: &str = "vibration";
-
 /// Whether a residual that scatters as described as far as [`super::screen`] sees may hold it.
 pub fn is_hidden(effect: &dyn Effect) -> bool {
-    effect.page().name == LINE
+    effect.page().texture == Texture::Line
 }
 
 /// Blocks of the effect's own scope.
@@ -55,6 +49,6 @@ fn concerned(problem: &Problem, effect: &dyn Effect) -> Vec<usize> {
     let (unit, page) = (problem.twin.unit(), effect.page());
     (0..unit.channels.len())
         .filter(|index| page.sensors.contains(&unit.channels[*index].sensor))
-        .filter(|index| !(problem.is_limited(*index) && SHAPELESS.contains(&page.name)))
+        .filter(|index| !(problem.is_limited(*index) && page.texture.is_shapeless()))
         .collect()
 }

@@ -15,9 +15,6 @@ use crate::{
     search::recalibrated::{as_described, recalibrated},
 };
 
-/// Effects that stand for white noise, for its outliers, or for errors of each sample's own.
-const WHITE: [&str; 4] = ["noise-level", "packet-corruption", "shock", "sampling-jitter"];
-
 /// [nats a sample] that the tails of a reference's errors gain over normal scatter: those of a Student law of five degrees of
 /// freedom, whose excess kurtosis of six is the largest that BROAD's recordings show, between blows. Its entropy is 1.3721 and
 /// a normal law's of the same variance 1.4189.
@@ -54,7 +51,7 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
             found.push(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter));
         }
         let is_found = found.iter().any(|own| own.effect.page().name == effect.page().name);
-        if WHITE.contains(&effect.page().name) && !is_found {
+        if effect.page().texture.is_white() && !is_found {
             hidden.extend(variants.iter().filter_map(|variant| seek(*variant, false)));
         }
     }
@@ -268,7 +265,7 @@ impl<'a> Search<'a> {
 
     /// Whether an effect may be what these scatter by: one that stands for white noise is not where neighbours are alike.
     fn is_possible(&self, effect: &dyn Effect, views: &[View]) -> bool {
-        !(WHITE.contains(&effect.page().name) && views.iter().any(is_coloured))
+        !(effect.page().texture.is_white() && views.iter().any(is_coloured))
     }
 
     /// An effect in every block in which it gains more than it costs there, or alike in all sensors of a kind.
