@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use crate::motion::Motion;
+use crate::kinematics::Motion;
 use crate::truth::{Truth, TruthSource};
 
 /// [rad/s] rate of the Earth: IERS' nominal mean angular velocity, 15.041069 deg/h.

@@ -5,6 +5,7 @@ pub mod environment;
 pub mod geometry;
 pub mod host;
 pub mod keys;
+pub mod kinematics;
 pub mod motion;
 pub mod part;
 pub mod plant;

@@ -3,10 +3,8 @@
 //! One motion a file. A motion knows nothing of gravity, Earth rate or field; [`World`] adds those. Analytic motions are
 //! built of [`Profile`]s and [`Attitude`] turns and so have exact derivatives. [`LIST`] names them for the command line.
 
-mod attitude;
 #[cfg(test)]
 mod check;
-mod profile;
 mod rate_table;
 mod recorded;
 mod rotation_test;
@@ -22,8 +20,6 @@ use std::sync::Arc;
 use emems::estimate::{Launch, Site};
 use nalgebra::Vector3;
 
-pub use attitude::Attitude;
-pub use profile::{Jet, Profile};
 pub use rate_table::{Axis, Plateau, Position, RateTable, TABLE_4_1};
 pub use recorded::Recorded;
 pub use rotation_test::RotationTest;
@@ -33,48 +29,8 @@ pub use still::Still;
 pub use tumble::Tumble;
 
 use crate::environment::{Environment, World};
+pub use crate::kinematics::{Attitude, Jet, Motion, Pose, Profile};
 use crate::truth::TruthSource;
-
-/// Where the unit is in its motion at one instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
-    /// Attitude with its derivatives.
-    pub attitude: Attitude,
-    /// [m/s2] acceleration of the unit's centre relative to n, in n.
-    pub acc_n: Vector3<f64>,
-    /// [degC] temperature of the unit, where the motion knows it.
-    pub temperature_c: Option<f64>,
-    /// Lift-off line, `true` = asserted.
-    pub lift_off: bool,
-    /// Micro-gravity line, `true` = asserted.
-    pub micro_g: bool,
-}
-
-impl Pose {
-    /// Turning about a centre that does not move, with both lines idle.
-    pub fn turning(attitude: Attitude) -> Self {
-        Self {
-            attitude,
-            acc_n: Vector3::zeros(),
-            temperature_c: None,
-            lift_off: false,
-            micro_g: false,
-        }
-    }
-}
-
-/// A motion of the unit.
-pub trait Motion: Send + Sync {
-    /// Pose at `t_s` seconds after power-on. Defined for every time: before the start it is the start, after the end the
-    /// end.
-    fn at(&self, t_s: f64) -> Pose;
-    /// [s] when it ends; `None` for a motion without an end.
-    fn duration_s(&self) -> Option<f64>;
-    /// [m] place of the unit's centre in n, from wherever the motion counts; zero where it does not tell.
-    fn position_n(&self, _t_s: f64) -> Vector3<f64> {
-        Vector3::zeros()
-    }
-}
 
 impl Motion for Arc<dyn Motion> {
     fn at(&self, t_s: f64) -> Pose {

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use super::profile::Profile;
+use super::Profile;
 use super::{Attitude, Motion, Pose};
 
 /// An axis of the table.

@@ -4,7 +4,7 @@
 //! in [`Turn::in_b`]; from there on they are yaw, pitch and roll, each about the axis as turned so far. The thesis gives
 //! angles, not times: two seconds a turn and five seconds of rest between turns are ours.
 
-use super::profile::Profile;
+use super::Profile;
 use super::{Attitude, Motion, Pose};
 
 /// An axis of the thesis' frame e.

@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::profile::Profile;
+use super::Profile;
 use super::{Attitude, Motion, Pose};
 
 /// [m/s2] the unit of the specific-force schedules below.

@@ -6,8 +6,8 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use super::profile::{Jet, Profile};
 use super::{Attitude, Motion, Pose};
+use super::{Jet, Profile};
 
 /// [s] at rest before it begins.
 const REST_S: f64 = 10.0;
