@@ -1,5 +1,6 @@
 //! The twin: physical truth, the parts at register level, and the host board on which the unit runs in virtual time.
 
+pub mod channel;
 pub mod effect;
 pub mod environment;
 pub mod geometry;

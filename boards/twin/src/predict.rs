@@ -8,7 +8,6 @@
 //! Channel `k` is read at `cycle start + slot_s`. All of it is a pure function of its arguments; nothing is random here.
 
 mod calibration;
-mod chain;
 mod emems;
 mod grid;
 mod heading;
@@ -16,19 +15,17 @@ mod input;
 mod scene;
 #[cfg(test)]
 mod tests;
-mod unit;
 
 use std::borrow::Cow;
 
 pub use calibration::{Accuracy, Column};
-pub use chain::Chain;
 pub use emems::{emems, thesis_slot_s};
 pub use grid::{Grid, LowPass};
 pub use input::Memory;
 use input::{Filters, Look};
-pub use scene::{Aim, Feel, Filter, Scene};
-pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};
+pub use scene::{Filter, Scene};
 
+pub use crate::channel::{Aim, Chain, Channel, Feel, Kind, KnownEffect, UnitDescription, UnitError};
 use crate::effect::{Active, Cause, Nature, Parameter, Site, UnknownEffect};
 use crate::environment::Environment;
 

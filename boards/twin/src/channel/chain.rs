@@ -8,7 +8,7 @@
 //! A chain begins as the nominal channel; effects change it in place, and several may change one chain. All stages are
 //! exact and smooth in what the effects put in.
 
-use super::scene::{Aim, Feel};
+use super::feel::{Aim, Feel};
 use super::unit::Channel;
 
 /// [s] later as a function of the nominal instant [s].
@@ -83,27 +83,27 @@ impl<'a> Chain<'a> {
     }
 
     /// [s] the physical instant of what is logged at `t_s`.
-    pub(super) fn instant(&self, t_s: f64) -> f64 {
+    pub(crate) fn instant(&self, t_s: f64) -> f64 {
         t_s + self.delays.iter().map(|delay| delay(t_s)).sum::<f64>()
     }
 
     /// Whether it is read at other instants than the nominal ones.
-    pub(super) fn is_delayed(&self) -> bool {
+    pub(crate) fn is_delayed(&self) -> bool {
         !self.delays.is_empty()
     }
 
     /// Whether it looks at what the nominal channel looks at, when and through what that does.
-    pub(super) fn looks_as(&self, channel: &Channel) -> bool {
+    pub(crate) fn looks_as(&self, channel: &Channel) -> bool {
         self.aim == Aim::of(channel) && self.lag_s == 0.0 && self.high_pass_s.is_none() && !self.is_delayed()
     }
 
-    pub(super) fn is_additive(&self) -> bool {
+    pub(crate) fn is_additive(&self) -> bool {
         !self.terms.is_empty()
     }
 
     /// What is gross of a reading, through a low-pass of `tau_s`, given what is felt so long [s] before. The exponential's mean by
     /// two of its instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
-    pub(super) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
+    pub(crate) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
         let root = core::f64::consts::SQRT_2;
         let mean = |term: &Felt| {
             let at = |part: f64| term(&felt(part * tau_s));
@@ -113,15 +113,15 @@ impl<'a> Chain<'a> {
     }
 
     /// Time constants [s] and gains [physical unit per degC/s] of what follows the temperature.
-    pub(super) fn thermal(&self) -> &[(f64, f64)] {
+    pub(crate) fn thermal(&self) -> &[(f64, f64)] {
         &self.thermal
     }
 
-    pub(super) fn added(&self, feel: &Feel, input: f64) -> f64 {
+    pub(crate) fn added(&self, feel: &Feel, input: f64) -> f64 {
         self.terms.iter().map(|term| term(feel, input)).sum()
     }
 
-    pub(super) fn finish(&self, t_s: &[f64], readings: &mut [f64]) {
+    pub(crate) fn finish(&self, t_s: &[f64], readings: &mut [f64]) {
         for stage in &self.stages {
             stage(t_s, readings);
         }

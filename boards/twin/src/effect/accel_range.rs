@@ -2,7 +2,7 @@
 //! much or as little, or it clips early.
 
 use super::{Effect, Nature, Page, Scope, Site};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `accel-range`.
 pub struct AccelRange;

@@ -1,7 +1,7 @@
 //! Axis order: the magnetometer's registers come as X, Z, Y, and its gain has eight settings; either is easily mistaken.
 
 use super::{CorrectedAs, Effect, Nature, Page, Scope, Site};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `mag-axis-order`.
 pub struct AxisOrder;

@@ -1,7 +1,7 @@
 //! Zero shift since the calibration: the sensor reads `b` where there is nothing to read.
 
 use super::{CorrectedAs, Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
 pub struct Bias(pub &'static Page);

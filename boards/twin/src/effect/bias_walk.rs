@@ -7,7 +7,7 @@ use core::f64::consts::PI;
 
 use super::spread::View;
 use super::{Effect, Likelihood, Nature, Page, Symbol, Texture};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// Terms looked at.

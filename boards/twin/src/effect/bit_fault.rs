@@ -2,7 +2,7 @@
 
 use super::spread::{Beneath, IMPOSSIBLE, View, mixed, unusual_part};
 use super::{Effect, Nature, Page};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// The variant of exchanged bytes: one after bit 11, the highest a 12-bit code has apart from its sign.

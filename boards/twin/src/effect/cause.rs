@@ -8,7 +8,7 @@ use core::fmt;
 use thiserror::Error;
 
 use super::{Effect, Page, Scope, Site, by_name};
-use crate::predict::{Chain, KnownEffect, UnitDescription};
+use crate::channel::{Chain, KnownEffect, UnitDescription};
 
 /// Where an effect is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,7 +1,7 @@
 //! Clock rate: the unit's seconds are not the reference's.
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `clock-rate`.
 pub struct ClockRate;

@@ -2,7 +2,7 @@
 
 use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// `coarse-quantisation`.

@@ -4,7 +4,7 @@
 //! is the next one of the chip.
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// [uT] the field that holds the film: 8 G.
 const HOLDING_UT: f64 = 800.0;

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::{Effect, Page, Scope, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 const WITH_RATE: f64 = -1.0;
 const WHILE_TURNING: f64 = -2.0;

@@ -1,7 +1,7 @@
 //! Earth rate: the gyros feel the Earth turn. The twin knows it; a gap of this shape says the latitude or the north is wrong.
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `earth-rate`.
 pub struct EarthRate;

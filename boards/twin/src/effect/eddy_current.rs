@@ -5,7 +5,7 @@
 //! with `w`, which only fast turning shows.
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `eddy-current`.
 pub struct EddyCurrent;

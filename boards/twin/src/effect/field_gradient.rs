@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `field-gradient`.
 pub struct FieldGradient;

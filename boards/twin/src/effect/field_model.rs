@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `field-model`.
 pub struct FieldModel;

@@ -1,7 +1,7 @@
 //! Quadratic g-sensitivity: a shift with the square of the acceleration, as vibration leaves it too.
 
 use super::{Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-g2`.
 pub struct G2Sensitivity;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-g-sensitivity`.
 pub struct GSensitivity;

@@ -1,7 +1,7 @@
 //! Lag: another first-order low-pass, or filter taps nobody counted.
 
 use super::{CorrectedAs, Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-lag`.
 pub struct GyroLag;

@@ -5,7 +5,7 @@
 //! the usual two-branch model of a cell, tens of seconds).
 
 use super::{Effect, Page, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The variant that is a ramp.
 const RAMP: f64 = -1.0;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `hard-iron`.
 pub struct HardIron;

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use super::{Effect, Nature, Page, Scope, Site};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `accel-high-pass`.
 pub struct HighPass;

@@ -3,7 +3,7 @@
 //! Friction is a play operator: a state that follows the input, clipped to one half-width on either side. A shock leaves a step.
 
 use super::{Effect, Page, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// [m/s2]
 const HALF_WIDTHS: [f64; 3] = [0.3, 1.5, 6.0];

@@ -1,7 +1,7 @@
 //! Latency: what is logged at `t` is what was there at `t - tau`.
 
 use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
 pub struct Latency(pub &'static Page);

@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// [Hz] how far the mains and the clock of the unit are off together.
 const SPREAD_HZ: f64 = 0.03;

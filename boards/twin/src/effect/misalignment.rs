@@ -1,7 +1,7 @@
 //! Misalignment: the sensitive axis does not point where the description has it.
 
 use super::{CorrectedAs, Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
 pub struct Misalignment(pub &'static Page);

@@ -86,7 +86,7 @@ pub use page::{CorrectedAs, Nature, Needs, Page, Scope, Symbol, Texture};
 pub use site::Site;
 pub use spread::{Beneath, View, logged_step, most_likely, sigma_of};
 
-use crate::predict::{Chain, Feel, UnitDescription};
+use crate::channel::{Chain, Feel, UnitDescription};
 use crate::environment::Environment;
 use crate::part::signal::Noise;
 

@@ -1,7 +1,7 @@
 //! Nonlinearity of the answer: what is left when the best straight line is taken away.
 
 use super::{Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-nonlinearity`.
 pub struct GyroNonlinearity;

@@ -2,7 +2,7 @@
 
 use super::spread::{Beneath, View, mixture, unusual_part};
 use super::{Effect, Nature, Page, Symbol, Texture};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// `packet-corruption`.

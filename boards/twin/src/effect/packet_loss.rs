@@ -4,7 +4,7 @@
 //! packet makes it a multiple of the cycle.
 
 use super::{Effect, Needs, Page, Scope, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `packet-loss`.
 pub struct PacketLoss;

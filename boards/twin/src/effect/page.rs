@@ -1,6 +1,6 @@
 //! What is written about an effect: its name, its physics, its parameters, what it is mistaken for.
 
-use crate::predict::Kind;
+use crate::channel::Kind;
 
 /// How an effect is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

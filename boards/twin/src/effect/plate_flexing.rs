@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Aim, Chain, Kind};
+use crate::channel::{Aim, Chain, Kind};
 
 /// The variant of a load that is the force; its unit of compliance is then rad per m/s2.
 const OF_FORCE: f64 = 1.0;

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `plate-rotation`.
 pub struct PlateRotation;

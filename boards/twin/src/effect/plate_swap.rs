@@ -1,7 +1,7 @@
 //! Swapped plates: two plates, or the same part of two plates, are wired to each other's place.
 
 use super::{CorrectedAs, Effect, Nature, Page, Scope, Site};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `plate-swap`.
 pub struct PlateSwap;

@@ -1,7 +1,7 @@
 //! Read skew: the sensors are read one after the other, further apart or closer than the description has it.
 
 use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `read-skew`.
 pub struct ReadSkew;

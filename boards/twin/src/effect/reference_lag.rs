@@ -1,7 +1,7 @@
 //! Reference lag: the truth instrument's record is late, so that the unit seems early.
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `reference-lag`.
 pub struct ReferenceLag;

@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::reference_sign::MOST_ROWS;
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Feel, Kind};
+use crate::channel::{Chain, Feel, Kind};
 
 /// `reference-rate-scale`.
 pub struct ReferenceRateScale;

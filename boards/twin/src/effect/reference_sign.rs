@@ -8,7 +8,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Effect, Nature, Page, Scope, Site};
-use crate::predict::{Chain, Feel, Kind};
+use crate::channel::{Chain, Feel, Kind};
 use crate::environment::Environment;
 
 /// `reference-sign`.

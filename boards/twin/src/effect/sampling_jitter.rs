@@ -4,7 +4,7 @@
 
 use super::spread::{Beneath, View};
 use super::{Effect, Likelihood, Nature, Page, Scope, Symbol, Texture};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// [physical unit/s] of the prediction at each sample. Central differences: at a few samples a second they are short of the

@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use super::{Effect, Nature, Page, Site};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-saturation`.
 pub struct Saturation;

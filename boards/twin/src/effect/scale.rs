@@ -1,7 +1,7 @@
 //! Scale error: the sensor answers `1 + s` for one.
 
 use super::{CorrectedAs, Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
 pub struct Scale(pub &'static Page);

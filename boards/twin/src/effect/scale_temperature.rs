@@ -4,7 +4,7 @@ use super::{
     CorrectedAs, Effect, Page, Site, Symbol,
     bend::{self, bent},
 };
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The effects of this file, told apart by their pages.
 pub struct ScaleTemperature(pub &'static Page);

@@ -1,7 +1,7 @@
 //! Set and reset: from an event on, the film is magnetised the other way or only in part.
 
 use super::{Effect, Page, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `mag-set-reset`.
 pub struct SetReset;

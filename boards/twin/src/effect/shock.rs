@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::spread::{Beneath, View, mixed, mixture, unusual_part};
 use super::{Effect, Likelihood, Nature, Page, Scope, Symbol, Texture};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// `shock`.

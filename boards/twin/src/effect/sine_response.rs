@@ -3,7 +3,7 @@
 //! `sin(B u)/B` is smooth in `kappa = B^2`, which is the parameter, at zero and (as a hyperbolic sine) below it.
 
 use super::{Effect, Needs, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// sin(B u)/B for kappa = B^2. Near zero the quotient is its series, where sine and root lose digits.
 fn sine(kappa: f64, u: f64) -> f64 {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use crate::predict::{Channel, Kind, UnitDescription};
+use crate::channel::{Channel, Kind, UnitDescription};
 use crate::environment::Environment;
 
 /// A channel among the others, at a place on Earth, in a log.

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::{CorrectedAs, Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `soft-iron`.
 pub struct SoftIron;

@@ -6,7 +6,7 @@
 //! sigma, so that probabilities, of a value repeated to the last digit above all, are finite.
 
 use super::Effect;
-use crate::predict::Channel;
+use crate::channel::Channel;
 
 /// One channel's log against its prediction.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use super::spread::{Beneath, View, mixture, unusual_part};
 use super::{Effect, Likelihood, Nature, Page, Symbol};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// `stale-sample`.

@@ -2,7 +2,7 @@
 
 use super::spread::{Beneath, IMPOSSIBLE, View};
 use super::{Effect, Nature, Page, onsets};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// `stuck-channel`.

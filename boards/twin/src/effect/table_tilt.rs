@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{Effect, Page, Scope, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `table-tilt`.
 pub struct TableTilt;

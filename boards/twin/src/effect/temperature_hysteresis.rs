@@ -5,7 +5,7 @@
 //! temperature has this width.
 
 use super::{Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-temperature-hysteresis`.
 pub struct TemperatureHysteresis;

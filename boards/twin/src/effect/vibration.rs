@@ -12,7 +12,7 @@ use core::f64::consts::{PI, TAU};
 use super::line::{BLOCKS, Block, first_bin, mean_of, spectra, summed};
 use super::spread::{View, mixed};
 use super::{Effect, Likelihood, Nature, Page, Symbol, Texture};
-use crate::predict::Kind;
+use crate::channel::Kind;
 use crate::part::signal::Noise;
 
 /// Steps a bin in which the frequency is sought: between two of them a line loses a hundredth of its power.

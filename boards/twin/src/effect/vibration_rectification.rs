@@ -4,7 +4,7 @@
 //! an instant.
 
 use super::{Effect, Page, Site, Symbol, onsets};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// The variant that goes with the square of the rate.
 const TURNING: f64 = -1.0;

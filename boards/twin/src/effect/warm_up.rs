@@ -1,7 +1,7 @@
 //! Warm-up: after switching on, the zero settles exponentially.
 
 use super::{Effect, Page, Site, Symbol};
-use crate::predict::{Chain, Kind};
+use crate::channel::{Chain, Kind};
 
 /// `gyro-warm-up`.
 pub struct WarmUp;

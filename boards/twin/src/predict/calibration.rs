@@ -11,8 +11,8 @@ use core::f64::consts::{PI, SQRT_2};
 use nalgebra::Vector3;
 
 use super::input::{Filters, Look};
-use super::unit::{Channel, Kind};
 use super::{Aim, Twin};
+use crate::channel::{Channel, Kind};
 
 /// Terms of the drift.
 const DRIFT_TERMS: usize = 8;

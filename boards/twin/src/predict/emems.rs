@@ -8,7 +8,7 @@ use core::f64::consts::PI;
 use emems::sample::{Kind as Part, SENSORS};
 use nalgebra::Vector3;
 
-use super::unit::{Channel, Kind, UnitDescription};
+use crate::channel::{Channel, Kind, UnitDescription};
 use crate::geometry;
 
 /// [s] between two reads: 118.8 ms over sixteen.

@@ -60,7 +60,7 @@ fn same(name: &str, locality: Locality, variant: f64, theta: &[f64], changed: &T
     assert!(apart < SAME * whole && whole > 0.1, "{name}: {apart} of {whole}");
 }
 
-pub(super) fn changed_unit(change: impl Fn(usize, &mut crate::predict::Channel)) -> Twin {
+pub(super) fn changed_unit(change: impl Fn(usize, &mut crate::channel::Channel)) -> Twin {
     let mut unit = emems(thesis_slot_s);
     unit.channels
         .iter_mut()

@@ -235,7 +235,7 @@ fn what_shakes_several_sensors_is_as_strong_as_it_is_wherever_its_frequency_lies
     let t_s: Vec<Vec<f64>> = (0..predicted.len()).map(|channel| twin.instants_s(channel)).collect();
     let effect = by_name("vibration").unwrap();
     let shaken: Vec<usize> = (0..predicted.len())
-        .filter(|channel| twin.unit().channels[*channel].sensor == crate::predict::Kind::Accelerometer)
+        .filter(|channel| twin.unit().channels[*channel].sensor == crate::channel::Kind::Accelerometer)
         .collect();
     let quiet = noisy(&twin, &predicted, 5);
     let step_s = twin.starts_s()[1] - twin.starts_s()[0];

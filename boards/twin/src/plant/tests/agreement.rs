@@ -3,10 +3,11 @@
 //! The parts convert by their own clocks, and a read finds the last conversion; the prediction is asked for that instant.
 
 use super::*;
+use crate::channel::UnitDescription;
 use crate::environment::{Environment, World};
 use crate::motion::{Motion, RateTable, RotationTest, SoundingRocket, Still, Tumble};
 use crate::part::signal::ConversionClock;
-use crate::predict::{Scene, Twin, UnitDescription, emems};
+use crate::predict::{Scene, Twin, emems};
 
 /// [counts] half a count of rounding, and the parts' own low-pass: it takes its input as straight between conversions, which is
 /// off by h^2 u''/12, 0.03 counts where the rocket spins at three turns a second.
