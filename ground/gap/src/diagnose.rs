@@ -28,6 +28,7 @@ use crate::{
     probability::{
         cause::{Cause, share_out},
         doubt::{Promised, UNKNOWN_ALONE},
+        outcome::{Outcome, is_unexplained},
         posterior::Believed,
     },
     search::{
@@ -60,6 +61,8 @@ pub struct Diagnosis {
     pub indistinguishable: Vec<Vec<&'static str>>,
     /// Probability that something outside the library is needed.
     pub none_of_these: f64,
+    /// What it all comes to.
+    pub outcome: Outcome,
     /// What the causes leave.
     pub leftover: Leftover,
     /// Where the gap is.
@@ -97,10 +100,15 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether something outside the library is likelier needed than not, whatever is named.
+    pub fn is_unexplained(&self) -> bool {
+        is_unexplained(self.none_of_these)
+    }
+
     /// The next experiment, in words.
     pub fn advice(&self, subject: &Subject) -> String {
         let confirm = self.causes.first().map(|cause| cause.confirm_by);
-        advice(subject, self.rivals.as_ref(), confirm, self.none_of_these > 0.5)
+        advice(subject, self.rivals.as_ref(), confirm, self.outcome == Outcome::Unknown)
     }
 }
 
@@ -234,6 +242,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             explanation.signal_to_noise(&quiet),
         )
     });
+    let outcome = Outcome::of(causes.len(), none_of_these, &gate);
     Diagnosis {
         place,
         ceiling_percent: ceiling,
@@ -246,6 +255,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         gate,
         alternatives,
         indistinguishable: confusion::sets(&library, found),
+        outcome,
         none_of_these,
         leftover: left,
         shrink,

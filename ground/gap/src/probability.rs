@@ -1,10 +1,12 @@
 //! Step 7, how sure: from the odds of the evidence to the probability of a name.
 //!
 //! In: an explanation, what it leaves, and what the held-out windows say. Out: [`posterior::Believed`]: [`cause`]s with their
-//! [`contribution`]s and the [`regime`] in which they show, each believed less where something speaks against it ([`doubt`]).
+//! [`contribution`]s and the [`regime`] in which they show, each believed less where something speaks against it ([`doubt`]),
+//! and what it all comes to ([`outcome`]).
 
 pub mod cause;
 pub mod contribution;
 pub mod doubt;
+pub mod outcome;
 pub mod posterior;
 pub mod regime;

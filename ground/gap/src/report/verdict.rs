@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, report::terminal};
+use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::terminal};
 
 /// Share of the excess that the channels named for an unexplained residual hold together.
 const MOST_OF_IT: f64 = 0.8;
@@ -87,7 +87,7 @@ impl Verdict {
                 when: cause.when.clone(),
             })
             .collect();
-        if places.is_empty() && diagnosis.none_of_these > 0.5 {
+        if diagnosis.outcome == Outcome::Unknown {
             places.extend(unexplained(diagnosis));
         }
         Verdict {

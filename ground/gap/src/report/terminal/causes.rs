@@ -2,21 +2,20 @@
 
 use std::fmt::Write;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, probability::doubt::UNKNOWN_ALONE, search::explanation::SAID};
+use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, search::explanation::SAID};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
 
 /// Writes what is said of causes.
 pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
-    if diagnosis.causes.is_empty() {
-        let said = if diagnosis.none_of_these > 0.5 {
-            "NONE OF THESE: nothing in the library explains what is there"
-        } else if diagnosis.gate.unknown(UNKNOWN_ALONE) > 0.5 {
-            "UNDECIDED: there is a gap, but no cause of it is likelier than not"
-        } else {
-            "NO EFFECT beyond calibration and noise"
-        };
+    let said = match diagnosis.outcome {
+        Outcome::Named => None,
+        Outcome::Unknown => Some("NONE OF THESE: nothing in the library explains what is there"),
+        Outcome::Undecided => Some("UNDECIDED: there is a gap, but no cause of it is likelier than not"),
+        Outcome::Clean => Some("NO EFFECT beyond calibration and noise"),
+    };
+    if let Some(said) = said {
         writeln!(text, "CAUSE   {said}")?;
     }
     for cause in &diagnosis.causes {
@@ -96,11 +95,11 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
         .aspects
         .iter()
         .take(3)
-        .filter(|_| diagnosis.none_of_these > 0.5)
+        .filter(|_| diagnosis.is_unexplained())
     {
         writeln!(text, "        left: {} ({:.1} sigma)", aspect.what, aspect.size)?;
     }
-    if let Some(p) = diagnosis.leftover.again.filter(|_| diagnosis.none_of_these > 0.5) {
+    if let Some(p) = diagnosis.leftover.again.filter(|_| diagnosis.is_unexplained()) {
         writeln!(
             text,
             "        the first of them is as large on the held-out windows as it is by chance with probability {p:.3}"
