@@ -27,15 +27,12 @@ use crate::{
     },
     probability::{
         cause::{Cause, share_out},
-        doubt::{Promised, UNKNOWN_ALONE},
+        doubt::Promised,
         outcome::{Outcome, is_unexplained},
         posterior::Believed,
     },
-    search::{
-        explanation::{Explanation, SAID},
-        odds::alone,
-        readings::attribute,
-    },
+    search::{explanation::Explanation, odds::alone, readings::attribute},
+    thresholds::{DOUBTFUL, SAID, UNKNOWN_ALONE},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
@@ -43,9 +40,6 @@ use crate::{
         views,
     },
 };
-
-/// Probability of as large a leftover by chance from which on nothing speaks for one, wherever else it is.
-const DOUBTFUL: f64 = 0.36;
 
 /// What a case says.
 pub struct Diagnosis {

@@ -35,6 +35,7 @@ pub mod null;
 pub mod probability;
 pub mod report;
 pub mod search;
+pub mod thresholds;
 pub mod unknown;
 
 pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

@@ -8,9 +8,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The ten rooms in the order of the steps, around the last the conductor, what is kept and held against another case, and the
-/// shell.
-const ORDER: [&str; 14] = [
+/// The thresholds, the ten rooms in the order of the steps, around the last the conductor, what is kept and held against another
+/// case, and the shell.
+const ORDER: [&str; 15] = [
+    "thresholds",
     "input",
     "null",
     "library",

@@ -8,16 +8,8 @@
 use crate::{
     library::hypotheses::Library,
     search::{odds::by_effect, readings::Attribution},
+    thresholds::{SEEN_SNR, SET_APART, SET_POSSIBLE},
 };
-
-/// [nats] below which two effects are not told apart: 6 % errors.
-const APART: f64 = 5.0;
-
-/// Probability above which a rival belongs to the set.
-const POSSIBLE: f64 = 0.05;
-
-/// Marginal signal-to-noise ratio that counts as seen.
-pub const SEEN_SNR: f64 = 5.0;
 
 /// How small an effect this log would show.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,8 +48,10 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
         let mut set = vec![own];
         for rival in chosen.rivals.iter().map(|rival| rival.hypothesis) {
             let name = library.hypotheses[rival].effect();
-            let is_likely = likely.iter().any(|(known, share)| *known == name && *share > POSSIBLE);
-            let is_near = nats_apart(library, chosen, rival).is_some_and(|nats| nats < APART);
+            let is_likely = likely
+                .iter()
+                .any(|(known, share)| *known == name && *share > SET_POSSIBLE);
+            let is_near = nats_apart(library, chosen, rival).is_some_and(|nats| nats < SET_APART);
             if !set.contains(&name) && (is_likely || is_near) {
                 set.push(name);
             }

@@ -18,6 +18,7 @@ use crate::{
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
     library::products::Products,
     null::problem::Problem,
+    thresholds::TOLD_APART,
 };
 
 /// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
@@ -25,9 +26,6 @@ const LONGEST_S: f64 = 600.0;
 
 /// [s] step at which a motion is tabulated.
 const STEP_S: f64 = 0.01;
-
-/// [nats] at which two effects count as told apart: 1 % errors.
-const ENOUGH: f64 = 11.0;
 
 /// A motion that can be ordered.
 struct Experiment {
@@ -71,7 +69,7 @@ pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, i
     };
     let names = (pair.own.0.effect.page().name, pair.rival.effect.page().name);
     let before = error(pair.nats);
-    if pair.nats > ENOUGH {
+    if pair.nats > TOLD_APART {
         return format!(
             "{} and {} are apart already ({:.1e} errors). To be sure: {}",
             names.0,

@@ -20,16 +20,11 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
+    thresholds::{CROSS_VALIDATED, EVENT},
 };
 
 /// Blocks, each left out in turn.
 const BLOCKS: usize = 10;
-
-/// Share of an effect's energy in one block from which it counts as an event.
-const EVENT: f64 = 0.5;
-
-/// [nats] by which blocks would be better predicted if the effect were there, below which they say nothing.
-const SAID: f64 = 3.0;
 
 /// What cross-validation says of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +76,7 @@ fn key_of(without: &[Vec<DVector<f64>>], with: &[Vec<DVector<f64>>]) -> Option<K
     let promised: f64 = blocks()
         .map(|block| sum(block, |without, with| (without - with).norm_squared()))
         .sum();
-    if promised < SAID {
+    if promised < CROSS_VALIDATED {
         return None;
     }
     let gains: Vec<f64> = blocks()

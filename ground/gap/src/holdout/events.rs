@@ -10,13 +10,13 @@
 use twin::effect::Effect;
 use twin::effect::{Active, Cause};
 
-use crate::null::{
-    model::Model,
-    problem::{Component, Problem},
+use crate::{
+    null::{
+        model::Model,
+        problem::{Component, Problem},
+    },
+    thresholds::MORE_EVENTS,
 };
-
-/// Probability of more events than are looked for.
-const MORE: f64 = 1e-4;
 
 /// What the fit learned of events that happen again.
 #[derive(Clone, Debug)]
@@ -83,11 +83,11 @@ impl Events {
     }
 }
 
-/// The number that a Poisson variable of this mean exceeds with a probability of no more than [`MORE`].
+/// The number that a Poisson variable of this mean exceeds with a probability of no more than [`MORE_EVENTS`].
 fn most(mean: f64) -> usize {
     let (mut term, mut count) = ((-mean).exp(), 0);
     let mut left = 1.0 - term;
-    while left > MORE {
+    while left > MORE_EVENTS {
         count += 1;
         term *= mean / count as f64;
         left -= term;

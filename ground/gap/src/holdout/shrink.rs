@@ -1,10 +1,6 @@
 //! How far a held-out gap shrinks, and what that says of an effect: what [`crate::input::hold::Held::judge`] gives.
 
-/// Part of the gap by which recalibration and an effect may differ and shrink it as much.
-const SAME: f64 = 0.01;
-
-/// Excess of a gap over its floor, in sigma, below which their quotient is noise over noise.
-pub(super) const SMALLEST: f64 = 0.01;
+use crate::thresholds::{SAME_SHRINK, SMALLEST_EXCESS};
 
 /// One channel's gap.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,7 +52,8 @@ impl Shrink {
     /// shrink it more; where both shrink it as much, it is the size of that calibration which speaks. An attribution that fails
     /// this is withdrawn, whatever its evidence.
     pub fn supports_the_effect(&self) -> bool {
-        self.interval_percent[0] > 0.0 && self.beyond_recalibration[1] >= -SAME * (self.before - self.floor).max(0.0)
+        self.interval_percent[0] > 0.0
+            && self.beyond_recalibration[1] >= -SAME_SHRINK * (self.before - self.floor).max(0.0)
     }
 }
 
@@ -65,7 +62,7 @@ impl Shrink {
 pub fn ceiling_percent([before, floor]: [f64; 2], parameters: usize, snr: f64) -> f64 {
     let lost = (parameters as f64 / (snr * snr)).min(1.0);
     let [excess, least] = [before * before - floor * floor, floor * floor];
-    if before - floor > SMALLEST && snr > 0.0 {
+    if before - floor > SMALLEST_EXCESS && snr > 0.0 {
         100.0 * (before - (least + excess * lost).sqrt()) / (before - floor)
     } else {
         0.0

@@ -11,6 +11,7 @@ use super::recurrences::Said;
 use crate::{
     holdout::{events::Events, fit_error::FitError},
     input::hold::Held,
+    thresholds::{STRENGTH_SHOWN, STRENGTH_TOLERATED},
     unknown::adequacy::odds,
 };
 
@@ -44,20 +45,13 @@ pub struct Promise {
     pub sigma: f64,
 }
 
-/// Difference from one that a true effect may show: the calibration that was fitted beside it is not exact on another
-/// motion, and a real law is only nearly the library's.
-const TOLERATED: f64 = 0.25;
-
-/// Standard deviation above which the held-out windows hardly show the effect, and say nothing.
-const SHOWN: f64 = 0.5;
-
 impl Promise {
     /// How far a true effect may be as far from one, 0 to 1: the odds that the probability of that leaves it.
     pub fn confidence(&self) -> f64 {
-        if self.sigma > SHOWN {
+        if self.sigma > STRENGTH_SHOWN {
             return 1.0;
         }
-        let away = ((self.factor - 1.0).abs() - TOLERATED).max(0.0);
+        let away = ((self.factor - 1.0).abs() - STRENGTH_TOLERATED).max(0.0);
         odds(
             erfc(away / self.sigma / core::f64::consts::SQRT_2)
                 .max(f64::MIN_POSITIVE)

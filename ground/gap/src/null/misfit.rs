@@ -7,12 +7,10 @@
 //! one is how a real log makes nonsense certain. The sum ends at the first lag that is not above twice the spread of
 //! white noise's `1 / sqrt n`, for beyond it there is only noise to add up.
 //!
-//! It never makes evidence stronger, and a channel within [`CALM`] of white is left alone.
+//! It never makes evidence stronger, and a channel within [`MISFIT_CALM`] of white is left alone.
 
+use crate::thresholds::MISFIT_CALM;
 use nalgebra::DVector;
-
-/// Factor of the variance up to which nothing is tempered: white noise of three thousand samples stays within it.
-const CALM: f64 = 1.2;
 
 /// Factor of the variance beyond which it does not count: such a channel says nothing anyway.
 const MOST: f64 = 1e6;
@@ -31,7 +29,7 @@ fn factor(rest: &[f64]) -> f64 {
         return 1.0;
     }
     let variance = energy / rest.len() as f64 * correlation_time(rest, energy);
-    if variance > CALM {
+    if variance > MISFIT_CALM {
         variance.min(MOST).sqrt()
     } else {
         1.0

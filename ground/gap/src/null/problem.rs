@@ -20,11 +20,8 @@ pub use self::frame::Frame;
 use crate::{
     input::{reference::Reference, windows::Fit},
     null::{calibration::calibration, interval::Interval, joint::Columns},
+    thresholds::{REFERENCE_CORRELATION_S, REFERENCE_LIMITED},
 };
-
-/// [s] over which the error of a reference, or of a field that is not uniform, stays alike: a hand moves half a metre
-/// in it.
-pub const REFERENCE_CORRELATION_S: f64 = 1.0;
 
 /// An effect in a model: what, how large, and for effects that come and go, when.
 #[derive(Clone, Debug)]
@@ -159,7 +156,7 @@ impl<'a> Problem<'a> {
         let own = self.twin.unit().channels[channel].sigma();
         let sigmas = &self.sigmas[channel];
         let mean = sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len().max(1) as f64;
-        mean > 2.0 * own * own
+        mean > REFERENCE_LIMITED * own * own
     }
 
     /// Residuals in units of noise as they are in standard deviations of a sample: what is alike over many samples counts for

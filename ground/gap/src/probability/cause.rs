@@ -11,21 +11,12 @@ use crate::{
     null::problem::Problem,
     probability::regime,
     search::{
-        odds::{TEMPERATURE, oversize, probability, probability_of_any},
+        odds::{oversize, probability, probability_of_any},
         readings::{Attribution, Chosen},
         scatter::Scatter,
     },
+    thresholds::{NAMED_ENERGY, NAMED_SHARE, SUSPICIOUS, TEMPERATURE},
 };
-
-/// Of its largest size, from where an engineer should look twice.
-const SUSPICIOUS: f64 = 0.25;
-
-/// Share of an effect's energy from which a channel is named.
-const NAMED_SHARE: f64 = 0.02;
-
-/// Energy, in squares of noise, from which it is named whatever its share: three sigma. A delay that is large in the gyros
-/// is in the magnetometers too.
-const NAMED_ENERGY: f64 = 9.0;
 
 /// One parameter of a cause.
 #[derive(Clone, Debug)]

@@ -16,30 +16,10 @@ use crate::{
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     probability::cause::Cause,
-    search::explanation::{Explanation, REMAINDER},
+    search::explanation::Explanation,
+    thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
     unknown::adequacy::Leftover,
 };
-
-/// Prior probability that a unit has something the library does not, beside what is named.
-const UNKNOWN_PRIOR: f64 = 0.05;
-
-/// The same where nothing is named though something is there. On the dealt cases (TRIALS.md) that had no name and were not
-/// plainly none of these, what was there was outside the library 47 times in 146: a prior of 0.05 says 19, this one 39.
-pub const UNKNOWN_ALONE: f64 = 0.15;
-
-/// [nats] at which a name is as likely wrong as right, and the step that multiplies the odds by e: what no effect of the
-/// library describes looks a little like one of them. The wrong names of the dealt cases (TRIALS.md) had 8 to 26 nats; an
-/// effect of marginal signal-to-noise ratio 8 has 32 before its prior odds.
-const DOUBTED: f64 = 10.0;
-const DOUBT_STEP: f64 = 3.0;
-
-/// Energy that is left over that explained at which a name is as likely wrong as right. An effect that differs a little
-/// from its law leaves a few parts in a hundred; another effect's law, which happens to be like it, leaves more.
-const UNLIKE: f64 = 0.05;
-
-/// How far an effect is believed that is on in no held-out sample: it does not shrink their gap, and is as likely a patch for
-/// something else. On dealt cases (TRIALS.md) two wrong names were such, and no right one.
-const UNTOLD: f64 = 0.5;
 
 /// What is left over, and how much that says against names.
 pub struct Belief {

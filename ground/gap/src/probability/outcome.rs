@@ -3,10 +3,10 @@
 //! In: how many causes are named, how likely it is that something outside the library is needed, and the judgement of
 //! "calibration and noise are enough". Out: an [`Outcome`].
 
-use crate::{probability::doubt::UNKNOWN_ALONE, unknown::adequacy::Leftover};
-
-/// Probability from which something is said: it is then likelier than not.
-const LIKELIER: f64 = 0.5;
+use crate::{
+    thresholds::{SAID, UNKNOWN_ALONE},
+    unknown::adequacy::Leftover,
+};
 
 /// What a diagnosis comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ impl Outcome {
             Outcome::Named
         } else if is_unexplained(none_of_these) {
             Outcome::Unknown
-        } else if gate.unknown(UNKNOWN_ALONE) > LIKELIER {
+        } else if gate.unknown(UNKNOWN_ALONE) > SAID {
             Outcome::Undecided
         } else {
             Outcome::Clean
@@ -39,7 +39,7 @@ impl Outcome {
 
 /// Whether something outside the library is likelier needed than not, whatever is named.
 pub fn is_unexplained(none_of_these: f64) -> bool {
-    none_of_these > LIKELIER
+    none_of_these > SAID
 }
 
 #[cfg(test)]

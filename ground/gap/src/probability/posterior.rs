@@ -13,10 +13,8 @@ use crate::{
         contribution,
         doubt::{Belief, Promised, promises, second_keys},
     },
-    search::{
-        explanation::{Explanation, SAID},
-        odds::alternatives,
-    },
+    search::{explanation::Explanation, odds::alternatives},
+    thresholds::SAID,
     unknown::adequacy::Leftover,
 };
 

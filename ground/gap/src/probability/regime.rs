@@ -3,13 +3,8 @@
 //! In: for each row what the unit does, and the energy of the gap there. Out: a sentence such as "|rate about y| above
 //! 62 deg/s: 81 % of the energy in 30 % of the time", or "throughout".
 
+use crate::thresholds::{REGIME_ENERGY, REGIME_TIME};
 use twin::predict::Feel;
-
-/// Share of the time that counts as a regime.
-const TIME_SHARE: f64 = 0.3;
-
-/// Share of the energy it must hold: evenly spread energy would have [`TIME_SHARE`].
-const ENERGY_SHARE: f64 = 0.6;
 
 /// A quantity of the motion: name, unit, value.
 type Quantity = (&'static str, &'static str, fn(&Feel) -> f64);
@@ -31,11 +26,11 @@ const QUANTITIES: [Quantity; 9] = [
 /// In words, when the energy is there.
 pub fn when(feels: &[Feel], energy: &[f64]) -> String {
     let total: f64 = energy.iter().sum();
-    let wanted = (feels.len() as f64 * TIME_SHARE) as usize;
+    let wanted = (feels.len() as f64 * REGIME_TIME) as usize;
     if total <= 0.0 || wanted == 0 {
         return "throughout".to_owned();
     }
-    let mut best = (ENERGY_SHARE, "throughout".to_owned());
+    let mut best = (REGIME_ENERGY, "throughout".to_owned());
     for (name, unit, value) in QUANTITIES {
         let values: Vec<f64> = feels.iter().map(value).collect();
         let mut order: Vec<usize> = (0..values.len()).collect();
@@ -52,7 +47,7 @@ pub fn when(feels: &[Feel], energy: &[f64]) -> String {
                     "{name} {side} {:.3} {unit}: {:.0} % of the energy in {:.0} % of the time",
                     values[edge],
                     100.0 * share,
-                    100.0 * TIME_SHARE
+                    100.0 * REGIME_TIME
                 );
                 best = (share, words);
             }

@@ -11,13 +11,11 @@ pub use place::{places, when};
 pub use shrink::shrink;
 use wrap::wrapped;
 
-use crate::{diagnose::Diagnosis, input::case::Subject};
-
-/// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
-const REMAINS: f64 = 2.5;
-
-/// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
-const HELPED: f64 = 0.8;
+use crate::{
+    diagnose::Diagnosis,
+    input::case::Subject,
+    thresholds::{HELPED, REMAINS},
+};
 
 /// Detection limits that are printed.
 const LIMITS: usize = 4;

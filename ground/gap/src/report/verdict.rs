@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::terminal};
-
-/// Share of the excess that the channels named for an unexplained residual hold together.
-const MOST_OF_IT: f64 = 0.8;
+use crate::{
+    diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::terminal,
+    thresholds::MOST_OF_EXCESS,
+};
 
 /// The whole file.
 #[derive(Debug, Serialize)]
@@ -174,7 +174,7 @@ fn of_cause(subject: &Subject, cause: &crate::probability::cause::Cause) -> Caus
 fn unexplained(diagnosis: &Diagnosis) -> Option<Place> {
     let (mut channels, mut share) = (Vec::new(), 0.0);
     for (name, part) in &diagnosis.place.channels {
-        if share >= MOST_OF_IT || *part <= 0.0 {
+        if share >= MOST_OF_EXCESS || *part <= 0.0 {
             break;
         }
         channels.push(name.clone());

@@ -23,17 +23,12 @@ use crate::{
         problem::{Component, Frame, Problem},
     },
     search::scatter::Scatter,
+    thresholds::{WALK_FEWEST, WALK_OFF},
 };
 
 /// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods
 /// under 19 s.
 const TERMS: usize = 32;
-
-/// Samples from which a walk is told from anything else: the rows of a table are fewer, and no walk.
-pub const FEWEST: usize = 100;
-
-/// Sum of squares over the six octaves beyond which it is none: one walk in a thousand.
-const OFF: f64 = 22.5;
 
 /// Sizes tried, in prior sigmas, and the factor between them.
 const SIZES: (f64, f64) = (0.05, 200.0);
@@ -70,7 +65,7 @@ impl Walk {
         for channel in &gyros {
             let frame = &problem.frames[*channel];
             let samples = frame.series.rows.len();
-            if samples < FEWEST {
+            if samples < WALK_FEWEST {
                 continue;
             }
             let shapes = shapes(problem, *channel);
@@ -126,7 +121,7 @@ impl Walk {
             ((energy / count).cbrt() - (1.0 - spread)) / spread.sqrt()
         };
         let off: Vec<f64> = octaves.map(off).collect();
-        off.iter().map(|off| off * off).sum::<f64>() < OFF
+        off.iter().map(|off| off * off).sum::<f64>() < WALK_OFF
     }
 
     /// The problem's frames with it open.

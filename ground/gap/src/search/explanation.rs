@@ -18,27 +18,13 @@ use crate::{
         problem::{Frame, Problem},
     },
     search::{
-        bias_walk::{self, Walk},
+        bias_walk::Walk,
         odds::probability_of_any,
         readings::{Attribution, Chosen, attribute},
         scatter::{Scatter, scatters},
     },
+    thresholds::{COUNTED_PART, EFFECT_MARGIN, MOST_CAUSES, REMAINDER, SAID, WALK_FEWEST},
 };
-
-/// [nats] an effect on the scatter must gain.
-const SCATTER_MARGIN: f64 = 3.0;
-
-/// Probability from which an effect is named.
-pub const SAID: f64 = 0.5;
-
-/// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
-pub const REMAINDER: f64 = 0.005;
-
-/// Causes that are believed at once. More of them together are a patchwork for one effect the library does not have.
-const MOST_CAUSES: usize = 3;
-
-/// Part of the gain of all from which an effect counts among them.
-const LEAST_PART: f64 = 0.02;
 
 /// Searches beside a walk until it stays what it is.
 const WALKS: usize = 4;
@@ -82,7 +68,7 @@ impl Explanation {
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
         let beside = walked(problem, library, &first, withheld, progress)
-            .filter(|(walk, found, _)| walk.gain + gains(&found.chosen) > explained + SCATTER_MARGIN);
+            .filter(|(walk, found, _)| walk.gain + gains(&found.chosen) > explained + EFFECT_MARGIN);
         let is_alone = alone.is_some();
         let mut wanders = alone
             .as_ref()
@@ -226,7 +212,7 @@ fn gains(chosen: &[Chosen]) -> f64 {
 /// How many effects are chosen that count: packets lost at three instants are one, and what brings a fiftieth of all is what the
 /// laws of the others leave.
 fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
-    let least = LEAST_PART * gains(chosen);
+    let least = COUNTED_PART * gains(chosen);
     let names: std::collections::BTreeSet<&str> = chosen
         .iter()
         .filter(|chosen| chosen.gain >= least)
@@ -266,7 +252,7 @@ fn factors(rest: &[DVector<f64>], louder: &[f64], scatter: Option<&Scatter>) -> 
 
 fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
     let all = scatters(problem, model, withheld);
-    all.into_iter().next().filter(|scatter| scatter.gain > SCATTER_MARGIN)
+    all.into_iter().next().filter(|scatter| scatter.gain > EFFECT_MARGIN)
 }
 
 /// Whether an effect on the scatter, if it alone explains a log best, takes the place of what was found on readings: one that
@@ -275,13 +261,7 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
     let is_walk = scatter.effect.page().texture == Texture::Walk;
-    !scatter.beneath.is_empty()
-        || is_walk
-            && scatter
-                .channels
-                .iter()
-                .map(steps)
-                .all(|steps| steps >= bias_walk::FEWEST)
+    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= WALK_FEWEST)
 }
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.

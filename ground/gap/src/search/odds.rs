@@ -10,11 +10,8 @@ use crate::{
     library::hypotheses::Library,
     null::evidence::probabilities,
     search::readings::{Attribution, Chosen, Rival},
+    thresholds::{LISTED, TEMPERATURE},
 };
-
-/// Evidence is raised to one over this: see [`crate::null::evidence`]. A guess, not yet fitted:
-/// `TRIALS.md` says how far it holds.
-pub const TEMPERATURE: f64 = 2.0;
 
 /// Largest parameter over the size beyond which it more likely stands for something else.
 pub fn oversize(page: &Page, theta: &DVector<f64>, parameters: &[Parameter]) -> f64 {
@@ -90,7 +87,7 @@ pub fn alternatives(library: &Library, found: &Attribution, refused: &[Chosen]) 
     });
     let mut sums: Vec<(&'static str, f64)> = Vec::new();
     for (name, share) in own.chain(rivals) {
-        if causes.contains(&name) || share < 0.005 {
+        if causes.contains(&name) || share < LISTED {
             continue;
         }
         match sums.iter_mut().find(|(known, _)| *known == name) {

@@ -13,19 +13,14 @@ use crate::{
     library::products::Entries,
     null::problem::Problem,
     search::interval_sums::{Piece, Touched},
+    thresholds::{LEAST_HALF, STRETCH_MARGIN},
 };
 
 /// Instants at which an effect may begin or end.
 const EDGES: usize = 41;
 
-/// Part of what a stretch explains that each half of it must.
-const LEAST_HALF: f64 = 0.1;
-
 /// Steps into which the distance to the next of them is parted, again and again, when the best two are known.
 const FINE: i32 = 8;
-
-/// [nats] a stretch must gain over always, beyond the price of having looked.
-const MARGIN: f64 = 10.0;
 
 /// The stretch of time in which the effect with these `slopes` is on, and the nats it gains over always, the price of having
 /// looked taken off; `None` for always. `rest` is the residual of every channel without it.
@@ -72,7 +67,7 @@ pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sig
     let last_s = coarse[EDGES - 1];
     let price = ((EDGES * (EDGES - 1) / 2) as f64).ln();
     let (gain, (on_s, off_s)) = best(&coarse, &|_, _| true)?;
-    if gain <= MARGIN + price || (on_s == from_s && off_s == last_s) {
+    if gain <= STRETCH_MARGIN + price || (on_s == from_s && off_s == last_s) {
         return None;
     }
     // Each edge nearer and nearer, down to a sample: one sample on the wrong side of a large step is an outlier.

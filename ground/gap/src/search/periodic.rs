@@ -16,6 +16,7 @@ use crate::{
         problem::Problem,
     },
     search::interval_sums::{Piece, Touched},
+    thresholds::{LEAST_THIRD, STRETCH_MARGIN},
 };
 
 /// Phases into which a period is folded.
@@ -30,12 +31,6 @@ const STEPS: f64 = 4.0;
 
 /// Times the period and the edges are sought nearer.
 const ROUNDS: usize = 6;
-
-/// Part of what it explains that each third of the time must.
-const LEAST_THIRD: f64 = 0.1;
-
-/// [nats] it must gain over always, beyond the price of having looked.
-const MARGIN: f64 = 10.0;
 
 /// The residuals of the channels that an effect touches.
 struct Folded<'a> {
@@ -104,7 +99,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
     });
     let gains = folded.gains(parts.collect())?;
     let is_there = gains.iter().all(|own| *own > LEAST_THIRD * gains.iter().sum::<f64>());
-    (gain > MARGIN + price && is_there).then_some((on, gain - price))
+    (gain > STRETCH_MARGIN + price && is_there).then_some((on, gain - price))
 }
 
 impl<'a> Folded<'a> {

@@ -5,7 +5,7 @@
 //!
 //! A screen of all hypotheses costs matrices only ([`crate::null::evidence`]); the best few are then fitted by Gauss-Newton,
 //! because a latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its
-//! evidence, after the price of its prior odds, is above nothing by [`MARGIN`] nats; each chosen one is then tried against
+//! evidence, after the price of its prior odds, is above nothing by [`EFFECT_MARGIN`] nats; each chosen one is then tried against
 //! all rivals in its place, and dropped if the rest can do without it. An effect that comes and goes is screened with the
 //! stretch of time in which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of
 //! another if it has to be on throughout.
@@ -31,16 +31,11 @@ use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
     search::gauss_newton::{Refined, model_of, refine},
+    thresholds::{EFFECT_MARGIN, MOST_EFFECTS},
 };
-
-/// [nats] an effect must bring beyond its prior odds: three make a wrong addition one in twenty.
-const MARGIN: f64 = 3.0;
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
 const DISCRETE_ROUNDS: usize = 2;
-
-/// Effects at once: beyond five no answer was ever right, and shares of the excess cost two to their number.
-const MOST_EFFECTS: usize = 5;
 
 /// What a log speaks for.
 #[derive(Clone, Debug)]
@@ -106,7 +101,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
             }
         }
         match found {
-            Some((gain, larger)) if gain > MARGIN => {
+            Some((gain, larger)) if gain > EFFECT_MARGIN => {
                 let span = larger.last().and_then(|added| stretches[*added]);
                 best = taken(problem, library, &larger, &best.thetas, span);
                 set = larger;

@@ -11,7 +11,10 @@
 use nalgebra::DVector;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
-use crate::null::joint::{Fitted, Joint};
+use crate::{
+    null::joint::{Fitted, Joint},
+    thresholds::ASPECT_SHOWN,
+};
 
 mod aspects;
 mod calibrations;
@@ -143,7 +146,7 @@ pub fn judge(
             channel: label.channel,
             size,
         })
-        .filter(|aspect| aspect.size > 3.0)
+        .filter(|aspect| aspect.size > ASPECT_SHOWN)
         .collect();
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));
     Leftover {

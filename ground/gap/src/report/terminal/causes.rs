@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, search::explanation::SAID};
+use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, thresholds::SAID};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;

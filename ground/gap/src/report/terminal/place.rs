@@ -6,6 +6,7 @@ use super::wrap::wrapped;
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
+    thresholds::NO_GAP,
     unknown::place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,
@@ -20,9 +21,6 @@ const CELLS: usize = 8;
 
 /// Share below which a part is not printed.
 const LEAST: f64 = 0.01;
-
-/// Gap of a case below which shares are of nothing: more than the chance of one in twenty.
-const NO_GAP: f64 = 0.05;
 
 /// Where the gap is: shares, cells, when, and at which stage of the pipeline.
 pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {

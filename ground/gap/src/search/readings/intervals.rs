@@ -20,11 +20,8 @@ use crate::{
         once,
         periodic::again,
     },
+    thresholds::PASSING_PART,
 };
-
-/// Part of what a set explains that an effect must bring to be seen coming and going beside it: what another effect's law
-/// leaves over is not the same at all times either.
-const PASSING_PART: f64 = 0.1;
 
 /// For each hypothesis that comes and goes the stretch of time in which it explains most of what a set leaves, if it is not
 /// always there; its gain is then that of the stretch. One with variants has its onset among them.

@@ -13,18 +13,8 @@ use super::{
 use crate::{
     null::{model::Model, problem::Problem},
     search::recalibrated::{as_described, recalibrated},
+    thresholds::{DRAGGED, REFERENCE_TAILS, SCATTER_NEAR},
 };
-
-/// [nats a sample] that the tails of a reference's errors gain over normal scatter: those of a Student law of five degrees of
-/// freedom, whose excess kurtosis of six is the largest that BROAD's recordings show, between blows. Its entropy is 1.3721 and
-/// a normal law's of the same variance 1.4189.
-const TAILS: f64 = 0.0468;
-
-/// Part of the best gain from which an effect may come out best with a calibration of its own.
-const NEAR: f64 = 0.2;
-
-/// [prior sigmas] from which a calibration may have been dragged to where it is.
-const DRAGGED: f64 = 4.0;
 
 /// Steps of expectation and maximisation, and what one must bring [nats].
 const STEPS: usize = 5;
@@ -57,7 +47,7 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
     }
     by_gain(&mut found);
     by_gain(&mut hidden);
-    let least = found.first().map_or(0.0, |best| NEAR * best.gain);
+    let least = found.first().map_or(0.0, |best| SCATTER_NEAR * best.gain);
     let mut names: Vec<&str> = Vec::new();
     let mut near: Vec<Scatter> = Vec::new();
     for scatter in found.iter().chain(&hidden) {
@@ -320,7 +310,7 @@ impl<'a> Search<'a> {
             let of_reference = block.iter().filter(|index| self.problem.is_limited(**index));
             let gain = found.gain
                 - block.iter().map(|index| self.own_clock[*index]).sum::<f64>()
-                - TAILS * of_reference.map(samples_of).sum::<usize>() as f64;
+                - REFERENCE_TAILS * of_reference.map(samples_of).sum::<usize>() as f64;
             let price = 0.5 * (samples.max(1) as f64).ln() * found.theta.len() as f64 + 1.0 + (of as f64).ln();
             if gain > price {
                 scatter.gain += gain - price;

@@ -2,13 +2,10 @@
 
 use twin::{effect::View, predict::Kind};
 
-use crate::null::calibration::instant_sigma_s;
-
-/// [standard deviations] by which energy, tails or neighbours of a residual must differ from the nominal for a second look.
-const ODD: f64 = 2.0;
-
-/// The same for those of several channels together: three are worth 4.5 nats, below any price.
-const ODD_TOGETHER: f64 = 3.0;
+use crate::{
+    null::calibration::instant_sigma_s,
+    thresholds::{COLOURED, ODD, ODD_TOGETHER},
+};
 
 /// [standard deviations] how far energy, tails and neighbours of a residual are from the nominal.
 pub type Oddness = [f64; 3];
@@ -40,10 +37,6 @@ pub fn oddness(view: &View) -> Oddness {
         alike * root,
     ]
 }
-
-/// Correlation of neighbouring residuals from which a channel's misfit is no white noise, whatever its size. Louder noise
-/// would otherwise swallow any effect the library does not have, and be believed.
-const COLOURED: f64 = 0.2;
 
 /// [robust standard deviations] to which residuals are cut before neighbours are compared: a blow rings for a few samples,
 /// and these must not make the rest of the log look alike.

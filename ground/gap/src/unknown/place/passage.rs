@@ -10,22 +10,17 @@
 
 use nalgebra::DVector;
 
-use crate::{input::windows::Span, null::problem::Problem};
+use crate::{
+    input::windows::Span,
+    null::problem::Problem,
+    thresholds::{MOST_OF_EXCESS, PASSAGE_MARGIN, PASSAGE_QUIET},
+};
 
 /// Stretches that the fit windows are cut into.
 const STRETCHES: usize = 60;
 
-/// [nats] a passage must gain over always: the logarithm of the pairs compared, and ten.
-const MARGIN: f64 = 7.5 + 10.0;
-
 /// [nats] half the 95 % quantile of chi-square with one degree.
 const PROFILE: f64 = 1.92;
-
-/// Share of the excess that the channels looked at must hold together.
-const HELD: f64 = 0.8;
-
-/// Of the mean inside a passage, what the mean outside it must stay below: less is a gap that varies.
-const QUIET: f64 = 0.5;
 
 /// When the gap is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +67,7 @@ pub fn find(problem: &Problem, rests: &[DVector<f64>], excess: &[f64]) -> Option
     let whole: f64 = order.iter().map(|channel| excess[*channel]).sum();
     let mut held = 0.0;
     order.retain(|channel| {
-        let is_needed = held < HELD * whole;
+        let is_needed = held < MOST_OF_EXCESS * whole;
         held += excess[*channel];
         is_needed
     });
@@ -135,7 +130,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
             if is_all || count <= 0.0 || outside_count <= 0.0 {
                 continue;
             }
-            let is_quiet_outside = outside_energy / outside_count < QUIET * energy / count;
+            let is_quiet_outside = outside_energy / outside_count < PASSAGE_QUIET * energy / count;
             if is_quiet_outside {
                 let gain = (fit(energy, count) + fit(outside_energy, outside_count) - always) / spread;
                 gains.push((from, to, gain));
@@ -143,7 +138,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
         }
     }
     let (from, to, most) = gains.iter().copied().max_by(|one, other| one.2.total_cmp(&other.2))?;
-    if most < MARGIN {
+    if most < PASSAGE_MARGIN {
         return None;
     }
     let near = || gains.iter().filter(|(_, _, gain)| *gain > most - PROFILE);

@@ -1,0 +1,366 @@
+//! Every threshold that decides what is said: with its unit, what a larger and a smaller one do, and where it comes from.
+//!
+//! Steps of an iteration, sizes of a simulation, seeds and widths of a page decide nothing and stand where they are used. A
+//! threshold that is fitted names the cases; one that is only assumed says so, and is the first to be questioned.
+
+/// Where a threshold comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Provenance {
+    /// It follows from something.
+    Derived(&'static str),
+    /// Any value near would do, and this one is usual.
+    Convention(&'static str),
+    /// It was read off cases.
+    Fitted(&'static str),
+    /// It was chosen, for this reason, and never checked against cases.
+    Assumed(&'static str),
+}
+
+/// A threshold as it is listed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Threshold {
+    /// Its name in the code.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The unit of that.
+    pub unit: &'static str,
+    /// What it decides.
+    pub what: &'static str,
+    /// What a larger one does.
+    pub larger: &'static str,
+    /// What a smaller one does.
+    pub smaller: &'static str,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+macro_rules! thresholds {
+    ($(#[doc = $what:literal] $name:ident: $kind:ty = $value:expr, in $unit:literal, larger: $larger:literal, smaller: $smaller:literal, $from:ident($why:literal);)*) => {
+        $(#[doc = $what] pub const $name: $kind = $value;)*
+
+        /// All of them, in the order of the steps.
+        #[allow(clippy::unnecessary_cast, reason = "counts and numbers stand in one list")]
+        pub const ALL: &[Threshold] = &[$(Threshold {
+            name: stringify!($name),
+            value: ($value) as f64,
+            unit: $unit,
+            what: $what,
+            larger: $larger,
+            smaller: $smaller,
+            provenance: Provenance::$from($why),
+        }),*];
+    };
+}
+
+thresholds! {
+    // Step 2, nothing wrong
+    /// Time over which the error of a reference, or of a field that is not uniform, stays alike.
+    REFERENCE_CORRELATION_S: f64 = 1.0, in "s",
+        larger: "samples weigh less; slow effects hide behind the reference",
+        smaller: "errors of the reference are taken for effects",
+        Assumed("a hand moves half a metre in it");
+    /// Mean variance of a sample, reference included, beyond which its scatter says nothing of the sensor.
+    REFERENCE_LIMITED: f64 = 2.0, in "variances of the sensor",
+        larger: "scatter that is the reference's is taken for an effect",
+        smaller: "effects on the scatter are not looked for",
+        Derived("the reference then errs more than the sensor scatters");
+    /// Factor of the variance up to which nothing is taken for misfit.
+    MISFIT_CALM: f64 = 1.2, in "variances",
+        larger: "a misfit makes everything significant",
+        smaller: "white noise is taken for a misfit",
+        Derived("white noise of three thousand samples stays within it");
+    // Step 4, search
+    /// Evidence that an effect must bring beyond its prior odds, on readings or on the scatter.
+    EFFECT_MARGIN: f64 = 3.0, in "nats",
+        larger: "weak effects are not found",
+        smaller: "wrong effects are added",
+        Derived("three nats make a wrong addition one in twenty");
+    /// Effects on readings at once.
+    MOST_EFFECTS: usize = 5, in "effects",
+        larger: "slower; patchworks for an unknown effect",
+        smaller: "true sets of many are cut",
+        Fitted("no answer with more was right on the dealt cases");
+    /// Probability from which an effect, or the unknown, is named.
+    SAID: f64 = 0.5, in "probability",
+        larger: "fewer names, fewer of them wrong",
+        smaller: "more names, more of them wrong",
+        Convention("likelier than not");
+    /// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
+    REMAINDER: f64 = 0.005, in "part of the strongest gain",
+        larger: "weak second effects are not named",
+        smaller: "remainders of a strong effect get names",
+        Assumed("a real law is the library's to half a percent of the energy");
+    /// Causes that are believed at once; more together are a patchwork for one effect the library does not have.
+    MOST_CAUSES: usize = 3, in "effects",
+        larger: "patchworks are believed",
+        smaller: "true sets of four are withdrawn",
+        Fitted("the dealt cases have at most two effects");
+    /// Gain from which an effect counts among the causes.
+    COUNTED_PART: f64 = 0.02, in "part of all gains",
+        larger: "small effects do not count towards a patchwork",
+        smaller: "remainders count towards one",
+        Assumed("what the laws of the others leave");
+    /// Evidence is raised to one over this before it becomes a probability ([`crate::null::evidence`]).
+    TEMPERATURE: f64 = 2.0, in "1",
+        larger: "probabilities nearer to even",
+        smaller: "over-confident probabilities",
+        Assumed("a guess; TRIALS.md says how far it holds");
+    /// Probability from which an alternative is listed.
+    LISTED: f64 = 0.005, in "probability",
+        larger: "shorter lists",
+        smaller: "longer lists",
+        Convention("printed with two decimals of a percent");
+    /// Evidence that a stretch of time, once or periodic, must gain over "always", beyond the price of having looked.
+    STRETCH_MARGIN: f64 = 10.0, in "nats",
+        larger: "effects that come and go are taken for steady ones",
+        smaller: "steady ones are cut to a stretch",
+        Assumed("as decisive as the margin of a name");
+    /// Part of what a stretch explains that each half of it must.
+    LEAST_HALF: f64 = 0.1, in "part",
+        larger: "short strong parts lose their stretch",
+        smaller: "one blow makes a stretch",
+        Assumed("an even effect has half");
+    /// Part of what a periodic effect explains that each third of the time must.
+    LEAST_THIRD: f64 = 0.1, in "part",
+        larger: "uneven ones are missed",
+        smaller: "one event is taken for a period",
+        Assumed("an even effect has a third");
+    /// Part of what a set explains that an effect must bring to be seen coming and going beside it.
+    PASSING_PART: f64 = 0.1, in "part",
+        larger: "fewer stretches beside other effects",
+        smaller: "what another law leaves over gets a stretch",
+        Assumed("what another effect's law leaves is not the same at all times either");
+    /// Sum of squares over six octaves beyond which a walk is none.
+    WALK_OFF: f64 = 22.5, in "sum of squares",
+        larger: "other slow effects are called a walk",
+        smaller: "walks are refused",
+        Derived("chi-square of six degrees at one in a thousand");
+    /// Samples from which a walk is told from anything else.
+    WALK_FEWEST: usize = 100, in "samples",
+        larger: "walks of short logs are missed",
+        smaller: "rows of a table are called a walk",
+        Convention("tables have fewer rows");
+    /// What the tails of a reference's errors gain over normal scatter.
+    REFERENCE_TAILS: f64 = 0.0468, in "nats a sample",
+        larger: "outliers of the unit are taken for the reference's",
+        smaller: "outliers of the reference get names",
+        Derived("entropy of a Student law of five degrees, the heaviest tails on BROAD's recordings between blows: 1.4189 - 1.3721");
+    /// Gain from which an effect on the scatter may come out best with a calibration of its own.
+    SCATTER_NEAR: f64 = 0.2, in "part of the best gain",
+        larger: "rivals are not tried",
+        smaller: "slower",
+        Assumed("a calibration of its own brought no more");
+    /// Strain from which a calibration may have been dragged to where it is.
+    DRAGGED: f64 = 4.0, in "prior sigmas",
+        larger: "a dragged calibration hides its effect",
+        smaller: "slower",
+        Derived("four sigmas by chance are one in sixteen thousand");
+    /// Difference of energy, tails or neighbours of a residual from the nominal for a second look.
+    ODD: f64 = 2.0, in "standard deviations",
+        larger: "weak effects on the scatter are not looked at",
+        smaller: "slower",
+        Derived("two are worth two nats, below any price");
+    /// The same for those of several channels together.
+    ODD_TOGETHER: f64 = 3.0, in "standard deviations",
+        larger: "weak common effects are not looked at",
+        smaller: "slower",
+        Derived("three are worth 4.5 nats, below any price");
+    /// Correlation of neighbouring residuals from which a misfit is no white noise.
+    COLOURED: f64 = 0.2, in "correlation",
+        larger: "louder noise swallows effects the library does not have",
+        smaller: "louder noise is refused where a little is left",
+        Assumed("a misfit that is plainly coloured");
+    // Step 5, what is left
+    /// Size from which an aspect of what is left is listed.
+    ASPECT_SHOWN: f64 = 3.0, in "standard deviations",
+        larger: "shorter lists",
+        smaller: "longer lists",
+        Convention("three sigma");
+    /// Share of the cells named that may be wrong (false discovery rate).
+    FALSE_CELLS: f64 = 0.05, in "share",
+        larger: "more cells, more of them chance",
+        smaller: "fewer cells",
+        Convention("one in twenty");
+    /// What a passage must gain over always.
+    PASSAGE_MARGIN: f64 = 7.5 + 10.0, in "nats",
+        larger: "gaps that come and go are called steady",
+        smaller: "steady gaps get a time",
+        Derived("the logarithm of the pairs compared, and the margin of a stretch");
+    /// Of the mean inside a passage, what the mean outside it must stay below.
+    PASSAGE_QUIET: f64 = 0.5, in "part",
+        larger: "gaps that only vary get a time",
+        smaller: "passages are missed",
+        Assumed("less is a gap that varies");
+    /// Share of the excess that the channels looked at, or named for an unexplained gap, hold together.
+    MOST_OF_EXCESS: f64 = 0.8, in "share",
+        larger: "more channels are named",
+        smaller: "fewer channels are named",
+        Convention("four fifths");
+    // Step 6, hold
+    /// Share of an effect's energy in one block from which it counts as an event, which other blocks cannot predict.
+    EVENT: f64 = 0.5, in "share",
+        larger: "events are held to other blocks",
+        smaller: "effects escape cross-validation",
+        Convention("most of it");
+    /// What blocks would be better predicted by if the effect were there, below which they say nothing.
+    CROSS_VALIDATED: f64 = 3.0, in "nats",
+        larger: "fewer effects are cross-validated",
+        smaller: "noise refutes effects",
+        Derived("three nats are odds of twenty");
+    /// Difference by which recalibration and an effect shrink a gap as much.
+    SAME_SHRINK: f64 = 0.01, in "part of the gap",
+        larger: "effects that recalibration beats are kept",
+        smaller: "equal ones are withdrawn",
+        Assumed("a hundredth of a gap is not seen");
+    /// Excess of a gap over its floor below which their quotient is noise over noise.
+    SMALLEST_EXCESS: f64 = 0.01, in "sigma",
+        larger: "small gaps have no percentage",
+        smaller: "percentages of nothing",
+        Derived("the gap of five thousand samples is known to it");
+    /// Difference of an effect's held-out strength from one that a true effect may show.
+    STRENGTH_TOLERATED: f64 = 0.25, in "1",
+        larger: "wrong laws pass",
+        smaller: "true effects are doubted on another motion",
+        Assumed("the calibration fitted beside it is not exact on another motion, and a real law is only nearly the library's");
+    /// Standard deviation of that strength above which the held-out windows say nothing.
+    STRENGTH_SHOWN: f64 = 0.5, in "1",
+        larger: "noise refutes effects",
+        smaller: "weak hold windows confirm nothing",
+        Convention("half of what is asked");
+    /// Probability of more events than are looked for.
+    MORE_EVENTS: f64 = 1e-4, in "probability",
+        larger: "many events are cut",
+        smaller: "slower",
+        Convention("one in ten thousand");
+    /// Probability of as large a leftover by chance up to which it is looked for on the hold windows too.
+    DOUBTFUL: f64 = 0.36, in "probability",
+        larger: "slower",
+        smaller: "what is left is not confirmed",
+        Derived("from 1/e on the bound -1/(e p ln p) speaks for nothing");
+    // Step 7, how sure
+    /// Size from which an engineer should look twice.
+    SUSPICIOUS: f64 = 0.25, in "part of the largest size",
+        larger: "fewer warnings",
+        smaller: "more warnings",
+        Convention("five times the usual of an effect whose largest is twenty");
+    /// Share of an effect's energy from which a channel is named.
+    NAMED_SHARE: f64 = 0.02, in "share",
+        larger: "fewer channels",
+        smaller: "more channels",
+        Convention("one fiftieth");
+    /// Energy from which a channel is named whatever its share.
+    NAMED_ENERGY: f64 = 9.0, in "squares of noise",
+        larger: "fewer channels",
+        smaller: "more channels",
+        Derived("three sigma squared");
+    /// Prior probability that a unit has something the library does not, beside what is named.
+    UNKNOWN_PRIOR: f64 = 0.05, in "probability",
+        larger: "more alarms beside names",
+        smaller: "stand-ins are believed",
+        Assumed("one unit in twenty");
+    /// The same where nothing is named though something is there.
+    UNKNOWN_ALONE: f64 = 0.15, in "probability",
+        larger: "more alarms",
+        smaller: "unknown effects are called clean",
+        Fitted("dealt cases without a name that were not plainly none of these: outside the library 47 times in 146; 0.05 says 19, this one 39 (TRIALS.md)");
+    /// Evidence at which a name is as likely wrong as right.
+    DOUBTED: f64 = 10.0, in "nats",
+        larger: "weak true names are lost",
+        smaller: "weak wrong names are said",
+        Fitted("wrong names of the dealt cases had 8 to 26 nats; an effect of ratio 8 has 32 before its prior odds (TRIALS.md)");
+    /// Step that multiplies those odds by e.
+    DOUBT_STEP: f64 = 3.0, in "nats",
+        larger: "a softer threshold",
+        smaller: "a harder one",
+        Fitted("the same names");
+    /// Energy left over that explained at which a name is as likely wrong as right.
+    UNLIKE: f64 = 0.05, in "part",
+        larger: "stand-ins are believed",
+        smaller: "effects that differ a little from their law are doubted",
+        Assumed("a law that is a little off leaves a few parts in a hundred");
+    /// How far an effect is believed that is on in no held-out sample.
+    UNTOLD: f64 = 0.5, in "probability",
+        larger: "patches are believed",
+        smaller: "rare true effects are doubted",
+        Fitted("on dealt cases two wrong names were such, and no right one (TRIALS.md)");
+    /// Share of the time that counts as a regime.
+    REGIME_TIME: f64 = 0.3, in "share",
+        larger: "vague regimes",
+        smaller: "narrow regimes",
+        Convention("a third");
+    /// Share of an effect's energy that a regime must hold.
+    REGIME_ENERGY: f64 = 0.6, in "share",
+        larger: "fewer regimes are told",
+        smaller: "regimes of even effects are told",
+        Derived("twice what evenly spread energy has in [`REGIME_TIME`]");
+    // Step 9, advice
+    /// Distance below which two effects are not told apart.
+    SET_APART: f64 = 5.0, in "nats",
+        larger: "larger sets",
+        smaller: "smaller sets that miss the truth",
+        Derived("Q(sqrt(5/2)): 6 % errors");
+    /// Probability above which a rival belongs to the set.
+    SET_POSSIBLE: f64 = 0.05, in "probability",
+        larger: "smaller sets",
+        smaller: "larger sets",
+        Convention("one in twenty");
+    /// Marginal signal-to-noise ratio that counts as seen.
+    SEEN_SNR: f64 = 5.0, in "1",
+        larger: "more conservative limits",
+        smaller: "limits that are not kept",
+        Convention("five sigma");
+    /// Distance at which two effects count as told apart.
+    TOLD_APART: f64 = 11.0, in "nats",
+        larger: "more experiments are advised",
+        smaller: "fewer",
+        Derived("Q(sqrt(11/2)): 1 % errors");
+    // Step 10, report
+    /// Held-out gap of a channel of a table that noise does not leave in eight rows.
+    REMAINS: f64 = 2.5, in "sigma",
+        larger: "fewer channels are reported as left",
+        smaller: "more",
+        Derived("one in ten million");
+    /// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
+    HELPED: f64 = 0.8, in "part",
+        larger: "more channels are reported as left",
+        smaller: "fewer",
+        Assumed("a fifth of a gap is help");
+    /// Probability of the gap by chance above which shares are of nothing.
+    NO_GAP: f64 = 0.05, in "probability",
+        larger: "shares of noise are printed",
+        smaller: "shares of weak gaps are not printed",
+        Convention("one in twenty");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fewer is better: whoever adds one says why here.
+    const MOST: usize = 54;
+
+    #[test]
+    fn every_threshold_is_listed_whole_and_once() {
+        for (at, threshold) in ALL.iter().enumerate() {
+            let (Provenance::Derived(why)
+            | Provenance::Convention(why)
+            | Provenance::Fitted(why)
+            | Provenance::Assumed(why)) = threshold.provenance;
+            println!(
+                "{:24} {:8} {:24} {:?}",
+                threshold.name, threshold.value, threshold.unit, threshold.provenance
+            );
+            let texts = [threshold.unit, threshold.what, threshold.larger, threshold.smaller, why];
+            assert!(texts.iter().all(|text| !text.trim().is_empty()), "{}", threshold.name);
+            assert!(
+                threshold.value > 0.0 && threshold.value.is_finite(),
+                "{}",
+                threshold.name
+            );
+            let is_again = |other: &Threshold| other.name == threshold.name || other.what == threshold.what;
+            assert!(!ALL[..at].iter().any(is_again), "{} is listed twice", threshold.name);
+        }
+        assert!(ALL.len() <= MOST, "{} thresholds", ALL.len());
+    }
+}
