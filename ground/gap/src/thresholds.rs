@@ -90,12 +90,12 @@ thresholds! {
     REMAINDER: f64 = 0.005, in "part of the strongest gain",
         larger: "weak second effects are not named",
         smaller: "remainders of a strong effect get names",
-        Assumed("a real law is the library's to half a percent of the energy");
+        Assumed("what a law that is a little off leaves over");
     /// Causes that are believed at once; more together are a patchwork for one effect the library does not have.
     MOST_CAUSES: usize = 3, in "effects",
         larger: "patchworks are believed",
         smaller: "true sets of four are withdrawn",
-        Fitted("the dealt cases have at most two effects");
+        Assumed("more together are rather a patchwork for one effect that the library does not have");
     /// Gain from which an effect counts among the causes.
     COUNTED_PART: f64 = 0.02, in "part of all gains",
         larger: "small effects do not count towards a patchwork",
@@ -110,7 +110,7 @@ thresholds! {
     LISTED: f64 = 0.005, in "probability",
         larger: "shorter lists",
         smaller: "longer lists",
-        Convention("printed with two decimals of a percent");
+        Convention("half a percent");
     /// Evidence that a stretch of time, once or periodic, must gain over "always", beyond the price of having looked.
     STRETCH_MARGIN: f64 = 10.0, in "nats",
         larger: "effects that come and go are taken for steady ones",
@@ -150,7 +150,7 @@ thresholds! {
     SCATTER_NEAR: f64 = 0.2, in "part of the best gain",
         larger: "rivals are not tried",
         smaller: "slower",
-        Assumed("a calibration of its own brought no more");
+        Assumed("what a calibration of its own may bring");
     /// Strain from which a calibration may have been dragged to where it is.
     DRAGGED: f64 = 4.0, in "prior sigmas",
         larger: "a dragged calibration hides its effect",
@@ -217,7 +217,7 @@ thresholds! {
     SMALLEST_EXCESS: f64 = 0.01, in "sigma",
         larger: "small gaps have no percentage",
         smaller: "percentages of nothing",
-        Derived("the gap of five thousand samples is known to it");
+        Derived("1/sqrt(2 n): the gap of five thousand samples is known to it");
     /// Difference of an effect's held-out strength from one that a true effect may show.
     STRENGTH_TOLERATED: f64 = 0.25, in "1",
         larger: "wrong laws pass",
