@@ -39,7 +39,7 @@ use crate::{
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
     increments::{Force, Increments},
-    kalman::{Filter, Outcome, Step, seconds},
+    kalman::{Filter, KEPT_BYTES, Outage, Outcome, Step, seconds},
     redundancy::Known,
     sample::{Kind, Sample},
     triad,
@@ -177,6 +177,30 @@ impl Estimator {
     #[inline(never)]
     pub fn of(settings: &Settings) -> Self {
         Estimator::new(Set::compiled_in(Ranges::of(settings)), &settings.site)
+    }
+
+    /// Keeps the filter for after a reset; `false` where there is no attitude to keep.
+    pub fn keep(&mut self, bytes: &mut [u8; KEPT_BYTES]) -> bool {
+        self.filter.keep(bytes)
+    }
+
+    /// Goes on, after a reset, from what was kept of the filter.
+    #[inline(never)]
+    pub fn go_on(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
+        self.filter.go_on(bytes, outage);
+    }
+
+    /// Goes on, after a power cut, from the newest record, unless there is an attitude, or the first window finds one.
+    #[inline(never)]
+    pub fn go_on_from(&mut self, kept: &record::Estimate, outage: Outage) {
+        let Some(q_nb) = attitude::from_parts(kept.q_nb).filter(|_| !self.filter.aligned) else {
+            return;
+        };
+        let [x, y, z, bias_x, bias_y, bias_z] = kept.sigma;
+        let dcm = dcm_bn(&q_nb).transpose();
+        let covariance_n = dcm * Matrix3::from_diagonal(&Vector3::new(x * x, y * y, z * z)) * dcm.transpose();
+        let bias = (Vector3::from(kept.bias_b), [bias_x, bias_y, bias_z]);
+        self.filter.go_on_from(q_nb, covariance_n, bias, outage);
     }
 
     /// The filter as it stands.

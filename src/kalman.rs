@@ -45,6 +45,7 @@ mod field_sums;
 mod innovation;
 mod iron;
 mod joseph;
+mod kept;
 mod known;
 mod measured;
 mod params;
@@ -65,6 +66,7 @@ pub use self::{
     field::Reference,
     innovation::{INNOVATIONS, Innovation, Innovations, Quantity},
     iron::HardIron,
+    kept::{KEPT_BYTES, Outage},
     known::Known,
     params::{Delays, Params, Rest},
     state::STATES,
@@ -73,6 +75,7 @@ pub use self::{
 use self::{
     field_sums::{FieldSums, MeanField},
     innovation::Correction,
+    kept::Going,
     measured::Measured,
     passage::walks,
     pending::{Pace, Pending},
@@ -130,6 +133,10 @@ pub struct Filter {
     rested: bool,
     /// [s] for how long the bias that rest shows has been rejected without a break.
     bias_rejected_s: f32,
+    /// How it goes on after a reset, until the gyros are heard.
+    going: Option<Going>,
+    /// [rad^2] covariance in n of an attitude from before, for when the first window finds none.
+    known_before: Option<Matrix3<f32>>,
 }
 
 impl Filter {
@@ -159,6 +166,8 @@ impl Filter {
             disturbed_s: 0.0,
             rested: false,
             bias_rejected_s: 0.0,
+            going: None,
+            known_before: None,
             params,
         }
     }
@@ -197,6 +206,9 @@ impl Filter {
     /// Takes a step, and adds what it led to to an outcome that is empty yet: moving one costs as much as some steps.
     pub fn take(&mut self, step: &Step, outcome: &mut Outcome) {
         let rotation = step.is_a_rotation();
+        if rotation {
+            self.bridge(step);
+        }
         let since_s = match self.last_us {
             Some(last_us) if step.at_us <= last_us => {
                 outcome.refusal = Some(Refusal::NotLater);
@@ -258,7 +270,8 @@ impl Filter {
             // Of what a window does to it nothing else lasts until there is an attitude.
             self.covariance.drift(&walks(&self.params, means.duration_s));
             self.window.follow(&means);
-            outcome.aligned = self.align(UNKNOWN);
+            outcome.aligned = self.align(UNKNOWN) || self.fall_back();
+            self.known_before = None;
             if !outcome.aligned {
                 self.covariance.forget_attitude();
             }

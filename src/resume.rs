@@ -11,7 +11,9 @@
 //! Refuses a mode or a flag that does not exist: what a checksum lets through is still looked at.
 
 use crate::{
-    board::Retained,
+    board::{ResetCause, Retained},
+    crash::CrashRecord,
+    kalman::Outage,
     mode::Mode,
     retained::{PULSE, Place, STARTS, STATE},
 };
@@ -137,6 +139,49 @@ impl Pulse {
     }
 }
 
+/// [us] from a reset to the start of the unit's clock, as the image on the emulated board shows it.
+const START_US: u64 = 510;
+/// [us] between two pulses, at most half of which passed on average before a reset struck.
+const PULSE_US: u64 = 10_000;
+/// [us] from the last feeding of the watchdog to its reset if the LSI runs at 32 kHz.
+const WATCHDOG_US: u64 = 1_000_000;
+/// [s] how far that may be off: 0.68 to 1.88 s (17 to 47 kHz, STM32F407 data sheet), all equally likely, about 1 s.
+const WATCHDOG_SD_S: f32 = 0.45;
+/// A cut of the supply that is over in 50 ms to 2 s, all equally likely: longer ones nobody knows of, there is no clock in them.
+pub const POWER_CUT: Outage = Outage {
+    lasted_s: 1.0,
+    sd_s: 0.6,
+};
+
+/// What a reset missed since `kept_us` of the run before. A pin that is held low is not known of: it counts as if it were not.
+pub fn outage(kept_us: u64, reset: ResetCause, pulse: Pulse, crash: Option<&CrashRecord>) -> Outage {
+    let alive_us = pulse.at_us.max(kept_us);
+    let next_us = alive_us + PULSE_US;
+    let half_a_pulse = (alive_us + PULSE_US / 2, PULSE_US as f32 * 0.5e-6);
+    let (struck_us, sd_s) = match reset {
+        ResetCause::Watchdog => {
+            let bites_us = pulse.fed_us + WATCHDOG_US;
+            // One part waits for ever and the others go on until it bites; or nobody goes on.
+            if bites_us > next_us {
+                (bites_us, WATCHDOG_SD_S)
+            } else {
+                half_a_pulse
+            }
+        }
+        ResetCause::Software => match crash {
+            Some(crash) if (alive_us..next_us + WATCHDOG_US).contains(&crash.uptime_us) => (crash.uptime_us, 0.001),
+            _ => half_a_pulse,
+        },
+        ResetCause::Pin => half_a_pulse,
+        // The memory outlasted a dip of the supply.
+        ResetCause::PowerOn => (alive_us + (POWER_CUT.lasted_s * 1e6) as u64, POWER_CUT.sd_s),
+    };
+    Outage {
+        lasted_s: (struck_us - kept_us + START_US) as f32 * 1e-6,
+        sd_s,
+    }
+}
+
 fn recall<const N: usize>(place: Place, memory: &impl Retained) -> Option<[u8; N]> {
     let mut bytes = [0; N];
     (place.recall(memory, &mut bytes)?.len() == N).then_some(bytes)
@@ -199,6 +244,40 @@ mod tests {
         healthy.keep(&mut memory);
         assert_eq!(Starts::count(&mut memory).without_health, 1);
         assert_eq!(Starts::count(&mut memory).since_power_on, 5);
+    }
+
+    #[test]
+    fn an_outage_is_as_long_as_the_reset_allows() {
+        let pulse = |at_us, fed_us| Pulse { at_us, fed_us };
+        let missed = |reset, pulse: Pulse, crash| {
+            let Outage { lasted_s, sd_s } = outage(5_000_000, reset, pulse, crash);
+            ((lasted_s * 1e3).round_ties_even(), sd_s)
+        };
+        assert_eq!(
+            missed(ResetCause::Pin, pulse(5_070_000, 5_000_000), None),
+            (76.0, 0.005)
+        );
+        // Everybody hung at 5.07 s, 0.1 s after the last feeding; one part hung and the pulse went on.
+        assert_eq!(
+            missed(ResetCause::Watchdog, pulse(5_070_000, 4_970_000), None),
+            (971.0, 0.45)
+        );
+        assert_eq!(
+            missed(ResetCause::Watchdog, pulse(5_070_000, 4_071_000), None),
+            (76.0, 0.005)
+        );
+        let crash = CrashRecord::new(crate::crash::CrashCause::Panic, 1, 0, 0, 5_072_000, "");
+        assert_eq!(
+            missed(ResetCause::Software, pulse(5_070_000, 5_000_000), Some(&crash)),
+            (73.0, 0.001)
+        );
+        let old = CrashRecord::new(crate::crash::CrashCause::Panic, 1, 0, 0, 72_000, "");
+        assert_eq!(
+            missed(ResetCause::Software, pulse(5_070_000, 5_000_000), Some(&old)),
+            (76.0, 0.005)
+        );
+        // Pulses of no use: the reset was not before what was kept.
+        assert_eq!(missed(ResetCause::Pin, pulse(0, 0), None), (6.0, 0.005));
     }
 
     #[test]

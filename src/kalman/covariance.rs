@@ -287,6 +287,37 @@ impl Covariance {
         sound
     }
 
+    /// What is kept of it over a reset: all but the velocity, from the diagonals to the right.
+    pub(super) fn each_kept(&mut self, visit: &mut dyn FnMut(&mut f32)) {
+        for (row, numbers) in self.driven.iter_mut().enumerate().take(VELOCITY) {
+            numbers.iter_mut().take(VELOCITY).skip(row).for_each(&mut *visit);
+        }
+        for numbers in self.across.iter_mut().take(VELOCITY) {
+            numbers.iter_mut().for_each(&mut *visit);
+        }
+        for (row, numbers) in self.drivers.iter_mut().enumerate() {
+            numbers.iter_mut().skip(row).for_each(&mut *visit);
+        }
+    }
+
+    /// What stands on the other side of the diagonals follows from what was kept; the velocity is known to `velocity_sd`
+    /// \[m/s\] only, and the variance of each axis of the attitude grows by `variance` \[rad^2\].
+    pub(super) fn go_on(&mut self, velocity_sd: f32, variance: f32) {
+        mirror(&mut self.driven);
+        mirror(&mut self.drivers);
+        self.forget_velocity(velocity_sd);
+        for k in 0..VELOCITY {
+            self.driven[k][k] += variance;
+        }
+    }
+
+    /// Each component of the bias known to its own deviation [rad/s] only.
+    pub(super) fn know_bias(&mut self, sd: &[f32; GYRO_MATRIX]) {
+        for (k, sd) in sd.iter().enumerate() {
+            self.forget_driver(k, sd * sd);
+        }
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         let [driven, across, drivers] = [
             self.driven.as_flattened(),

@@ -98,6 +98,20 @@ impl Reference {
         known.then(|| Vector3::new(cos * cos_d, cos * sin_d, sin) * self.norm_ut)
     }
 
+    /// Its numbers; of a field that is known from the start none is learnt, and all are the site's.
+    pub(super) fn each(&mut self, visit: &mut dyn FnMut(&mut f32)) {
+        let scalars = [
+            &mut self.norm_ut,
+            &mut self.dip,
+            &mut self.declination,
+            &mut self.found_at,
+            &mut self.learnt_s,
+        ];
+        scalars.into_iter().for_each(&mut *visit);
+        self.raw_n.iter_mut().for_each(&mut *visit);
+        self.turned.iter_mut().for_each(visit);
+    }
+
     /// The field of a window against this one. `None` for a field of zero, or one along the vertical: it tells no
     /// heading.
     pub(super) fn compare(&self, params: &Params, duration_s: f32, mean: &MeanField) -> Option<Compared> {

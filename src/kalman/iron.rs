@@ -123,6 +123,17 @@ impl HardIron {
         false
     }
 
+    /// The numbers that say all but the latest windows; [`HardIron::go_on`] makes the rest of them.
+    pub(super) fn each(&mut self, visit: &mut dyn FnMut(&mut f32)) {
+        self.information.iter_mut().for_each(&mut *visit);
+        self.weighted.iter_mut().for_each(visit);
+    }
+
+    /// After its numbers were replaced.
+    pub(super) fn go_on(&mut self) {
+        self.solve();
+    }
+
     fn solve(&mut self) {
         // Information is a sum that began positive definite; rounding does not take that away.
         self.covariance = self.information.try_inverse().unwrap_or_else(Matrix3::zeros);

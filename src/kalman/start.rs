@@ -91,6 +91,7 @@ impl Filter {
         self.silent_s = 0.0;
         self.window = Window::EMPTY;
         self.aligned = false;
+        self.known_before = None;
         self.rate_b = Vector3::zeros();
         self.gyro_b = None;
         self.velocity_n = Vector2::zeros();
