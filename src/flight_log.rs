@@ -6,6 +6,7 @@
 //! ```text
 //! blocks 0..4     superblock, two good blocks in turn           superblock.rs
 //! blocks 4..      records, ascending, bad blocks left out       page.rs, record.rs
+//! the last 4      the calibration set that is kept, two in turn  kept_set.rs
 //! ```
 //!
 //! 1. A page is programmed once, with a record and a copy of the one before: a lost page takes only the newest with it.
@@ -28,6 +29,7 @@ mod blocks;
 mod carry;
 pub mod dump;
 mod error;
+mod kept_set;
 mod mount;
 pub mod page;
 pub mod record;
@@ -40,7 +42,10 @@ use self::{
     record::{BootHeader, Entry, Key, RecordBytes},
     superblock::Superblock,
 };
-use crate::nand::{Nand, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes};
+use crate::{
+    mode::Change,
+    nand::{Nand, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes},
+};
 
 /// Blocks kept for the superblock: two in use, two for when those wear out.
 pub const LOG_START: u16 = 4;
@@ -136,18 +141,48 @@ impl<N: Nand> FlightLog<N> {
     }
 
     async fn try_append(&mut self, entry: &Entry) -> Result<Key, LogError> {
-        if !self.begun {
-            self.begin(entry.start_us).await?;
-        } else if self.described_anew {
-            self.header.opened_us = entry.start_us;
-            let key = self.next_key();
-            self.put_record(record::encode_header(key, &self.header)).await?;
-        }
-        self.described_anew = false;
+        self.introduce(entry.start_us).await?;
         let key = self.next_key();
         self.put_record(record::encode_entry(key, entry)).await?;
         self.status.last = Some((key, entry.start_us));
         Ok(key)
+    }
+
+    /// Keeps a change of mode, as an entry is kept.
+    pub async fn note(&mut self, change: &Change) -> Result<(), LogError> {
+        self.mounted()?;
+        let outcome = self.try_note(change).await;
+        self.stop_if_unsure(&outcome);
+        outcome
+    }
+
+    async fn try_note(&mut self, change: &Change) -> Result<(), LogError> {
+        self.introduce(change.at_us).await?;
+        let key = self.next_key();
+        self.put_record(record::encode_change(key, change)).await
+    }
+
+    /// The header before the first record of a boot, and before one of a unit that is described anew.
+    async fn introduce(&mut self, now_us: u64) -> Result<(), LogError> {
+        if !self.begun {
+            self.begin(now_us).await?;
+        } else if self.described_anew {
+            self.header.opened_us = now_us;
+            let key = self.next_key();
+            self.put_record(record::encode_header(key, &self.header)).await?;
+        }
+        self.described_anew = false;
+        Ok(())
+    }
+
+    /// The header of this boot is in the log.
+    pub fn is_begun(&self) -> bool {
+        self.begun
+    }
+
+    /// The newest packet record that mounting found, as it stands there.
+    pub fn newest(&self) -> Option<&RecordBytes> {
+        (self.carried > 0 && !self.begun).then_some(&self.last)
     }
 
     /// Programs a page with a record and the one before it.
@@ -192,12 +227,18 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Keeps the mode for the next start.
-    pub async fn keep_mode(&mut self, flight: bool, recording: bool) -> Result<(), LogError> {
+    pub async fn keep_mode(&mut self, mode: Resumed) -> Result<(), LogError> {
         self.mounted()?;
-        if (self.superblock.flight, self.superblock.recording) == (flight, recording) {
+        let kept = &mut self.superblock;
+        let Resumed {
+            flight,
+            recording,
+            derived,
+        } = mode;
+        if (kept.flight, kept.recording, kept.derived) == (flight, recording, derived) {
             return Ok(());
         }
-        (self.superblock.flight, self.superblock.recording) = (flight, recording);
+        (kept.flight, kept.recording, kept.derived) = (flight, recording, derived);
         let outcome = self.save().await;
         self.stop_if_unsure(&outcome);
         outcome
@@ -243,7 +284,7 @@ impl<N: Nand> FlightLog<N> {
     /// How it stands.
     pub fn status(&self) -> Status {
         let per_block = u32::from(PAGES_PER_BLOCK);
-        let blocks = self.chip.blocks();
+        let (blocks, log_end) = (self.chip.blocks(), self.log_end());
         let log_bad = |end| u32::from(self.superblock.bad.count(LOG_START..end));
         let after = |block: u16| block.saturating_add(1);
         let end_block = match self.ahead {
@@ -256,10 +297,10 @@ impl<N: Nand> FlightLog<N> {
         };
         Status {
             used: end.saturating_sub(u32::from(LOG_START) * per_block),
-            capacity: u32::from(blocks.saturating_sub(LOG_START)).saturating_sub(log_bad(blocks)) * per_block,
+            capacity: u32::from(log_end.saturating_sub(LOG_START)).saturating_sub(log_bad(log_end)) * per_block,
             bad_blocks: self.superblock.bad.count(0..blocks),
             more_bad_blocks: self.superblock.bad.is_full(),
-            erasing: self.erase_next.map(|next| u32::from(blocks.saturating_sub(next))),
+            erasing: self.erase_next.map(|next| u32::from(log_end.saturating_sub(next))),
             ..self.status
         }
     }

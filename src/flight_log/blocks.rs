@@ -45,7 +45,7 @@ impl<N: Nand> FlightLog<N> {
 
     /// Whether there is such a block, and it is none of the superblock's.
     pub(super) fn is_of_the_log(&self, block: u16) -> bool {
-        (LOG_START..self.chip.blocks()).contains(&block)
+        (LOG_START..self.log_end()).contains(&block)
     }
 
     /// Whether a block holds records of the running epoch; its second page speaks for a first one that is lost.
@@ -62,7 +62,7 @@ impl<N: Nand> FlightLog<N> {
     /// The first block from `from` on that may be erased. A block that is live, or answers for one that is, may not,
     /// whatever mount made of it; nor one the maker marked.
     pub(super) fn free_block(&mut self, from: u16) -> Result<Option<u16>, LogError> {
-        'blocks: for block in from.max(LOG_START)..self.chip.blocks() {
+        'blocks: for block in from.max(LOG_START)..self.log_end() {
             if self.superblock.bad.contains(block) {
                 continue;
             }

@@ -36,6 +36,8 @@ pub struct Resumed {
     pub flight: bool,
     /// It was recording.
     pub recording: bool,
+    /// Derived frames were on.
+    pub derived: bool,
 }
 
 /// What the superblock's blocks hold.
@@ -62,6 +64,7 @@ impl<N: Nand> FlightLog<N> {
         Ok(Resumed {
             flight: self.superblock.flight,
             recording: self.superblock.recording,
+            derived: self.superblock.derived,
         })
     }
 

@@ -12,7 +12,7 @@
 //! | 517 | FFh always: the bad mark |
 //! | 521-522, 523-524 | epoch; block |
 //! | 525-526 | CRC-16/CCITT-FALSE of kind, boot, epoch, block and the page in its block |
-//! | 527 | format version, times sixteen, plus kind (1 log, 2 superblock) |
+//! | 527 | format version, times sixteen, plus kind (1 log, 2 superblock, 3 calibration set) |
 //!
 //! The tag names the page's own block and is checked against where it was read: a chip with a stuck address line answers
 //! with another block's pages. Its code corrects one wrong bit, so one torn tag in
@@ -42,6 +42,8 @@ pub enum Kind {
     Log = 1,
     /// The superblock.
     Superblock = 2,
+    /// A calibration set.
+    Set = 3,
 }
 
 /// Where a page belongs.
@@ -116,7 +118,7 @@ pub fn stamp(spare: &SpareBytes, at: PageAddress) -> Stamp {
         };
         bytes = flipped(bytes, bit);
     }
-    let kind = [Kind::Log, Kind::Superblock]
+    let kind = [Kind::Log, Kind::Superblock, Kind::Set]
         .into_iter()
         .find(|kind| bytes[8] == version_and_kind(*kind));
     let Some(kind) = kind else {

@@ -1,13 +1,13 @@
-//! A record: what is kept of one cycle, or of one boot, in 256 bytes that stand for themselves.
+//! A record: what is kept of one cycle, of one boot, or of a change of mode, in 256 bytes that stand for themselves.
 //!
-//! In: an [`Entry`] or a [`BootHeader`] and its [`Key`]. Out: the bytes, and back. Little endian, version 1:
+//! In: an [`Entry`], a [`BootHeader`] or a [`Change`] and its [`Key`]. Out: the bytes, and back. Little endian, version 1:
 //!
 //! | bytes | packet record (type 1) | boot header (type 2) |
 //! |---|---|---|
 //! | 0-1 | E7 4D | the same |
 //! | 2, 3 | version, type | the same |
 //! | 4-7, 8-11, 12-13 | number within the boot, boot, epoch: the key | the same |
-//! | 14-15 | flags | flags |
+//! | 14-15 | flags: 1 FLIGHT, 2 with an attitude | flags: 4 with how it started |
 //! | 16-23 | [us] start of the cycle, since the unit's clock started | [us] when the log was opened |
 //! | 24-179 | the packet, verbatim | firmware (16, text), unit (16, text), calibration set (16, text), 156-byte |
 //! | 180-211 | 16 x u16: when each sensor was sampled after the start [4 us], FFFF not sampled | packet's period [us] u32, |
@@ -18,6 +18,14 @@
 //! | 248-251 | health of the sensors; zero without an attitude | zero |
 //! | 252-255 | CRC-32 (ISO-HDLC) of bytes 0 to 251 | the same |
 //!
+//! How a boot started stands at the end of its header (logs of older firmware have description there, and no flag):
+//! `216` reset cause (1 power-on, 2 watchdog, 3 software, 4 pin), `217` crash (0 none, 1 panic, 2 hard fault, 3 unhandled
+//! exception), `218-219` starts since power-on, `220-223` line or pc, `224-227` lr, `228-231` CFSR, `232-235` \[ms\] it ran, `236-251`
+//! tail of the source file's name.
+//!
+//! A change of mode (type 3): `14-15` flags (1 FLIGHT from then on), `16-23` \[us\] when, `24` recording from then on, `25` cause
+//! (1 command, 2 lift-off, 3 log), the rest zero.
+//!
 //! The key is never used twice, so a record that turns up again is the same record. Refuses what the checksum does not
 //! fit, a newer version by its number, and a type it does not know.
 
@@ -26,8 +34,11 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 use crate::{
+    board::ResetCause,
+    crash::{CrashCause, CrashRecord},
     derived::Health,
     faults::SensorHealth,
+    mode::{Cause, Change, Mode},
     packet::PACKET_BYTES,
     sample::{NO_SLOT, SENSOR_COUNT},
 };
@@ -42,11 +53,14 @@ pub const VERSION: u8 = 1;
 pub type RecordBytes = [u8; RECORD_BYTES];
 
 /// What a packet record holds, in words, in every boot header: whoever finds the chip needs no other document.
-pub const DESCRIPTION: &str = "e-MEMS log 1 LE: seq4@4 boot4@8 epoch2@12 flags2@14 us8@16 packet156@24 \
-slots16xu16@180(4us) q4xi16@212/32767 bias3xf32@220 sigma6xbf16@232 health@244 sensors@248 crc32@252";
+pub const DESCRIPTION: &str = "e-MEMS log 1 LE: seq4@4 boot4@8 epoch2@12 us8@16 packet156@24 \
+16u16@180(4us) q4i16@212/32767 bias3f32@220 sd6bf16@232 health@244 crc32@252";
+
+const _: () = assert!(at::DESCRIPTION + DESCRIPTION.len() <= at::START);
 
 const PACKET: u8 = 1;
 const HEADER: u8 = 2;
+const CHANGE: u8 = 3;
 const MAGIC: [u8; 2] = [0xE7, 0x4D];
 const CHECKED: usize = RECORD_BYTES - 4;
 pub(crate) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -76,6 +90,10 @@ mod at {
     pub const CALIBRATION: usize = 56;
     pub const PERIOD: usize = 72;
     pub const DESCRIPTION: usize = 76;
+    pub const START: usize = 216;
+    pub const PLACE: usize = 236;
+    pub const RECORDING: usize = 24;
+    pub const CAUSE: usize = 25;
 }
 
 /// Which record: the order of keys is the order in which they were made.
@@ -138,6 +156,19 @@ pub struct BootHeader {
     pub calibration: Name,
     /// [us] from packet to packet.
     pub period_us: u32,
+    /// How the unit started; `None` in logs of older firmware.
+    pub start: Option<Start>,
+}
+
+/// How the unit started.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// Why.
+    pub reset: ResetCause,
+    /// How often since power-on, this start among them.
+    pub starts: u16,
+    /// The crash before it; kept to milliseconds and to the last sixteen letters of its place.
+    pub crash: Option<CrashRecord>,
 }
 
 /// What a record holds.
@@ -151,6 +182,8 @@ pub enum Content {
     Packet(Entry),
     /// The header of a boot.
     Header(BootHeader),
+    /// A change of mode.
+    Change(Change),
 }
 
 /// Why bytes are not a record.
@@ -189,6 +222,8 @@ impl core::error::Error for RecordError {}
 const FLIGHT: u16 = 1 << 0;
 /// Flag: the estimator's fields are set.
 const ESTIMATED: u16 = 1 << 1;
+/// Flag of a header: it says how the unit started.
+const STARTED: u16 = 1 << 2;
 
 /// The bytes of a packet record.
 pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
@@ -225,7 +260,8 @@ pub fn encode_entry(key: Key, entry: &Entry) -> RecordBytes {
 
 /// The bytes of a boot header.
 pub fn encode_header(key: Key, header: &BootHeader) -> RecordBytes {
-    let mut bytes = begin(key, HEADER, 0, header.opened_us);
+    let flags = u16::from(header.start.is_some()) * STARTED;
+    let mut bytes = begin(key, HEADER, flags, header.opened_us);
     for (at, name) in [
         (at::FIRMWARE, &header.firmware),
         (at::UNIT, &header.unit),
@@ -235,6 +271,36 @@ pub fn encode_header(key: Key, header: &BootHeader) -> RecordBytes {
     }
     put(&mut bytes, at::PERIOD, &header.period_us.to_le_bytes());
     put(&mut bytes, at::DESCRIPTION, DESCRIPTION.as_bytes());
+    if let Some(start) = &header.start {
+        put(&mut bytes, at::START, &[start.reset.code()]);
+        put(&mut bytes, at::START + 2, &start.starts.to_le_bytes());
+        if let Some(crash) = &start.crash {
+            put(&mut bytes, at::START + 1, &[crash.cause.code()]);
+            let ran_ms = u32::try_from(crash.uptime_us / 1000).unwrap_or(u32::MAX);
+            for (number, word) in [crash.at, crash.lr, crash.cfsr, ran_ms].into_iter().enumerate() {
+                put(&mut bytes, at::START + 4 + 4 * number, &word.to_le_bytes());
+            }
+            // Names of source files are ASCII; of another the tail is no text, and is left out when it is read.
+            let place = crash.place.as_bytes();
+            let tail = place.len().saturating_sub(CHECKED - at::PLACE);
+            put(&mut bytes, at::PLACE, place.get(tail..).unwrap_or_default());
+        }
+    }
+    seal(&mut bytes);
+    bytes
+}
+
+/// The bytes of a change of mode.
+pub fn encode_change(key: Key, change: &Change) -> RecordBytes {
+    let flags = u16::from(change.mode == Mode::Flight) * FLIGHT;
+    let mut bytes = begin(key, CHANGE, flags, change.at_us);
+    let cause = match change.cause {
+        Cause::Command => 1,
+        Cause::LiftOff => 2,
+        Cause::Log => 3,
+    };
+    put(&mut bytes, at::RECORDING, &[change.recording.into()]);
+    put(&mut bytes, at::CAUSE, &[cause]);
     seal(&mut bytes);
     bytes
 }
@@ -304,6 +370,17 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
             unit: name(bytes, at::UNIT),
             calibration: name(bytes, at::CALIBRATION),
             period_us: u32::from_le_bytes(take(bytes, at::PERIOD)),
+            start: start(bytes),
+        }),
+        CHANGE => Content::Change(Change {
+            at_us: start_us,
+            mode: if flight { Mode::Flight } else { Mode::Wait },
+            recording: bytes[at::RECORDING] != 0,
+            cause: match bytes[at::CAUSE] {
+                2 => Cause::LiftOff,
+                3 => Cause::Log,
+                _ => Cause::Command,
+            },
         }),
         kind => return Err(RecordError::Type(kind)),
     };
@@ -330,6 +407,25 @@ fn seal(bytes: &mut RecordBytes) {
 
 fn flags(bytes: &RecordBytes) -> u16 {
     u16::from_le_bytes(take(bytes, at::FLAGS))
+}
+
+/// How the unit started, where the header says it.
+fn start(bytes: &RecordBytes) -> Option<Start> {
+    if flags(bytes) & STARTED == 0 {
+        return None;
+    }
+    let word = |number: usize| u32::from_le_bytes(take(bytes, at::START + 4 + 4 * number));
+    let crash = CrashCause::of_code(bytes[at::START + 1]).map(|cause| {
+        let place = &bytes[at::PLACE..CHECKED];
+        let end = place.iter().position(|byte| *byte == 0).unwrap_or(place.len());
+        let place = core::str::from_utf8(place.get(..end).unwrap_or_default()).unwrap_or_default();
+        CrashRecord::new(cause, word(0), word(1), word(2), u64::from(word(3)) * 1000, place)
+    });
+    Some(Start {
+        reset: ResetCause::of_code(bytes[at::START])?,
+        starts: u16::from_le_bytes(take(bytes, at::START + 2)),
+        crash,
+    })
 }
 
 /// Rounds to the nearest integer: `as` would cut, and `core` has no `round`.

@@ -1,7 +1,7 @@
 //! The superblock: what must be known before the log is read.
 //!
 //! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
-//! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording), `6-7` epoch, `8-11` its own number,
+//! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording, 4 derived frames), `6-7` epoch, `8-11` its own number,
 //! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-243` their numbers ascending,
 //! `244-245` the block with the newest records before that boot (0: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
 
@@ -81,6 +81,8 @@ pub struct Superblock {
     pub flight: bool,
     /// Packets are being recorded.
     pub recording: bool,
+    /// Derived frames are on.
+    pub derived: bool,
     /// Blocks that are not used.
     pub bad: BadBlocks,
 }
@@ -106,7 +108,7 @@ pub fn encode(superblock: &Superblock) -> RecordBytes {
         4,
         &[
             VERSION,
-            u8::from(superblock.flight) | u8::from(superblock.recording) << 1,
+            u8::from(superblock.flight) | u8::from(superblock.recording) << 1 | u8::from(superblock.derived) << 2,
         ],
     );
     put(6, &superblock.epoch.to_le_bytes());
@@ -152,6 +154,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<Superblock, SuperblockError> {
         block_before: word(BLOCK_BEFORE),
         flight: bytes[5] & 1 != 0,
         recording: bytes[5] & 2 != 0,
+        derived: bytes[5] & 4 != 0,
         bad,
     })
 }
@@ -173,6 +176,7 @@ mod tests {
             block_before: 98,
             flight: true,
             recording: false,
+            derived: true,
             bad,
         }
     }

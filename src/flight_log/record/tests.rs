@@ -95,11 +95,64 @@ fn a_header_says_what_it_was_given_and_describes_the_log() {
         unit: name("FM-2"),
         calibration: name("sixteen-letters!"),
         period_us: 20_000,
+        start: None,
     };
-    let bytes = encode_header(KEY, &header);
-    assert_eq!(decode(&bytes), Ok((KEY, Content::Header(header))));
-    let text = std::string::String::from_utf8_lossy(&bytes[76..252]).into_owned();
-    assert!(text.trim_end_matches('\0').ends_with("crc32@252"), "{text}");
+    let crash = CrashRecord::new(
+        CrashCause::HardFault,
+        0x0800_1234,
+        0x0800_5678,
+        0x0002_0000,
+        90_000_000,
+        "unit/acquire.rs",
+    );
+    let start = |crash| {
+        Some(Start {
+            reset: ResetCause::Software,
+            starts: 300,
+            crash,
+        })
+    };
+    for start in [None, start(None), start(Some(crash))] {
+        let header = BootHeader {
+            start,
+            ..header.clone()
+        };
+        let bytes = encode_header(KEY, &header);
+        assert_eq!(decode(&bytes), Ok((KEY, Content::Header(header))));
+        let text = std::string::String::from_utf8_lossy(&bytes[76..216]).into_owned();
+        assert!(text.trim_end_matches('\0').ends_with("crc32@252"), "{text}");
+    }
+}
+
+/// Until then the description went on to where the start stands now.
+#[test]
+fn a_header_of_older_firmware_says_nothing_of_its_start() {
+    let mut bytes = begin(KEY, HEADER, 0, 5);
+    put(&mut bytes, at::DESCRIPTION, &[b'x'; CHECKED - at::DESCRIPTION]);
+    seal(&mut bytes);
+    let Ok((_, Content::Header(header))) = decode(&bytes) else {
+        panic!("no header");
+    };
+    assert_eq!((header.opened_us, header.start), (5, None));
+}
+
+#[test]
+fn a_change_of_mode_says_what_it_was_given() {
+    for (mode, recording, cause) in [
+        (Mode::Flight, true, Cause::LiftOff),
+        (Mode::Wait, false, Cause::Command),
+        (Mode::Flight, false, Cause::Log),
+    ] {
+        let change = Change {
+            at_us: 5_000_000_000,
+            mode,
+            recording,
+            cause,
+        };
+        let bytes = encode_change(KEY, &change);
+        assert_eq!(decode(&bytes), Ok((KEY, Content::Change(change))));
+        assert!(!is_packet(&bytes));
+    }
 }
 
 #[test]
