@@ -7,15 +7,19 @@
 //! CRC-16/CCITT-FALSE over them. Layout, with the digits of each field:
 //!
 //! ```text
-//! version 4 | counter 4 | start_us 16 | mode 1 | health 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
-//! covered_us 6 | end_us 16 | angle_b 8 x 3 | for each gyro: integral 8, least 4, most 4, count 2
+//! version 2 | counter 4 | start_us 12 | mode 1 | health 8 | start 8 | cycle_us 5 | slot_us 5 x 16 (FFFFF: not sampled)
+//! covered_us 6 | end_us 12 | angle_b 8 x 3 | for each gyro: integral 8, least 4, most 4, count 2
 //! for each reading of the accelerometers in between: covered_us 6, after_us 5, angle_b 8 x 3, counts 4 x 12
 //! for each slice of the gyros: before_us 5, lasts_us 4, quarters of counts 4 x 4
 //! estimate_us 5 | force_b 8 x 3 | field_b_ut 8 x 3 | rate_b 8 x 3 | sensors 8 | triad_nb 8 x 4 (0: none)
 //! q_nb 8 x 4 (0: none) | covariance_n 8 x 6 | bias_b 8 x 3 | bias_sd 8 x 3
 //! ```
 //!
-//! Numbers of 8 digits are IEEE 754, but for `health` and `sensors`, which are bits. With the packet of the same counter
+//! `start` says how the unit started: reset cause 1 (1 power-on, 2 watchdog, 3 software, 4 pin), crash 1 (0 none, 1 panic, 2
+//! hard fault, 3 unhandled exception), starts since power-on 4, 0 2. Version 5 is written; version 4, which had no `start` and 16
+//! digits for both times, is read.
+//!
+//! Numbers of 8 digits are IEEE 754, but for `start`, `health` and `sensors`, which are bits. With the packet of the same counter
 //! a frame holds all that [`estimate`](crate::estimate) was given, so a stream of both from the start gives its result again.
 
 mod health;
@@ -25,6 +29,8 @@ use core::fmt;
 use crc::{CRC_16_IBM_3740, Crc};
 
 use crate::{
+    board::ResetCause,
+    crash::CrashCause,
     estimate::Estimate,
     faults::SensorHealth,
     increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
@@ -41,17 +47,33 @@ pub const DERIVED_START: u8 = b'$';
 /// Bytes of a derived frame.
 pub const DERIVED_BYTES: usize = 1 + FIELD_DIGITS + 1 + 4 + 1;
 
-const VERSION: u64 = 4;
+const VERSION: u64 = 5;
+/// The version before.
+const WITHOUT_START: u64 = 4;
 const FIELD_DIGITS: usize = CYCLE_DIGITS + GYRO_DIGITS + FORCE_DIGITS + SLICE_DIGITS + ESTIMATE_DIGITS;
-const CYCLE_DIGITS: usize = 2 + 4 + 16 + 1 + 8 + 5 + 5 * SENSOR_COUNT;
-const GYRO_DIGITS: usize = 6 + 16 + 8 * 3 + 4 * (8 + 4 + 4 + 2);
+const CYCLE_DIGITS: usize = 2 + 4 + TIME_DIGITS + 1 + 8 + 8 + 5 + 5 * SENSOR_COUNT;
+const GYRO_DIGITS: usize = 6 + TIME_DIGITS + 8 * 3 + 4 * (8 + 4 + 4 + 2);
 const FORCE_DIGITS: usize = READINGS * (6 + 5 + 8 * 3 + 4 * 12);
 const SLICE_DIGITS: usize = SLICES * (5 + 4 + 4 * 4);
 const ESTIMATE_DIGITS: usize = 5 + 8 * (3 + 3 + 3 + 1 + 4 + 4 + 6 + 3 + 3);
+/// Microseconds of nine years.
+const TIME_DIGITS: usize = 12;
 const NO_SLOT_CODE: u64 = 0xF_FFFF;
 
 /// CRC-16/CCITT-FALSE, which the catalogue calls IBM-3740; "123456789" gives 29B1.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+
+/// How the unit started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Start {
+    /// Why.
+    pub reset: ResetCause,
+    /// The crash before it that is not in the log yet.
+    pub crash: Option<CrashCause>,
+    /// How often since power-on, this start among them.
+    pub starts: u16,
+}
 
 /// What a derived frame says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +87,8 @@ pub struct Derived {
     pub mode: Mode,
     /// Health, error identifier included.
     pub health: Health,
+    /// How the unit started; `None` in frames of version 4.
+    pub start: Option<Start>,
     /// [us] from the start of the cycle to the closing of its packet.
     pub cycle_us: u32,
     /// [us] when each sensor was sampled after `start_us`, reading order; [`NO_SLOT`] if it was not.
@@ -120,9 +144,14 @@ pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
     };
     fields.put(VERSION, 2);
     fields.put(derived.counter.into(), 4);
-    fields.put(derived.start_us, 16);
+    fields.put(derived.start_us, TIME_DIGITS);
     fields.put((derived.mode == Mode::Flight).into(), 1);
     fields.put(derived.health.0.into(), 8);
+    fields.put(derived.start.map_or(0, |start| start.reset.code()).into(), 1);
+    let crash = derived.start.and_then(|start| start.crash);
+    fields.put(crash.map_or(0, CrashCause::code).into(), 1);
+    fields.put(derived.start.map_or(0, |start| start.starts).into(), 4);
+    fields.put(0, 2);
     fields.put(u64::from(derived.cycle_us).min(NO_SLOT_CODE), 5);
     for slot_us in derived.slots_us {
         fields.put(
@@ -135,7 +164,7 @@ pub fn encode(derived: &Derived) -> [u8; DERIVED_BYTES] {
         );
     }
     fields.put(u64::from(derived.increments.covered_us).min(0xFF_FFFF), 6);
-    fields.put(derived.increments.end_us, 16);
+    fields.put(derived.increments.end_us, TIME_DIGITS);
     fields.reals(&derived.increments.angle_b);
     for channel in derived.increments.gyro {
         fields.reals(&[channel.integral_counts_s]);
@@ -206,14 +235,17 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
     }
     let mut fields = Reader { frame, at: 1 };
     let version = fields.take(2);
-    if version != VERSION {
-        return Err(DerivedError::Version(version as u8));
-    }
+    let time_digits = match version {
+        VERSION => TIME_DIGITS,
+        WITHOUT_START => 16,
+        _ => return Err(DerivedError::Version(version as u8)),
+    };
     Ok(Derived {
         counter: fields.word(),
-        start_us: fields.take(16),
+        start_us: fields.take(time_digits),
         mode: if fields.take(1) == 1 { Mode::Flight } else { Mode::Wait },
         health: Health(fields.take(8) as u32),
+        start: if version == VERSION { fields.start() } else { None },
         cycle_us: fields.take(5) as u32,
         slots_us: core::array::from_fn(|_| match fields.take(5) {
             NO_SLOT_CODE => NO_SLOT,
@@ -221,7 +253,7 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
         }),
         increments: Increments {
             covered_us: fields.take(6) as u32,
-            end_us: fields.take(16),
+            end_us: fields.take(time_digits),
             angle_b: fields.reals(),
             gyro: core::array::from_fn(|_| {
                 let [integral_counts_s] = fields.reals();
@@ -300,6 +332,14 @@ impl Reader<'_> {
 
     fn reals<const N: usize>(&mut self) -> [f32; N] {
         core::array::from_fn(|_| f32::from_bits(self.take(8) as u32))
+    }
+
+    fn start(&mut self) -> Option<Start> {
+        let reset = ResetCause::of_code(self.take(1) as u8);
+        let crash = CrashCause::of_code(self.take(1) as u8);
+        let starts = self.word();
+        self.take(2);
+        reset.map(|reset| Start { reset, crash, starts })
     }
 
     fn attitude(&mut self) -> Option<[f32; 4]> {

@@ -1,3 +1,5 @@
+extern crate std;
+
 use super::*;
 use crate::{packet, sample::NOT_READ};
 
@@ -15,6 +17,11 @@ fn derived() -> Derived {
         start_us: 86_400_000_000,
         mode: Mode::Flight,
         health: Health(0x80).with(Health::RECORDING),
+        start: Some(Start {
+            reset: ResetCause::Watchdog,
+            crash: Some(CrashCause::HardFault),
+            starts: 0x0102,
+        }),
         cycle_us: 3_700,
         slots_us,
         estimate_us: 240,
@@ -56,6 +63,35 @@ fn derived() -> Derived {
 fn a_frame_says_what_it_was_given() {
     assert_eq!(decode(&encode(&derived())), Ok(derived()));
     assert_eq!(DERIVED_BYTES, 902);
+}
+
+/// Both times had sixteen digits, and nothing was said of the start.
+#[test]
+fn a_frame_of_version_4_is_read() {
+    let frame = encode(&derived());
+    let mut older = [
+        &b"$04"[..],
+        &frame[3..7],
+        &b"0000"[..],
+        &frame[7..28],
+        &frame[36..127],
+        &b"0000"[..],
+        &frame[127..],
+    ]
+    .concat();
+    let crc = CRC.checksum(&older[1..1 + FIELD_DIGITS]);
+    older.truncate(2 + FIELD_DIGITS);
+    older.extend(std::format!("{crc:04X}\n").into_bytes());
+    let expected = Derived {
+        start: None,
+        ..derived()
+    };
+    assert_eq!(decode(&older), Ok(expected));
+    older[2] = b'2';
+    let crc = CRC.checksum(&older[1..1 + FIELD_DIGITS]);
+    older.truncate(2 + FIELD_DIGITS);
+    older.extend(std::format!("{crc:04X}\n").into_bytes());
+    assert_eq!(decode(&older), Err(DerivedError::Version(2)));
 }
 
 #[test]
