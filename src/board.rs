@@ -105,6 +105,26 @@ pub enum ResetCause {
     Pin,
 }
 
+impl ResetCause {
+    /// Every cause, in the order of their codes.
+    const ALL: [ResetCause; 4] = [
+        ResetCause::PowerOn,
+        ResetCause::Watchdog,
+        ResetCause::Software,
+        ResetCause::Pin,
+    ];
+
+    /// Its number in logs and frames, from 1.
+    pub fn code(self) -> u8 {
+        self as u8 + 1
+    }
+
+    /// The cause with this number.
+    pub fn of_code(code: u8) -> Option<Self> {
+        ResetCause::ALL.get(usize::from(code).checked_sub(1)?).copied()
+    }
+}
+
 /// What the unit's clock, and with it every time and baud rate, comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]

@@ -54,8 +54,12 @@ pub enum Command {
         /// The bytes.
         bytes: [u8; 4],
     },
-    /// Use the calibration set that was sent.
+    /// Use and keep the calibration set that was sent.
     LoadSet,
+    /// Forget the calibration set that is kept, and use the one compiled in.
+    ForgetSet,
+    /// Confirm [`Command::LoadSet`] or [`Command::ForgetSet`].
+    ConfirmSet,
     /// Read the calibration set in use.
     ReadSet,
     /// Stop the running task.
@@ -91,7 +95,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 18] = [
+pub const COMMANDS: [Entry; 20] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(b"G_MT", Command::SendPackets, "WAIT: packets to the umbilical"),
@@ -108,7 +112,17 @@ pub const COMMANDS: [Entry; 18] = [
         SET_WORD,
         "WAIT: calibration, G_CWppppbbbbbbbb (hex place, four bytes)",
     ),
-    entry(b"G_CL", Command::LoadSet, "WAIT: use the calibration sent"),
+    entry(
+        b"G_CL",
+        Command::LoadSet,
+        "WAIT: use and keep the calibration sent (then G_CK)",
+    ),
+    entry(
+        b"G_CX",
+        Command::ForgetSet,
+        "WAIT: forget the calibration kept (then G_CK)",
+    ),
+    entry(b"G_CK", Command::ConfirmSet, "WAIT: confirm G_CL or G_CX, within 10 s"),
     entry(b"G_CR", Command::ReadSet, "WAIT: read the calibration in use"),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets"),
@@ -116,7 +130,7 @@ pub const COMMANDS: [Entry; 18] = [
     entry(b"G_VE", Command::Version, "version"),
     entry(b"G_HE", Command::Help, "this list"),
     entry(b"G_DL", Command::DerivedOn, "derived frames on"),
-    entry(b"G_DD", Command::DerivedOff, "derived frames off"),
+    entry(b"G_DX", Command::DerivedOff, "derived frames off"),
     entry(b"G_AT", Command::SelfTest, "WAIT: self-test of the sensors"),
 ];
 

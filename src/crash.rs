@@ -31,6 +31,21 @@ pub enum CrashCause {
     UnhandledException,
 }
 
+impl CrashCause {
+    /// Every cause, in the order of their codes.
+    const ALL: [CrashCause; 3] = [CrashCause::Panic, CrashCause::HardFault, CrashCause::UnhandledException];
+
+    /// Its number in records and frames, from 1.
+    pub fn code(self) -> u8 {
+        self as u8 + 1
+    }
+
+    /// The cause with this number.
+    pub fn of_code(code: u8) -> Option<Self> {
+        CrashCause::ALL.get(usize::from(code).checked_sub(1)?).copied()
+    }
+}
+
 /// What is known about a crash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CrashRecord {
@@ -80,11 +95,7 @@ impl CrashRecord {
     pub fn encode(&self) -> [u8; CRASH_BYTES] {
         let mut bytes = [0; CRASH_BYTES];
         bytes[0..4].copy_from_slice(&MAGIC);
-        bytes[4] = match self.cause {
-            CrashCause::Panic => 1,
-            CrashCause::HardFault => 2,
-            CrashCause::UnhandledException => 3,
-        };
+        bytes[4] = self.cause.code();
         bytes[5] = self.place.len() as u8;
         bytes[8..12].copy_from_slice(&self.at.to_le_bytes());
         bytes[12..16].copy_from_slice(&self.lr.to_le_bytes());
@@ -104,12 +115,7 @@ impl CrashRecord {
         if bytes[0..4] != MAGIC || word(CHECKED) != CRC.checksum(&bytes[..CHECKED]) {
             return None;
         }
-        let cause = match bytes[4] {
-            1 => CrashCause::Panic,
-            2 => CrashCause::HardFault,
-            3 => CrashCause::UnhandledException,
-            _ => return None,
-        };
+        let cause = CrashCause::of_code(bytes[4])?;
         let place = core::str::from_utf8(bytes[PLACE..CHECKED].get(..bytes[5] as usize)?).ok()?;
         let uptime_us = u64::from(word(20)) | u64::from(word(24)) << 32;
         Some(CrashRecord::new(cause, word(8), word(12), word(16), uptime_us, place))

@@ -6,10 +6,15 @@
 //! FLIGHT). So nothing that matters hangs on one word: G_MV and G_ME take effect when sent twice in a row, G_MA when
 //! followed by the different G_CA, each within [`CONFIRM_WITHIN_US`]; any other word in between withdraws them.
 //!
+//! The same holds for the calibration set: G_CL (use and keep the one sent) and G_CX (forget the one kept) are armed, and
+//! take effect with the different G_CK.
+//!
 //! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
+//!
+//! After power-on the mode is WAIT until the log was heard. What it says of the time before is taken once, and not after
+//! a command or lift-off, which know better; so a log that is mounted again later changes nothing.
 
-use crate::command::Command;
-use crate::resume::Resume;
+use crate::{command::Command, flight_log::Resumed, resume::Resume};
 
 /// [us] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -33,6 +38,43 @@ impl Mode {
             Mode::Flight => "FLIGHT",
         }
     }
+}
+
+/// What changed the mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Cause {
+    /// G_MV or G_ME.
+    Command,
+    /// The lift-off line.
+    LiftOff,
+    /// The log, after a power cut.
+    Log,
+}
+
+impl Cause {
+    /// Its name on the lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cause::Command => "command",
+            Cause::LiftOff => "lift-off",
+            Cause::Log => "log, as before the power cut",
+        }
+    }
+}
+
+/// A change of mode, as it is announced and logged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Change {
+    /// [us] when, since the unit's clock started.
+    pub at_us: u64,
+    /// The mode from then on.
+    pub mode: Mode,
+    /// Whether packets are recorded from then on.
+    pub recording: bool,
+    /// What changed it.
+    pub cause: Cause,
 }
 
 /// What the umbilical is busy with in WAIT. Reading sensors and telemetry never stop and are no tasks.
@@ -104,35 +146,60 @@ pub struct State {
     pub recording: bool,
     /// Derived frames are on.
     pub derived: bool,
-    pending: Option<(Command, u64)>,
+    /// The log may know the mode from before power-on, and has not been heard yet.
+    pub awaits_log: bool,
+    pending: Option<Pending>,
     lift_off: bool,
 }
 
+/// What waits for confirmation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Pending {
+    /// What was armed.
+    armed: Command,
+    /// The command that confirms it.
+    with: Command,
+    /// [us] until when.
+    until_us: u64,
+}
+
 impl State {
-    /// The state after a start: FLIGHT and recording go on where a reset struck them.
+    /// The state after a start: what a reset struck goes on; after power-on the log is waited for.
     pub fn resumed(resume: Option<Resume>) -> Self {
-        let Resume { mode, recording, .. } = resume.unwrap_or_default();
+        let resume = resume.unwrap_or(Resume {
+            awaits_log: true,
+            ..Resume::default()
+        });
         State {
-            mode,
-            recording,
+            mode: resume.mode,
+            recording: resume.recording,
+            derived: resume.derived,
+            awaits_log: resume.awaits_log,
             ..State::default()
         }
     }
 
-    /// Takes what the recorder says of the time before a power cut, unless something is known already.
-    pub fn recovered(&mut self, flight: bool, recording: bool) {
-        if flight && self.mode == Mode::Wait {
+    /// Takes what the log says of the time before power-on, if it is the first to say something of the mode.
+    pub fn recovered(&mut self, before: Resumed) {
+        if !core::mem::take(&mut self.awaits_log) {
+            return;
+        }
+        self.derived |= before.derived;
+        if before.flight {
             self.enter(Mode::Flight);
-            self.recording = recording;
+            self.recording = before.recording;
         }
     }
 
     /// Takes a command that came at `now_us`.
     pub fn command(&mut self, command: Command, now_us: u64) -> Verdict {
-        let pending = self.pending.take().filter(|(_, until_us)| now_us <= *until_us);
-        let confirmed = pending.is_some_and(|(awaited, _)| awaited == command);
+        let pending = self.pending.take().filter(|pending| now_us <= pending.until_us);
+        let armed = pending
+            .filter(|pending| pending.with == command)
+            .map(|pending| pending.armed);
+        let confirmed = armed.is_some();
         match command {
-            Command::Flight | Command::Wait if !confirmed => self.confirm(command, now_us),
+            Command::Flight | Command::Wait if !confirmed => self.confirm(command, command, now_us),
             Command::Flight => self.enter(Mode::Flight),
             Command::Wait => self.enter(Mode::Wait),
             Command::Status | Command::Version | Command::Help => Verdict::Done(Action::Report(command)),
@@ -148,7 +215,7 @@ impl State {
                 if state.lift_off {
                     return Verdict::Refused(Refusal::LiftOff);
                 }
-                state.confirm(Command::ConfirmErase, now_us)
+                state.confirm(command, Command::ConfirmErase, now_us)
             }),
             Command::ConfirmErase => self.only_in(Mode::Wait, |state| {
                 if !confirmed {
@@ -165,9 +232,16 @@ impl State {
             }),
             Command::Stop => self.start(Task::Idle),
             Command::SelfTest => self.only_in(Mode::Wait, |_| Verdict::Done(Action::SelfTest)),
-            Command::SetWord { .. } | Command::LoadSet | Command::ReadSet => {
+            Command::SetWord { .. } | Command::ReadSet => {
                 self.only_in(Mode::Wait, |_| Verdict::Done(Action::Calibration(command)))
             }
+            Command::LoadSet | Command::ForgetSet => {
+                self.only_in(Mode::Wait, |state| state.confirm(command, Command::ConfirmSet, now_us))
+            }
+            Command::ConfirmSet => self.only_in(Mode::Wait, |_| match armed {
+                Some(armed) => Verdict::Done(Action::Calibration(armed)),
+                None => Verdict::Refused(Refusal::NothingToConfirm),
+            }),
         }
     }
 
@@ -185,6 +259,7 @@ impl State {
     }
 
     fn enter(&mut self, mode: Mode) -> Verdict {
+        self.awaits_log = false;
         if self.mode != mode {
             self.mode = mode;
             self.task = Task::Idle;
@@ -200,8 +275,9 @@ impl State {
         })
     }
 
-    fn confirm(&mut self, with: Command, now_us: u64) -> Verdict {
-        self.pending = Some((with, now_us.saturating_add(CONFIRM_WITHIN_US)));
+    fn confirm(&mut self, armed: Command, with: Command, now_us: u64) -> Verdict {
+        let until_us = now_us.saturating_add(CONFIRM_WITHIN_US);
+        self.pending = Some(Pending { armed, with, until_us });
         Verdict::Confirm(with)
     }
 

@@ -33,7 +33,6 @@ use crate::{
     crash::CrashRecord,
     estimate::{Estimator, Site},
     resume::{Resume, Starts},
-    retained::CRASH,
     sensor::{adis16265, hmc5883l, lis331hh, tca9548a::Switch},
 };
 
@@ -119,9 +118,9 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
         oscillator: parts.oscillator,
         stack_use: parts.stack_use,
     };
-    CRASH.forget(&mut parts.retained);
-    let memory = RefCell::new(parts.retained);
     let shared = Shared::new(settings, start);
+    calibration::recall(&shared, &parts.retained);
+    let memory = RefCell::new(parts.retained);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();
@@ -129,18 +128,18 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
     let link = join::join4(
         telemetry::run::<B>(&shared, &votes, parts.telemetry),
         umbilical::send::<B>(&shared, &votes, parts.umbilical_tx),
-        umbilical::listen::<B>(&shared, &votes, parts.umbilical_rx),
+        umbilical::listen::<B>(&shared, &votes, parts.umbilical_rx, &memory),
         inputs::run::<B>(&shared, &votes, parts.discretes),
     );
     let data = join::join4(
         acquire::run::<B>(&shared, &votes, &switch, &gyros, &memory),
-        gyros::run::<B>(&shared, &votes, &gyros),
-        estimate::run(&shared, &votes, &mut estimator),
-        record::run::<B>(&shared, &votes, parts.nand),
+        gyros::run::<B>(&shared, &votes, &gyros, &memory),
+        estimate::run(&shared, &votes, &mut estimator, &memory),
+        record::run::<B>(&shared, &votes, parts.nand, &memory),
     );
     let care = join::join(
         self_test::run::<B>(&shared, &switch, &gyros),
-        vote::run::<B>(&shared.clock, &votes, parts.watchdog),
+        vote::run::<B>(&shared.clock, &votes, parts.watchdog, &shared.fed_us),
     );
     shared.clock.drive(pin!(join::join3(link, data, care))).await;
     // Every part runs for ever; should one end, the vote is missing and the watchdog restarts the unit.

@@ -10,6 +10,7 @@ const WAITING: State = State {
     task: Task::Idle,
     recording: false,
     derived: false,
+    awaits_log: false,
     pending: None,
     lift_off: false,
 };
@@ -18,16 +19,19 @@ const FLYING: State = State {
     ..WAITING
 };
 
-/// The state after the bytes, and whether anything was erased.
-fn after(mut state: State, bytes: &[u8]) -> (State, bool) {
+/// The state after the bytes, whether anything was erased, and whether the calibration set was changed.
+fn after(mut state: State, bytes: &[u8]) -> (State, bool, bool) {
     let mut parser = Parser::default();
-    let mut erased = false;
+    let (mut erased, mut calibrated) = (false, false);
     for (at, byte) in bytes.iter().enumerate() {
         if let Some(Heard::Command(command)) = parser.hear(*byte, 1000 * at as u64) {
-            erased |= state.command(command, 1000 * at as u64) == Verdict::Done(Action::Erase);
+            let verdict = state.command(command, 1000 * at as u64);
+            erased |= verdict == Verdict::Done(Action::Erase);
+            let set = |command| verdict == Verdict::Done(Action::Calibration(command));
+            calibrated |= set(Command::LoadSet) || set(Command::ForgetSet);
         }
     }
-    (state, erased)
+    (state, erased, calibrated)
 }
 
 /// Every way the seven commands of App. A.3 and ours are given: the words that carry one out.
@@ -37,12 +41,12 @@ fn deeds() -> Vec<Vec<u8>> {
         Command::SetWord { .. } => b"G_CW00040000A040".to_vec(),
         _ => entry.word.to_vec(),
     });
-    once.chain([b"G_MVG_MV".to_vec(), b"G_MEG_ME".to_vec(), b"G_MAG_CA".to_vec()])
-        .collect()
+    let confirmed: [&[u8]; 5] = [b"G_MVG_MV", b"G_MEG_ME", b"G_MAG_CA", b"G_CLG_CK", b"G_CXG_CK"];
+    once.chain(confirmed.map(<[u8]>::to_vec)).collect()
 }
 
 /// Checks the `garbled` forms of every deed, and of every two deeds in a row: none erases unless G_CA was sent, none
-/// leads to a mode whose word was not sent.
+/// changes the calibration set unless G_CK was sent, none leads to a mode whose word was not sent.
 fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
     let says = |sent: &[u8], word: &[u8]| sent.windows(word.len()).any(|letters| letters == word);
     for state in [WAITING, FLYING] {
@@ -50,9 +54,10 @@ fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
             for second in [Vec::new()].into_iter().chain(deeds()) {
                 let sent = [first.as_slice(), &second].concat();
                 for bytes in garble(&sent) {
-                    let (got, erased) = after(state, &bytes);
+                    let (got, erased, calibrated) = after(state, &bytes);
                     let text = std::string::String::from_utf8_lossy(&bytes).into_owned();
                     assert!(!erased || says(&sent, b"G_CA"), "{state:?}: {text} erases");
+                    assert!(!calibrated || says(&sent, b"G_CK"), "{state:?}: {text} changes the set");
                     let word = if got.mode == Mode::Flight { b"G_MV" } else { b"G_ME" };
                     assert!(
                         got.mode == state.mode || says(&sent, word),
@@ -105,7 +110,8 @@ fn no_two_bit_error_in_one_deed_erases() {
                 let mut bytes = sent.clone();
                 bytes[first / 8] ^= 1 << (first % 8);
                 bytes[second / 8] ^= 1 << (second % 8);
-                assert!(!after(WAITING, &bytes).1, "{bytes:?}");
+                let (_, erased, calibrated) = after(WAITING, &bytes);
+                assert!(!erased && (!calibrated || sent.ends_with(b"G_CK")), "{bytes:?}");
             }
         }
     }
@@ -172,6 +178,8 @@ fn a_task_of_the_other_mode_is_refused() {
         Command::SelfTest,
         Command::SetWord { place, bytes: [0; 4] },
         Command::LoadSet,
+        Command::ForgetSet,
+        Command::ConfirmSet,
         Command::ReadSet,
     ] {
         assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
@@ -189,4 +197,112 @@ fn lift_off_starts_flight_and_recording_once() {
     state.command(Command::Wait, 1);
     assert!(!state.lift_off(true), "a line stuck asserted does not undo G_ME");
     assert_eq!((state.mode, state.recording), (Mode::Wait, false));
+}
+
+#[test]
+fn a_set_is_loaded_or_forgotten_by_a_second_different_word() {
+    let mut state = WAITING;
+    let done = |command| Verdict::Done(Action::Calibration(command));
+    assert_eq!(
+        state.command(Command::ConfirmSet, 0),
+        Verdict::Refused(Refusal::NothingToConfirm)
+    );
+    for armed in [Command::LoadSet, Command::ForgetSet] {
+        assert_eq!(state.command(armed, 0), Verdict::Confirm(Command::ConfirmSet));
+        assert_eq!(state.command(armed, 1), Verdict::Confirm(Command::ConfirmSet));
+        assert_eq!(state.command(Command::ConfirmSet, 2), done(armed));
+        assert_eq!(
+            state.command(Command::ConfirmSet, 3),
+            Verdict::Refused(Refusal::NothingToConfirm)
+        );
+    }
+    // The confirmation of one thing is not that of another.
+    state.command(Command::Erase, 4);
+    assert_eq!(
+        state.command(Command::ConfirmSet, 5),
+        Verdict::Refused(Refusal::NothingToConfirm)
+    );
+    state.command(Command::LoadSet, 6);
+    assert_eq!(
+        state.command(Command::ConfirmErase, 7),
+        Verdict::Refused(Refusal::NothingToConfirm)
+    );
+    state.command(Command::LoadSet, 8);
+    assert_eq!(
+        state.command(Command::ConfirmSet, CONFIRM_WITHIN_US + 9),
+        Verdict::Refused(Refusal::NothingToConfirm)
+    );
+}
+
+/// A wrong bit makes no word one that changes something without a confirmation.
+#[test]
+fn no_word_that_changes_the_state_at_once_is_one_bit_from_another() {
+    use crate::command::COMMANDS;
+    // The thesis' words are as they are: packets go to the umbilical or stop, recording begins in FLIGHT. Nothing is lost by it.
+    let harmless = |one: &[u8; 4], other: &[u8; 4]| {
+        matches!(
+            (one, other),
+            (b"G_MT", b"G_Mt") | (b"G_Mt", b"G_MT") | (b"G_MV", b"G_MT") | (b"G_ME", b"G_MG")
+        )
+    };
+    for one in &COMMANDS {
+        for other in &COMMANDS {
+            let wrong: u32 = (one.word.iter().zip(other.word))
+                .map(|(a, b)| (a ^ b).count_ones())
+                .sum();
+            let changes = [WAITING, FLYING].into_iter().any(|before| {
+                [false, true].into_iter().any(|derived| {
+                    let before = State { derived, ..before };
+                    let mut after = before;
+                    after.command(other.command, 0);
+                    after.pending = None;
+                    after != before
+                })
+            }) || other.command == Command::Stop;
+            assert!(
+                wrong != 1 || !changes || harmless(one.word, other.word),
+                "{:?} {:?}",
+                core::str::from_utf8(one.word),
+                core::str::from_utf8(other.word)
+            );
+        }
+    }
+}
+
+#[test]
+fn the_log_is_believed_once_and_only_before_anybody_else_has_spoken() {
+    let flying = Resumed {
+        flight: true,
+        recording: true,
+        derived: true,
+    };
+    let mut after_power_on = State::resumed(None);
+    after_power_on.recovered(flying);
+    assert_eq!(
+        (after_power_on.mode, after_power_on.recording, after_power_on.derived),
+        (Mode::Flight, true, true)
+    );
+    for now_us in [0, 1] {
+        after_power_on.command(Command::Wait, now_us);
+    }
+    after_power_on.recovered(flying);
+    assert_eq!(after_power_on.mode, Mode::Wait, "a mode that was commanded stands");
+
+    let mut commanded = State::resumed(None);
+    for now_us in [0, 1] {
+        commanded.command(Command::Wait, now_us);
+    }
+    commanded.recovered(flying);
+    assert_eq!(commanded.mode, Mode::Wait, "also where the command came before the log");
+
+    let awaiting = Resume {
+        awaits_log: true,
+        ..Resume::default()
+    };
+    let mut after_a_reset = State::resumed(Some(awaiting));
+    after_a_reset.recovered(flying);
+    assert_eq!(after_a_reset.mode, Mode::Flight, "a reset before the log was heard");
+    let mut known = State::resumed(Some(Resume::default()));
+    known.recovered(flying);
+    assert_eq!(known.mode, Mode::Wait, "retained memory knows better");
 }

@@ -66,10 +66,14 @@ pub async fn run<B: Board>(
         let started = shared.clock.until(Instant::from_millis(GYRO_START_MS));
         votes.waiting(Voter::Acquire, started).await;
     }
-    for slot in 0..SENSOR_COUNT {
-        acquisition
-            .configure(slot, acquisition.budget.limit_us(0, 0, false))
-            .await;
+    // The gyros first: what they do not see of a reset in flight is missing in the attitude.
+    for first in [true, false] {
+        let is_due = |slot: &usize| (SENSORS[*slot].kind == Kind::Gyro) == first;
+        for slot in (0..SENSOR_COUNT).filter(is_due) {
+            acquisition
+                .configure(slot, acquisition.budget.limit_us(0, 0, false))
+                .await;
+        }
     }
     let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
@@ -87,15 +91,12 @@ pub async fn run<B: Board>(
         votes.waiting(Voter::Acquire, shared.clock.until(start + close)).await;
         counter = counter.wrapping_add(1);
         shared.publish_cycle(cycle);
-        let (mode, recording) = {
-            let state = shared.state.borrow();
-            (state.mode, state.recording)
-        };
+        let state = *shared.state.borrow();
         let resume = Resume {
-            mode,
-            recording,
-            derived: false,
-            awaits_log: false,
+            mode: state.mode,
+            recording: state.recording,
+            derived: state.derived,
+            awaits_log: state.awaits_log,
             next_counter: counter,
         };
         resume.keep(&mut *memory.borrow_mut());
@@ -135,7 +136,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
         let mut reading = Reading::unread(counter);
         let mut slots_us = [NO_SLOT; SENSOR_COUNT];
         for (slot, slot_us) in slots_us.iter_mut().enumerate() {
-            let elapsed_us = (now() - start).as_micros();
+            let elapsed_us = now().saturating_duration_since(start).as_micros();
             let waiting = (SENSOR_COUNT - 1 - slot) as u64;
             let lost = self.standing[slot] == Standing::Lost;
             let limit_us = self.budget.limit_us(elapsed_us, waiting, lost);
@@ -161,7 +162,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
             packet: packet::encode(&reading),
             increments: self.shared.integrator.borrow_mut().take(),
             health: core::mem::take(&mut self.health).with(self.gyros.take_health()),
-            cycle_us: (now() - start).as_micros() as u32,
+            cycle_us: now().saturating_duration_since(start).as_micros() as u32,
         }
     }
 

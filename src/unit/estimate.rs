@@ -3,6 +3,13 @@
 //! The step holds the processor for as long as it takes. So it comes after everybody else has had the cycle: telemetry has
 //! handed its packet to the DMA, and half an interval lies between the closing of a cycle and the next fast sample. What can be
 //! done before, for the readings of the accelerometers between two cycles, is.
+//!
+//! After each step the filter is kept in retained memory, and after a reset in FLIGHT it goes on from there: in micro-gravity
+//! there is no vertical to find the attitude by. In WAIT it is found afresh, which takes a second and needs no belief in what the
+//! unit was turned through meanwhile. After a power cut in FLIGHT it goes on from the log's newest record, unless the first
+//! second of readings tells better.
+
+use core::cell::RefCell;
 
 use embassy_futures::{
     select::{Either, select},
@@ -15,17 +22,25 @@ use super::{
     vote::{Voter, Votes},
 };
 use crate::{
-    board::Oscillator,
-    derived::{Derived, Health},
+    board::{Oscillator, Retained},
+    derived::{Derived, Health, Start},
     estimate::{Estimate, Estimator},
-    mode::State,
+    kalman::{Filter, KEPT_BYTES},
+    mode::{Mode, State},
+    resume::{self, POWER_CUT, Pulse},
+    retained::ATTITUDE,
 };
 
 /// Derives for ever.
-pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator) {
+pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &RefCell<impl Retained>) {
     let Some(mut cycles) = shared.cycle_reader() else {
         return;
     };
+    let mut kept = [0; KEPT_BYTES];
+    if shared.set_loaded.take() {
+        estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
+    }
+    go_on(shared, estimator, &*memory.borrow(), &mut kept);
     loop {
         let next = select(cycles.next_message_pure(), shared.force.wait());
         let cycle = match votes.waiting(Voter::Estimate, next).await {
@@ -47,14 +62,45 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator) {
         if shared.set_loaded.take() {
             estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
         }
+        if let Some(found) = shared.attitude_found.take() {
+            estimator.go_on_from(&found, POWER_CUT);
+        }
         let began = now();
         let estimate = estimator.step(&cycle.sample, &cycle.increments);
-        let estimate_us = (now() - began).as_micros() as u32;
-        shared.publish_derived(derive(&cycle, state, health, estimate_us, estimate));
+        let estimate_us = now().saturating_duration_since(began).as_micros() as u32;
+        shared.publish_derived(derive(
+            &cycle,
+            state,
+            health,
+            shared.start.in_short(),
+            estimate_us,
+            estimate,
+        ));
+        keep(estimator, &mut *memory.borrow_mut(), &mut kept);
     }
 }
 
-fn derive(cycle: &Cycle, state: State, health: Health, estimate_us: u32, estimate: Estimate) -> Derived {
+/// Goes on from what was kept before a reset in FLIGHT.
+fn go_on(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kept: &mut [u8; KEPT_BYTES]) {
+    let start = &shared.start;
+    let was_in_flight = start.resume.is_some_and(|resume| resume.mode == Mode::Flight);
+    let found = ATTITUDE.recall(memory, kept).map(<[u8]>::len);
+    if was_in_flight && found == Some(KEPT_BYTES) {
+        let pulse = Pulse::recall(memory).unwrap_or_default();
+        let outage = resume::outage(Filter::kept_at_us(kept), start.reset, pulse, start.crash.as_ref());
+        estimator.go_on(kept, outage);
+    }
+}
+
+fn keep(estimator: &mut Estimator, memory: &mut impl Retained, kept: &mut [u8; KEPT_BYTES]) {
+    if estimator.keep(kept) {
+        ATTITUDE.keep(memory, kept);
+    } else {
+        ATTITUDE.forget(memory);
+    }
+}
+
+fn derive(cycle: &Cycle, state: State, health: Health, start: Start, estimate_us: u32, estimate: Estimate) -> Derived {
     let reading = &cycle.sample.reading;
     Derived {
         counter: reading.counter,
@@ -63,6 +109,7 @@ fn derive(cycle: &Cycle, state: State, health: Health, estimate_us: u32, estimat
         health: health
             .with(Health(reading.errors.0.into()))
             .with_if(Health::RECORDING, state.recording),
+        start: Some(start),
         cycle_us: cycle.cycle_us,
         slots_us: cycle.sample.slots_us,
         increments: cycle.increments,

@@ -4,7 +4,7 @@
 //! asked one after the other and answer in the same order: the part needs a pause between its frames, and the other
 //! three fill it.
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 
 use embassy_sync::{blocking_mutex::raw::NoopRawMutex, mutex::Mutex};
 use embassy_time::{Duration, Instant};
@@ -20,6 +20,7 @@ use crate::{
     board::Board,
     derived::Health,
     increments::Fast,
+    resume::Pulse,
     sample::NOT_READ,
     sensor::{
         Error,
@@ -154,8 +155,8 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     }
 }
 
-/// Samples fast for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>) {
+/// Samples fast for ever, and leaves in retained memory that the unit is alive: after a reset it tells when that struck.
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>, memory: &RefCell<B::Retained>) {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
     let limit = Duration::from_millis(FAST_LIMIT_MS);
     // A cycle starts on the grid of the period and asks the gyros 3 ms later. Three quarters of an interval off the grid
@@ -165,6 +166,11 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::
     loop {
         votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;
         tick += interval;
+        let pulse = Pulse {
+            at_us: now().as_micros(),
+            fed_us: shared.fed_us.get(),
+        };
+        pulse.keep(&mut *memory.borrow_mut());
         if let Ok((at, counts)) = shared.clock.within(limit, gyros.fast()).await {
             shared.integrator.borrow_mut().add(Fast {
                 at_us: at.as_micros(),

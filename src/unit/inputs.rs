@@ -10,6 +10,7 @@ use super::{
 use crate::{
     board::{Board, Discretes},
     discrete::{Debounce, POLL_US},
+    mode::Cause,
 };
 
 /// After a cycle, between two fast samples of the gyros.
@@ -23,7 +24,7 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discret
     loop {
         let levels = (lift_off.poll(lines.lift_off()), micro_g.poll(lines.micro_g()));
         shared.discretes.set(levels);
-        if shared.state.borrow_mut().lift_off(levels.0) {
+        if shared.change(Cause::LiftOff, |state| state.lift_off(levels.0)) {
             shared.say(format_args!("lift-off: FLIGHT, recording"));
         }
         votes.waiting(Voter::Inputs, shared.clock.until(poll)).await;

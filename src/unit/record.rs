@@ -2,25 +2,34 @@
 //! better done in free time.
 //!
 //! A chip that is dead, absent or full costs its records and nothing else: the reason is on the console and in the health
-//! of every derived frame, and it is tried again every [`RETRY_MS`].
+//! of every derived frame, and it is tried again every [`RETRY_MS`]. After a dip of the supply it is tried again at once, and
+//! again after twice as long each time; the newest record waits for it. So a dip costs the records of its own duration at most.
+//!
+//! What the log says of the time before power-on (mode, attitude, the calibration set it keeps) is taken once, at the first mount,
+//! and where neither retained memory nor a command knows better. A crash record is forgotten when a boot header with it is in the log.
+
+use core::cell::RefCell;
 
 use embassy_time::{Duration, Instant};
 
 use super::{
+    calibration,
     clock::now,
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
 use crate::{
-    board::Board,
+    board::{Board, Retained},
+    calibration::ENCODED_BYTES,
     derived::Health,
     estimate::Estimate,
     flight_log::{
-        FlightLog, LogError,
-        record::{self, BootHeader, Entry, Key, Name},
+        FlightLog, LogError, Resumed,
+        record::{self, BootHeader, Content, Entry, Key, Name},
     },
-    mode::{Mode, Task},
-    nand::{Nand, k9f1208::K9f1208},
+    mode::{Cause, Mode, State, Task},
+    nand::{Nand, NandError, k9f1208::K9f1208},
+    retained::{CRASH, SET},
 };
 
 /// [ms] while a dump waits for the line, how long until the next look.
@@ -32,16 +41,24 @@ const IDLE_MS: u64 = 100;
 /// [ms] until a chip that failed is tried again.
 const RETRY_MS: u64 = 2_000;
 
+/// [ms] until it is tried again after the supply failed, at first.
+const DIP_MS: u64 = 10;
+
 /// Serves the recorder for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory: &RefCell<B::Retained>) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         return;
     };
     let mut recorder = Recorder {
         shared,
+        memory,
         log: FlightLog::new(K9f1208::new(bus, &shared.clock), header(shared)),
         calibration: shared.set_name.borrow().clone(),
         retry: Some(Instant::MIN),
+        dip_ms: DIP_MS,
+        crash: shared.start.crash.is_some(),
+        missed: None,
+        set: [0; ENCODED_BYTES],
         erasing: false,
         dumped: None,
     };
@@ -58,7 +75,8 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand) {
         // A cycle comes before what is derived from it, so it is there unless this part was too late for it.
         while let Some(cycle) = cycles.try_next_message_pure() {
             if cycle.sample.start_us == frame.start_us {
-                recorder.take(&cycle, &frame.estimate).await;
+                let entry = recorder.entry(&cycle, &frame.estimate);
+                recorder.take(entry).await;
             }
         }
     }
@@ -72,22 +90,32 @@ fn header(shared: &Shared) -> BootHeader {
         unit: name(shared.settings.unit),
         calibration: shared.set_name.borrow().clone(),
         period_us: shared.settings.period_ms as u32 * 1000,
+        start: Some(shared.start.in_full()),
     }
 }
 
-struct Recorder<'a, N> {
+struct Recorder<'a, N, R> {
     shared: &'a Shared,
+    memory: &'a RefCell<R>,
     log: FlightLog<N>,
     /// The set that the log's header names.
     calibration: Name,
     /// When to mount; `None` while mounted.
     retry: Option<Instant>,
+    /// [ms] the next wait for the supply.
+    dip_ms: u64,
+    /// What the log was about to take when the supply failed.
+    missed: Option<Entry>,
+    /// A calibration set on its way from or to the chip.
+    set: [u8; ENCODED_BYTES],
     erasing: bool,
+    /// There is a crash record that the log does not have yet.
+    crash: bool,
     /// The record dumped last: the page after it repeats it.
     dumped: Option<Key>,
 }
 
-impl<N: Nand> Recorder<'_, N> {
+impl<N: Nand, R: Retained> Recorder<'_, N, R> {
     async fn mount_if_due(&mut self) {
         if self.retry.is_none_or(|due| now() < due) {
             return;
@@ -95,15 +123,74 @@ impl<N: Nand> Recorder<'_, N> {
         match self.log.mount().await {
             Ok(resumed) => {
                 self.retry = None;
-                self.shared.recorder_error.set(None);
-                self.shared.recorder_refused.set(false);
-                // Retained memory, where there is some, knows better: it is written each cycle.
-                if self.shared.start.resume.is_none() {
-                    let mut state = self.shared.state.borrow_mut();
-                    state.recovered(resumed.flight, resumed.recording);
+                // Reading goes on in a dip of the supply; whether it is over, the next record tells.
+                if self.missed.is_none() {
+                    self.forgive();
+                }
+                if self.shared.state.borrow().awaits_log {
+                    self.find_attitude(resumed.flight);
+                    let shared = self.shared;
+                    shared.change(Cause::Log, |state| state.recovered(resumed));
+                }
+                if !self.shared.set_known.get()
+                    && let Err(error) = self.find_set().await
+                {
+                    return self.fail(error);
+                }
+                if let Some(entry) = self.missed.take() {
+                    self.take(entry).await;
                 }
             }
             Err(error) => self.fail(error),
+        }
+    }
+
+    fn forgive(&mut self) {
+        self.dip_ms = DIP_MS;
+        self.shared.recorder_error.set(None);
+        self.shared.recorder_refused.set(false);
+    }
+
+    /// The attitude of the newest record, for the estimation to go on from in flight.
+    fn find_attitude(&self, flight: bool) {
+        if let Some(newest) = self.log.newest().filter(|_| flight)
+            && let Ok((_, Content::Packet(entry))) = record::decode(newest)
+            && entry.flight
+        {
+            self.shared.attitude_found.set(entry.estimate);
+        }
+    }
+
+    /// The set that the chip keeps, or the news that it keeps none: both are known over the next reset.
+    async fn find_set(&mut self) -> Result<(), LogError> {
+        let kept = self.log.kept_set(&mut self.set).await?.unwrap_or_default();
+        // A command may have ordered one meanwhile.
+        if !self.shared.set_known.replace(true) {
+            SET.keep(&mut *self.memory.borrow_mut(), kept);
+            if !kept.is_empty() {
+                calibration::take_kept(self.shared, kept);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the set that was ordered, or that none was.
+    async fn keep_set(&mut self) {
+        let set = calibration::to_keep(self.shared);
+        let content = set.as_ref().map_or(&[][..], |set| set);
+        let kept = self.log.keep_set(content, &mut self.set).await;
+        match kept {
+            Ok(()) => {
+                self.shared.set_to_keep.set(false);
+                self.shared.say(format_args!("calibration is kept in the recorder"));
+            }
+            Err(error) => {
+                // After a failure of the chip once more when it is mounted again.
+                self.shared.set_to_keep.set(matches!(error, LogError::Nand(_)));
+                self.shared
+                    .say(format_args!("calibration lasts until power-off only: {error}"));
+                self.fail(error);
+            }
         }
     }
 
@@ -113,42 +200,84 @@ impl<N: Nand> Recorder<'_, N> {
         if self.shared.recorder_error.replace(Some(error)) != Some(error) {
             self.shared.say(format_args!("recorder: {error}"));
         }
-        if matches!(error, LogError::Nand(_) | LogError::NotMounted) {
-            self.retry = Some(now() + Duration::from_millis(RETRY_MS));
+        let wait_ms = match error {
+            LogError::Nand(NandError::PowerFailing) => {
+                let wait_ms = self.dip_ms;
+                self.dip_ms = (2 * self.dip_ms).min(RETRY_MS);
+                wait_ms
+            }
+            LogError::Nand(_) | LogError::NotMounted => RETRY_MS,
+            _ => return,
+        };
+        self.retry = Some(now() + Duration::from_millis(wait_ms));
+    }
+
+    fn entry(&self, cycle: &Cycle, estimate: &Estimate) -> Entry {
+        let sample = &cycle.sample;
+        let errors = Health(sample.reading.errors.0.into());
+        Entry {
+            start_us: sample.start_us,
+            packet: cycle.packet,
+            slots_us: sample.slots_us,
+            flight: self.shared.state.borrow().mode == Mode::Flight,
+            health: cycle.health.with(errors).with(Health::RECORDING),
+            estimate: estimate.kept(),
         }
     }
 
-    async fn take(&mut self, cycle: &Cycle, estimate: &Estimate) {
-        let (flight, recording) = {
-            let state = self.shared.state.borrow();
-            (state.mode == Mode::Flight, state.recording)
-        };
+    async fn take(&mut self, entry: Entry) {
+        let state = *self.shared.state.borrow();
+        let recording = state.recording;
+        let power_failed = self.shared.recorder_error.get() == Some(LogError::Nand(NandError::PowerFailing));
         if self.retry.is_some() {
+            self.missed = Some(entry).filter(|_| power_failed && recording);
             return;
         }
-        if let Err(error) = self.log.keep_mode(flight, recording).await {
-            return self.fail(error);
+        match self.try_take(&entry, state).await {
+            Ok(()) => {
+                if recording || power_failed {
+                    self.forgive();
+                }
+                self.forget_logged_crash();
+            }
+            Err(error) => {
+                self.fail(error);
+                let power_failed = error == LogError::Nand(NandError::PowerFailing);
+                self.missed = Some(entry).filter(|_| power_failed && recording);
+            }
         }
-        if !recording {
-            return;
-        }
+    }
+
+    /// The mode, its changes since the entry before, and the entry if packets are being recorded.
+    async fn try_take(&mut self, entry: &Entry, state: State) -> Result<(), LogError> {
+        let mode = Resumed {
+            flight: state.mode == Mode::Flight,
+            recording: state.recording,
+            derived: state.derived,
+        };
+        self.log.keep_mode(mode).await?;
         if self.calibration != *self.shared.set_name.borrow() {
             self.calibration.clone_from(&self.shared.set_name.borrow());
             self.log.describe(header(self.shared));
         }
-        let sample = &cycle.sample;
-        let errors = Health(sample.reading.errors.0.into());
-        let entry = Entry {
-            start_us: sample.start_us,
-            packet: cycle.packet,
-            slots_us: sample.slots_us,
-            flight,
-            health: cycle.health.with(errors).with(Health::RECORDING),
-            estimate: estimate.kept(),
-        };
-        match self.log.append(&entry).await {
-            Ok(_) => self.shared.recorder_refused.set(false),
-            Err(error) => self.fail(error),
+        let oldest = |shared: &Shared| shared.changes.borrow().front().copied();
+        while let Some(change) = oldest(self.shared) {
+            let noted = self.log.note(&change).await;
+            if !matches!(noted, Err(LogError::Nand(_) | LogError::NotMounted)) {
+                self.shared.changes.borrow_mut().pop_front();
+            }
+            noted?;
+        }
+        if state.recording {
+            self.log.append(entry).await?;
+        }
+        Ok(())
+    }
+
+    /// A crash is forgotten when the log has it.
+    fn forget_logged_crash(&mut self) {
+        if self.log.is_begun() && core::mem::take(&mut self.crash) {
+            CRASH.forget(&mut *self.memory.borrow_mut());
         }
     }
 
@@ -168,8 +297,11 @@ impl<N: Nand> Recorder<'_, N> {
                 }
             }
         }
-        if self.retry.is_some() {
-            return IDLE_MS;
+        if let Some(due) = self.retry {
+            return due.saturating_duration_since(now()).as_millis().clamp(STEP_MS, IDLE_MS);
+        }
+        if self.shared.set_to_keep.get() {
+            self.keep_set().await;
         }
         match self.log.free_time().await {
             // An erase takes milliseconds itself, and everybody else has their turn in them.

@@ -8,20 +8,23 @@ use embassy_sync::{
     pubsub::{PubSubChannel, Subscriber},
     signal::Signal,
 };
-use heapless::String;
+use heapless::{Deque, String};
 
-use super::{Settings, clock::Clock};
+use super::{
+    Settings,
+    clock::{Clock, now},
+};
 use crate::{
     board::{Oscillator, ResetCause, StackUse},
     calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
-    derived::{DERIVED_BYTES, Derived, Health},
+    derived::{self, DERIVED_BYTES, Derived, Health},
     flight_log::{
         self, LogError,
-        record::{Name, RecordBytes},
+        record::{self, Name, RecordBytes},
     },
     increments::{Force, Increments, Integrator},
-    mode::State,
+    mode::{Cause, Change, State},
     packet::PACKET_BYTES,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
@@ -50,6 +53,9 @@ const FRAMES: usize = 2;
 /// Of both lines, 8N1.
 const LINE_BAUD: u64 = 115_200;
 const BITS_PER_BYTE: u64 = 10;
+
+/// Changes of mode that wait for a line or for the log: two commands a second apart, and lift-off.
+const CHANGES: usize = 4;
 
 type Cycles = PubSubChannel<NoopRawMutex, Cycle, CYCLES, 4, 0>;
 type DerivedFrames = PubSubChannel<NoopRawMutex, Derived, FRAMES, 3, 0>;
@@ -82,6 +88,24 @@ pub struct Start {
 }
 
 impl Start {
+    /// How it started, as derived frames have it.
+    pub fn in_short(&self) -> derived::Start {
+        derived::Start {
+            reset: self.reset,
+            crash: self.crash.as_ref().map(|crash| crash.cause),
+            starts: self.starts.since_power_on,
+        }
+    }
+
+    /// How it started, as the log has it.
+    pub fn in_full(&self) -> record::Start {
+        record::Start {
+            reset: self.reset,
+            starts: self.starts.since_power_on,
+            crash: self.crash.clone(),
+        }
+    }
+
     /// Resets since power-on, the one before this start among them.
     pub fn resets(&self) -> u16 {
         self.starts.since_power_on.saturating_sub(1)
@@ -124,6 +148,16 @@ pub struct Shared {
     pub set_name: RefCell<Name>,
     /// It was loaded and the estimation does not use it yet.
     pub set_loaded: Cell<bool>,
+    /// The set in use is known to be the one to use: it was kept over a reset, or ordered. Otherwise the recorder is asked.
+    pub set_known: Cell<bool>,
+    /// It was ordered, and the recorder is to keep it.
+    pub set_to_keep: Cell<bool>,
+    /// The attitude that the log was left with before a power cut in flight, for the estimation.
+    pub attitude_found: Cell<Option<record::Estimate>>,
+    /// [us] when the watchdog was last fed.
+    pub fed_us: Cell<u64>,
+    /// Changes of mode that are not in the log yet.
+    pub changes: RefCell<Deque<Change, CHANGES>>,
     /// The one that is being sent.
     pub arriving: RefCell<Arriving>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
@@ -132,6 +166,8 @@ pub struct Shared {
     derived: DerivedFrames,
     /// Lines for the console.
     pub replies: Channel<NoopRawMutex, Line, 8>,
+    /// Lines that go before them, and the same ones for telemetry: changes of mode.
+    pub announced: [Channel<NoopRawMutex, Line, CHANGES>; 2],
     /// Records read from the recorder for the umbilical: as many as a page holds.
     pub dumped: Channel<NoopRawMutex, Dumped, 2>,
 }
@@ -157,11 +193,17 @@ impl Shared {
             calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
             set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
             set_loaded: Cell::default(),
+            set_known: Cell::default(),
+            set_to_keep: Cell::default(),
+            attitude_found: Cell::default(),
+            fed_us: Cell::default(),
+            changes: RefCell::default(),
             arriving: RefCell::default(),
             force: Signal::new(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
             replies: Channel::new(),
+            announced: [Channel::new(), Channel::new()],
             dumped: Channel::new(),
         }
     }
@@ -196,6 +238,41 @@ impl Shared {
     /// Gives a derived frame to every reader.
     pub fn publish_derived(&self, derived: Derived) {
         self.derived.immediate_publisher().publish_immediate(derived);
+    }
+
+    /// Changes the state. A change of mode is announced on both lines and waits for the log.
+    pub fn change<T>(&self, cause: Cause, act: impl FnOnce(&mut State) -> T) -> T {
+        let (before, outcome, after) = {
+            let mut state = self.state.borrow_mut();
+            let before = state.mode;
+            let outcome = act(&mut state);
+            (before, outcome, *state)
+        };
+        if after.mode != before {
+            let text = line(format_args!("mode {}: {}", after.mode.name(), cause.name()));
+            for announced in &self.announced {
+                let _ = announced.try_send(text.clone());
+            }
+            let mut changes = self.changes.borrow_mut();
+            if changes.is_full() {
+                changes.pop_front();
+            }
+            let _ = changes.push_back(Change {
+                at_us: now().as_micros(),
+                mode: after.mode,
+                recording: after.recording,
+                cause,
+            });
+        }
+        outcome
+    }
+
+    /// Uses another set from the next cycle on.
+    pub fn use_set(&self, set: &Set, name: Name) {
+        *self.calibration.borrow_mut() = *set;
+        *self.set_name.borrow_mut() = name;
+        self.set_known.set(true);
+        self.set_loaded.set(true);
     }
 
     /// Puts a line on the console, unless eight already wait: telemetry and reading come before talking.

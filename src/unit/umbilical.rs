@@ -2,22 +2,25 @@
 //!
 //! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
 
-use embassy_futures::select::{Either4, select4};
+use core::cell::RefCell;
+
+use embassy_futures::select::{Either, Either4, select, select4};
 use embedded_io_async::Read;
 
 use super::{
     calibration,
     clock::now,
     shared::Shared,
-    telemetry::write,
+    telemetry::{say, write},
     vote::{Voter, Votes},
 };
 use crate::{
-    board::Board,
+    board::{Board, Retained},
     command::{COMMANDS, Command, Heard, Parser, word_of},
+    crash::{CrashCause, CrashRecord},
     derived,
     flight_log::{dump, record},
-    mode::{Action, Refusal, Task, Verdict},
+    mode::{Action, Cause, Refusal, Task, Verdict},
 };
 
 /// Sends for ever.
@@ -28,7 +31,9 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
     if let Some(crash) = &shared.start.crash {
         shared.say(format_args!(
             "crash before this start: {:?} at {} {}",
-            crash.cause, crash.at, crash.place
+            crash.cause,
+            At(crash),
+            crash.place
         ));
     }
     shared.say(format_args!(
@@ -43,14 +48,17 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
             cycles.next_message_pure(),
             frames.next_message_pure(),
         );
-        let next = votes.waiting(Voter::UmbilicalSend, next).await;
+        let next = select(shared.announced[1].receive(), next);
+        let next = match votes.waiting(Voter::UmbilicalSend, next).await {
+            Either::First(text) => {
+                say(&shared.clock, &mut line, &text).await;
+                continue;
+            }
+            Either::Second(next) => next,
+        };
         let sending = shared.state.borrow().task == Task::SendPackets;
         match next {
-            Either4::First(reply) => {
-                write(&shared.clock, &mut line, b">").await;
-                write(&shared.clock, &mut line, reply.as_bytes()).await;
-                write(&shared.clock, &mut line, b"\r\n").await;
-            }
+            Either4::First(reply) => say(&shared.clock, &mut line, &reply).await,
             Either4::Second((page, record)) => {
                 if let Some(packet) = record::packet(&record) {
                     write(&shared.clock, &mut line, packet).await;
@@ -67,7 +75,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
 }
 
 /// Listens for ever.
-pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx) {
+pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx, memory: &RefCell<B::Retained>) {
     let mut parser = Parser::default();
     let mut lost = 0_u32;
     let mut bytes = [0; 32];
@@ -82,14 +90,16 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
         for byte in heard {
             if let Some(heard) = parser.hear(*byte, now().as_micros()) {
                 // An answer of many lines waits for room behind a transmitter that may be stuck.
-                votes.waiting(Voter::UmbilicalListen, answer(shared, heard)).await;
+                votes
+                    .waiting(Voter::UmbilicalListen, answer(shared, memory, heard))
+                    .await;
             }
         }
         shared.umbilical_noise.set(parser.passed_over.saturating_add(lost));
     }
 }
 
-async fn answer(shared: &Shared, heard: Heard) {
+async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) {
     let command = match heard {
         Heard::Command(command) => command,
         Heard::Unknown(word) => {
@@ -102,8 +112,13 @@ async fn answer(shared: &Shared, heard: Heard) {
             ));
         }
     };
-    let verdict = shared.state.borrow_mut().command(command, now().as_micros());
+    let verdict = shared.change(Cause::Command, |state| state.command(command, now().as_micros()));
     let word = Printable(word_of(command));
+    if let (Verdict::Confirm(_), Command::LoadSet) = (verdict, command)
+        && let Err(why) = calibration::sent(shared)
+    {
+        return shared.say(format_args!("G_CL no: {why}"));
+    }
     match verdict {
         Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
         Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
@@ -123,7 +138,7 @@ async fn answer(shared: &Shared, heard: Heard) {
                 "{word} ok: sixteen sensors, about 5 s; keep the unit still"
             ));
         }
-        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, command).await,
+        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, memory, command).await,
         Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
@@ -187,10 +202,21 @@ fn status(shared: &Shared) {
         },
     }
     shared.say(format_args!(
-        "G_ST started {:?} resets {resets} up {} s",
+        "G_ST started {:?} resets {resets} up {} s, starts without a minute of health {}",
         shared.start.reset,
-        now().as_secs()
+        now().as_secs(),
+        shared.start.starts.without_health
     ));
+    if let Some(crash) = &shared.start.crash {
+        shared.say(format_args!(
+            "G_ST crash {:?} at {} {} lr {:08X} after {} ms",
+            crash.cause,
+            At(crash),
+            crash.place,
+            crash.lr,
+            crash.uptime_us / 1000
+        ));
+    }
     let stack = (shared.start.stack_use)();
     shared.say(format_args!(
         "G_ST clock {} stack {} of {} bytes",
@@ -198,6 +224,18 @@ fn status(shared: &Shared) {
         stack.used,
         stack.size
     ));
+}
+
+/// Where a crash was: the line of a panic, the program counter of a fault.
+struct At<'a>(&'a CrashRecord);
+
+impl core::fmt::Display for At<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.0.cause {
+            CrashCause::Panic => write!(f, "{}", self.0.at),
+            _ => write!(f, "{:08X}", self.0.at),
+        }
+    }
 }
 
 /// Letters as they came; what a terminal might take for a command is a dot.

@@ -14,7 +14,7 @@ use core::{
 use embassy_time::Duration;
 use pin_project_lite::pin_project;
 
-use super::clock::{Clock, next_on_grid};
+use super::clock::{Clock, next_on_grid, now};
 use crate::board::{Board, Watchdog};
 
 /// A part of the unit.
@@ -82,7 +82,8 @@ impl<F: Future> Future for Waiting<'_, F> {
 /// Feeds the watchdog while every part is alive.
 ///
 /// The question needs no wake of its own: this part's alarm polls the whole unit, and with it every part that waits.
-pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog) {
+/// `fed_us` is when that last was.
+pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog, fed_us: &Cell<u64>) {
     let interval = Duration::from_millis(ASK_MS);
     let mut ask = next_on_grid(interval, PHASE);
     loop {
@@ -91,6 +92,7 @@ pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchd
         if votes.answered.get() == ALL {
             votes.answered.set(0);
             watchdog.feed();
+            fed_us.set(now().as_micros());
         }
     }
 }
