@@ -82,7 +82,9 @@ pub struct Flown {
     pub packets: Vec<(Nanos, Reading)>,
     /// Derived frames on the telemetry line.
     pub derived: Vec<Derived>,
-    /// Telemetry writes that are neither: there must be none.
+    /// Lines on the telemetry line.
+    pub announced: String,
+    /// Telemetry writes that are none of these: there must be none.
     pub strange: Vec<Vec<u8>>,
     /// Everything the umbilical said.
     pub umbilical: Vec<u8>,
@@ -129,6 +131,8 @@ impl Bench for Flown {
             (bytes.first(), bytes.len(), derived::decode(bytes))
         {
             self.derived.push(derived);
+        } else if bytes.is_ascii() && (bytes == b">" || bytes == b"\r\n" || self.announced.ends_with('>')) {
+            self.announced.push_str(&String::from_utf8_lossy(bytes));
         } else {
             self.strange.push(bytes.to_vec());
         }

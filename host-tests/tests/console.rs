@@ -78,10 +78,10 @@ fn a_flight_is_recorded_dumped_and_erased() {
         "{:?}",
         flown.replies()
     );
-    // Pages 2 and 3 of the range hold records, page 1 repeats nothing: no boot came before.
-    assert_eq!(packets_in(&flown), 10 + 3, "{:?}", flown.replies());
+    // Of pages 2 to 4 the first holds the change to FLIGHT, the others records; page 1 repeats nothing: no boot came before.
+    assert_eq!(packets_in(&flown), 10 + 2, "{:?}", flown.replies());
     assert!(
-        flown.replied("G_CA ok: erasing 12 pages") && flown.replied("recorder 0 of"),
+        flown.replied("G_CA ok: erasing 14 pages") && flown.replied("recorder 0 of"),
         "{:?}",
         flown.replies()
     );
@@ -133,7 +133,11 @@ fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
     own.identity.set = 5;
     own.gyro[2].bias_counts = -12.5;
     let sent = set_words(&own);
-    let good = still().say(S, &sent).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
+    let good = still()
+        .say(S, &sent)
+        .say(3 * S, b"G_CLG_CK")
+        .say(4 * S, b"G_CR")
+        .fly(6 * S);
     assert!(good.replied("G_CL ok: set 5 of unit 7"), "{:?}", good.replies());
     assert_eq!(read_back(&good), own.encode());
     assert_eq!(good.second(5).len(), 5, "packets go on");
@@ -144,14 +148,18 @@ fn a_calibration_set_is_loaded_only_whole_and_sound_and_in_wait() {
         (&sent[16..], "G_CL no: 1 words missing, the first at 0000"),
         (&spoilt[..], "G_CL no: checksum"),
     ] {
-        let flown = still().say(S, words).say(3 * S, b"G_CL").say(4 * S, b"G_CR").fly(6 * S);
+        let flown = still()
+            .say(S, words)
+            .say(3 * S, b"G_CLG_CK")
+            .say(4 * S, b"G_CR")
+            .fly(6 * S);
         assert!(flown.replied(why), "{why}: {:?}", flown.replies());
         assert_eq!(read_back(&flown), nominal.encode(), "{why}");
     }
 
     let mut foreign = own;
     foreign.identity.unit = 9;
-    let foreign = [&sent[..], b"G_CL", &set_words(&foreign)[..], b"G_CL"].concat();
+    let foreign = [&sent[..], b"G_CLG_CK", &set_words(&foreign)[..], b"G_CLG_CK"].concat();
     let numbered = still().say(S, &foreign).say(6 * S, b"G_CR").fly(8 * S);
     let why = "G_CL no: of unit 9, this is unit 7";
     assert!(numbered.replied(why), "{:?}", numbered.replies());

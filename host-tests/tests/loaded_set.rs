@@ -67,7 +67,7 @@ fn differing(flown: &Flown, sets: &[(u16, Set)]) -> Vec<u16> {
 #[test]
 fn a_loaded_set_makes_the_estimate_from_the_next_cycle_on_and_replays() {
     let sent = set_words(&other());
-    let flown = flight().say(4 * S, &sent).say(8 * S, b"G_CL").fly(30 * S);
+    let flown = flight().say(4 * S, &sent).say(8 * S, b"G_CLG_CK").fly(30 * S);
     assert!(flown.replied("G_CL ok: set 5"), "{:?}", flown.replies());
     let first = differing(&flown, &[])[0];
     // 8 s after power-on, the first cycle some 0.4 s after it.
@@ -88,7 +88,7 @@ fn a_loaded_set_makes_the_estimate_from_the_next_cycle_on_and_replays() {
 fn a_refused_set_changes_no_bit_of_the_estimate() {
     let mut spoilt = set_words(&other());
     spoilt[16 * 40 + 10] ^= 1;
-    let flown = flight().say(4 * S, &spoilt).say(8 * S, b"G_CL").fly(15 * S);
+    let flown = flight().say(4 * S, &spoilt).say(8 * S, b"G_CLG_CK").fly(15 * S);
     assert!(flown.replied("G_CL no: checksum"), "{:?}", flown.replies());
     assert_eq!(differing(&flown, &[]), []);
 }
@@ -116,11 +116,11 @@ fn the_log_names_the_set_it_was_recorded_with() {
     let name = format!("5:{:08X}", other().checksum());
     let words = set_words(&other());
     let recorded = |flight: Flight, at: u64| flight.say(at * S, b"G_MVG_MV").say((at + 1) * S, b"G_MG");
-    let before = recorded(flight().say(2 * S, &words).say(6 * S, b"G_CL"), 7).fly(12 * S);
+    let before = recorded(flight().say(2 * S, &words).say(6 * S, b"G_CLG_CK"), 7).fly(12 * S);
     assert_eq!(named(before), std::slice::from_ref(&name));
     let between = recorded(flight(), 2)
         .say(6 * S, b"G_MEG_ME")
         .say(7 * S, &words)
-        .say(11 * S, b"G_CL");
+        .say(11 * S, b"G_CLG_CK");
     assert_eq!(named(recorded(between, 12).fly(18 * S)), [String::new(), name]);
 }

@@ -11,7 +11,7 @@ use host_tests::recorder::{Flown, WEARS, campaign, draws};
 use twin::part::nand::{Cells, TEARS, Tear};
 
 /// Blocks of the chip of a short flight: four for the superblock, room for a block each boot and the records.
-const BLOCKS: u16 = 14;
+const BLOCKS: u16 = 18;
 
 /// Records of a short flight: four blocks and a half.
 const RECORDS: u32 = 150;

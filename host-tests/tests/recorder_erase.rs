@@ -14,7 +14,7 @@ use emems::flight_log::{
 use host_tests::recorder::{Flown, Tally, campaign, log, three_boots};
 use twin::part::nand::{Cells, TEARS, Tear};
 
-const BLOCKS: u16 = 20;
+const BLOCKS: u16 = 24;
 
 /// Operations of an erase: the superblock's erase and two pages, sixteen blocks; and a margin of runs without a cut.
 const OPERATIONS: u64 = 3 + 16 + MARGIN;

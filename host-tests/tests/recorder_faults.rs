@@ -33,7 +33,7 @@ use emems::{
 use host_tests::recorder::{Flown, campaign, entry, log, nothing_lost, read_all, three_boots};
 use twin::part::nand::{Break, Cells, Tear, Wear};
 
-const BLOCKS: u16 = 20;
+const BLOCKS: u16 = 24;
 
 /// F3: the torn page of an unacknowledged record reads one way now and another way then.
 #[test]

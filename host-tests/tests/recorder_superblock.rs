@@ -12,7 +12,7 @@ use emems::{
 use host_tests::recorder::{entry, log, nothing_lost, three_boots};
 use twin::part::nand::Cells;
 
-const BLOCKS: u16 = 20;
+const BLOCKS: u16 = 24;
 
 /// [ns] what a mount may take of the time of a chip of full size; these are smaller.
 const MOUNT_WORST: u64 = 100_000_000;

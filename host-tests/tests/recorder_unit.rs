@@ -229,7 +229,7 @@ fn at_50_hz_every_packet_is_recorded_and_the_room_left_is_said() {
     let flown = flight.say(4 * S, b"G_ST").fly(6 * S);
     check_no_gap_but_at(&flown, &[]);
     assert!(logged(flown.nand.clone().expect("a chip")).len() >= 190);
-    assert!(flown.replied("of 130944 pages, 0 bad blocks"), "{:?}", flown.replies());
+    assert!(flown.replied("of 130816 pages, 0 bad blocks"), "{:?}", flown.replies());
     assert!(flown.replied("43 min left"), "{:?}", flown.replies());
 }
 

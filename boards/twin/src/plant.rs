@@ -195,7 +195,7 @@ impl Plant {
                 self.gyro.iter_mut().for_each(|gyro| gyro.power_on(now));
             }
             Fault::Stretching(slot, duration) => self.stretch(slot, duration),
-            Fault::DmaHung | Fault::Busy(_) | Fault::Reset => {}
+            Fault::DmaHung | Fault::Busy(_) | Fault::Panic | Fault::Reset => {}
         }
     }
 

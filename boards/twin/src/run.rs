@@ -59,6 +59,8 @@ pub enum Fault {
     DmaHung,
     /// The processor is kept from the unit for so long [ns], as by a storm of interrupts. Host board only.
     Busy(Nanos),
+    /// The firmware panics: it leaves a crash record and resets itself. Host board only.
+    Panic,
     /// The reset pin.
     Reset,
 }

@@ -2,8 +2,10 @@
 
 use std::{cell::RefCell, pin::pin, rc::Rc};
 
+use embassy_time::Instant;
 use emems::{
     board::ResetCause,
+    crash::{CrashCause, CrashRecord},
     unit::{self, Settings},
 };
 
@@ -78,6 +80,12 @@ pub fn fly_around(
             while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
                 match faults.pop().map(|scheduled| scheduled.fault) {
                     Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(Fault::Panic) => {
+                        let uptime_us = Instant::now().as_micros();
+                        let crash = CrashRecord::new(CrashCause::Panic, 123, 0, 0, uptime_us, "src/unit/twin.rs");
+                        crash.keep(&mut ends.kept.clone());
+                        struck = Some(ResetCause::Software);
+                    }
                     Some(Fault::DmaHung) => ends.dma_hung.set(true),
                     Some(Fault::Busy(duration)) => clock::spend(duration),
                     Some(cut @ Fault::PowerCut(_)) => {
