@@ -82,6 +82,8 @@ pub fn derived_header() -> String {
         }
     }
     header.push_str(ESTIMATE_HEADER);
+    // How the unit started; empty in frames that do not say it.
+    header.push_str(",reset,starts,crash");
     header
 }
 
@@ -128,6 +130,14 @@ pub fn derived_row(derived: &Derived) -> String {
         push_force(&mut row, force);
     }
     push_estimate(&mut row, derived);
+    match derived.start {
+        Some(start) => push(&mut row, format_args!(",{:?},{}", start.reset, start.starts)),
+        None => row.push_str(",,"),
+    }
+    row.push(',');
+    if let Some(crash) = derived.start.and_then(|start| start.crash) {
+        push(&mut row, format_args!("{crash:?}"));
+    }
     row
 }
 
@@ -187,7 +197,9 @@ fn push(row: &mut String, text: std::fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use emems::{
-        derived::Health,
+        board::ResetCause,
+        crash::CrashCause,
+        derived::{Health, Start},
         estimate::Estimate,
         increments::{Channel, Increments, SLICES, Slice},
         mode::Mode,
@@ -244,6 +256,7 @@ mod tests {
             start_us: 200_000,
             mode: Mode::Wait,
             health: Health(0x80),
+            start: None,
             cycle_us: 3_700,
             slots_us: [NO_SLOT; 16],
             increments: Increments {
@@ -268,5 +281,16 @@ mod tests {
         check(si_header(), si_row(0.0, &golden()));
         check(derived_header(), derived_row(&derived));
         assert!(derived_row(&derived).starts_with("1,200000,WAIT,00000080,3700,,,"));
+        assert!(derived_row(&derived).ends_with(",,,"));
+        let crashed = Derived {
+            start: Some(Start {
+                reset: ResetCause::Software,
+                crash: Some(CrashCause::Panic),
+                starts: 2,
+            }),
+            ..derived
+        };
+        check(derived_header(), derived_row(&crashed));
+        assert!(derived_row(&crashed).ends_with(",Software,2,Panic"));
     }
 }

@@ -211,6 +211,7 @@ mod tests {
             start_us: 1_000_000 + 200_000 * u64::from(counter),
             mode: emems::mode::Mode::Wait,
             health: Health::default(),
+            start: None,
             cycle_us: 5_000,
             slots_us: [NO_SLOT; SENSOR_COUNT],
             increments: Increments {

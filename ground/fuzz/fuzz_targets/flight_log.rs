@@ -21,7 +21,7 @@ use emems::{
 use libfuzzer_sys::fuzz_target;
 use twin::part::nand::Cells;
 
-const BLOCKS: u16 = 12;
+const BLOCKS: u16 = 16;
 const PAGES: usize = BLOCKS as usize * PAGES_PER_BLOCK as usize;
 /// Page, column, kind, four bytes.
 const EDIT_BYTES: usize = 8;

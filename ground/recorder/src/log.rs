@@ -14,6 +14,7 @@ use emems::{
         record::{self, BootHeader, Content, Entry, Key, RecordBytes, RecordError},
         superblock,
     },
+    mode::Change,
     nand::{MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes},
     packet::PACKET_BYTES,
 };
@@ -28,6 +29,8 @@ pub struct Log {
     pub packets: BTreeMap<Key, Entry>,
     /// Boot headers.
     pub headers: BTreeMap<Key, BootHeader>,
+    /// Changes of mode.
+    pub changes: BTreeMap<Key, Change>,
     /// The epoch of the newest superblock: older ones were erased by command.
     pub epoch: Option<u16>,
     /// How good the medium was.
@@ -125,8 +128,8 @@ fn read_image(image: &[u8]) -> Result<Log, LogError> {
                 }
                 Err(superblock::SuperblockError::Newer(version)) => return Err(LogError::Newer(version)),
                 Err(superblock::SuperblockError::Damaged) => {
-                    let of_superblock = matches!(stamp, Stamp::Ours(tag) if tag.kind == Kind::Superblock);
-                    log.damage.lost += u64::from(!log.take(bytes) && !of_superblock);
+                    let of_records = !matches!(stamp, Stamp::Ours(tag) if tag.kind != Kind::Log);
+                    log.damage.lost += u64::from(!log.take(bytes) && of_records);
                 }
             }
         }
@@ -170,6 +173,11 @@ impl Log {
                     self.damage.conflicts.insert(key);
                 }
             }
+            Ok((key, Content::Change(change))) => {
+                if *self.changes.entry(key).or_insert(change) != change {
+                    self.damage.conflicts.insert(key);
+                }
+            }
             Err(RecordError::Newer(version)) => {
                 self.damage.newer.insert(version);
             }
@@ -203,8 +211,9 @@ impl Log {
                 // A boot that was erased over begins where it was.
                 None => self.first_of_boot(*key),
             };
-            // A header stands among the records where a log was opened again.
-            let missing = (expected..key.seq).filter(|seq| !self.headers.contains_key(&Key { seq: *seq, ..*key }));
+            // A header stands among the records where a log was opened again, and so does a change of mode.
+            let is_other = |key| self.headers.contains_key(&key) || self.changes.contains_key(&key);
+            let missing = (expected..key.seq).filter(|seq| !is_other(Key { seq: *seq, ..*key }));
             let (mut missing, first) = (missing.clone(), missing.into_iter().next());
             if let Some(first) = first {
                 gaps.push(Gap {

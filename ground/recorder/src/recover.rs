@@ -9,6 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use emems::{board::ResetCause, crash::CrashCause, flight_log::record::Start};
+
 use crate::{
     log::{self, LIMIT, Log, LogError},
     parquet, table,
@@ -125,6 +127,20 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
             f64::from(header.period_us) * 1e-3,
             header.opened_us as f64 * 1e-6
         )?;
+        if let Some(start) = &header.start {
+            writeln!(remarks, "  {}", started(start))?;
+        }
+    }
+    for (key, change) in &log.changes {
+        writeln!(
+            remarks,
+            "epoch {} boot {}: mode {} at {:.3} s by {}",
+            key.epoch,
+            key.boot,
+            change.mode.name(),
+            change.at_us as f64 * 1e-6,
+            change.cause.name()
+        )?;
     }
     let gaps = log.gaps();
     for gap in gaps.iter().take(GAPS_LISTED) {
@@ -167,6 +183,28 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
     remarks.flush()
 }
 
+/// How a unit started, in words.
+fn started(start: &Start) -> String {
+    let reset = match start.reset {
+        ResetCause::PowerOn => "power-on",
+        ResetCause::Watchdog => "the watchdog",
+        ResetCause::Software => "the firmware",
+        ResetCause::Pin => "the reset pin",
+    };
+    let crash = start.crash.as_ref().map_or(String::new(), |crash| {
+        let at = match crash.cause {
+            CrashCause::Panic => format!("panic at line {} of ..{}", crash.at, crash.place),
+            CrashCause::HardFault => format!(
+                "hard fault at {:08X}, lr {:08X}, CFSR {:08X}",
+                crash.at, crash.lr, crash.cfsr
+            ),
+            CrashCause::UnhandledException => format!("exception {} without a handler", crash.at as i32),
+        };
+        format!("; crash before it: {at}, after {:.3} s", crash.uptime_us as f64 * 1e-6)
+    });
+    format!("started by {reset}, start {} since power-on{crash}", start.starts)
+}
+
 fn or_none(name: &str) -> &str {
     if name.is_empty() { "none" } else { name }
 }
@@ -176,6 +214,53 @@ mod tests {
     use std::time::Instant;
 
     use super::*;
+
+    #[test]
+    fn what_a_unit_says_of_its_start_and_its_modes_is_told() {
+        use emems::{
+            crash::CrashRecord,
+            flight_log::record::{BootHeader, Key},
+            mode::{Cause, Change, Mode},
+        };
+        let mut log = Log::default();
+        let start = Start {
+            reset: ResetCause::Software,
+            starts: 3,
+            crash: Some(CrashRecord::new(
+                CrashCause::Panic,
+                123,
+                0,
+                0,
+                90_500_000,
+                "unit/acquire.rs",
+            )),
+        };
+        let header = BootHeader {
+            start: Some(start),
+            ..BootHeader::default()
+        };
+        log.headers.insert(Key::default(), header);
+        let change = Change {
+            at_us: 2_000_000,
+            mode: Mode::Flight,
+            recording: true,
+            cause: Cause::LiftOff,
+        };
+        log.changes.insert(
+            Key {
+                seq: 1,
+                ..Key::default()
+            },
+            change,
+        );
+        let mut remarks = Vec::new();
+        write_remarks(&log, false, &mut remarks).expect("written");
+        let remarks = String::from_utf8(remarks).expect("text");
+        let started = "started by the firmware, start 3 since power-on; crash before it: panic at line 123 of ..unit/acquire.rs, \
+                       after 90.500 s";
+        assert!(remarks.contains(started), "{remarks}");
+        assert!(remarks.contains("mode FLIGHT at 2.000 s by lift-off"), "{remarks}");
+    }
 
     #[test]
     fn a_file_larger_than_a_chip_is_refused_unread() {

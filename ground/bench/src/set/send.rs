@@ -1,7 +1,7 @@
 //! A set over the umbilical: sent, used, read back.
 //!
 //! In: a line to the unit and the bytes the unit carries. Out: what the unit says of the set it now uses, which was read
-//! back and is the same. Words of four bytes (`G_CW`), an order to use them (`G_CL`) and to read (`G_CR`). Lost and
+//! back and is the same. Words of four bytes (`G_CW`), an order to use and keep them (`G_CL`, confirmed by `G_CK`) and to read (`G_CR`). Lost and
 //! damaged words are sent again, the whole at most [`TRIES`] times; packets and other lines in between are passed over.
 //!
 //! Refuses what the unit refuses, in its words; a silent line; a set that reads back differently.
@@ -72,7 +72,14 @@ fn load<L: Read + Write>(line: &mut L, set: &[u8; ENCODED_BYTES]) -> Result<Stri
             write!(line, "G_CW{place:04X}{:08X}", u32::from_be_bytes(*bytes))?;
         }
         line.write_all(word_of(Command::LoadSet))?;
-        said = replies(line, |reply| reply.starts_with("G_CL ").then(|| reply.to_owned()))?;
+        said = replies(line, |reply| reply.starts_with("G_CL").then(|| reply.to_owned()))?;
+        if said.as_ref().is_some_and(|reply| reply.starts_with("G_CL: send ")) {
+            line.write_all(word_of(Command::ConfirmSet))?;
+            said = replies(line, |reply| {
+                let answers = reply.starts_with("G_CL ") || reply.starts_with("G_CK ");
+                answers.then(|| reply.to_owned())
+            })?;
+        }
         match &said {
             Some(reply) if reply.starts_with("G_CL ok") => return Ok(reply.clone()),
             // Damaged on the way: once more.

@@ -125,6 +125,7 @@ fn derived_frame() -> [u8; DERIVED_BYTES] {
         start_us: 200_000,
         mode: Mode::Flight,
         health: derived::Health(0),
+        start: None,
         cycle_us: 3_700,
         slots_us: std::array::from_fn(|slot| 225 * slot as u32),
         increments: Increments {

@@ -10,7 +10,7 @@ use twin::part::nand::{Cells, Tear};
 
 use super::*;
 
-const BLOCKS: u16 = 12;
+const BLOCKS: u16 = 16;
 
 fn entry(counter: u16) -> Entry {
     Entry {

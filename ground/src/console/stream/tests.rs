@@ -26,6 +26,7 @@ fn derived() -> Derived {
         start_us: 200_000,
         mode: Mode::Flight,
         health: derived::Health(0),
+        start: None,
         cycle_us: 8000,
         slots_us: [NO_SLOT; SENSOR_COUNT],
         increments: Integrator::new(1.0).take(),

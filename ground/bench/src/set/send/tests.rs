@@ -80,6 +80,10 @@ impl Unit {
                     self.say(&format!("G_CR {:04X} {hex}", 8 * line));
                 }
             }
+            Verdict::Confirm(_) => match self.arriving.set(ranges(), self.set.identity.unit) {
+                Ok(_) => self.say("G_CL: send G_CK within 10 s"),
+                Err(why) => self.say(&format!("G_CL no: {why}")),
+            },
             _ if command == Command::LoadSet => self.say("G_CL no: only in WAIT"),
             _ => {}
         }
