@@ -64,7 +64,7 @@ fn f10_marked_blocks_are_neither_written_nor_erased_and_their_marks_stay() {
     assert_eq!(status.bad_blocks, 80);
     assert_eq!(
         status.capacity,
-        (4096 - 4 - 79) * 32,
+        (4096 - 4 - 4 - 79) * 32,
         "79 of the 80 are in the log's part"
     );
     nothing_lost(flown);
