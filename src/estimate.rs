@@ -186,13 +186,13 @@ impl Estimator {
 
     /// Goes on, after a reset, from what was kept of the filter.
     #[inline(never)]
-    pub fn go_on(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
-        self.filter.go_on(bytes, outage);
+    pub fn resume(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
+        self.filter.resume(bytes, outage);
     }
 
     /// Goes on, after a power cut, from the newest record, unless there is an attitude, or the first window finds one.
     #[inline(never)]
-    pub fn go_on_from(&mut self, kept: &record::Estimate, outage: Outage) {
+    pub fn resume_near(&mut self, kept: &record::Estimate, outage: Outage) {
         let Some(q_nb) = attitude::from_parts(kept.q_nb).filter(|_| !self.filter.aligned) else {
             return;
         };
@@ -200,7 +200,7 @@ impl Estimator {
         let dcm = dcm_bn(&q_nb).transpose();
         let covariance_n = dcm * Matrix3::from_diagonal(&Vector3::new(x * x, y * y, z * z)) * dcm.transpose();
         let bias = (Vector3::from(kept.bias_b), [bias_x, bias_y, bias_z]);
-        self.filter.go_on_from(q_nb, covariance_n, bias, outage);
+        self.filter.resume_near(q_nb, covariance_n, bias, outage);
     }
 
     /// The filter as it stands.

@@ -34,7 +34,7 @@ fn kept(chip: &mut Cells) -> Option<Vec<u8>> {
     block_on(async {
         log.mount().await.expect("mounts");
         let mut buffer = [0; LONGEST];
-        log.kept_set(&mut buffer).await.expect("reads").map(<[u8]>::to_vec)
+        log.kept_set(&mut buffer).expect("reads").map(<[u8]>::to_vec)
     })
 }
 

@@ -80,7 +80,7 @@ impl Filter {
     }
 
     /// Goes on from what was kept once the gyros are heard. The filter is one that knows nothing yet.
-    pub fn go_on(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
+    pub fn resume(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
         let mut numbers = bytes[8..].as_chunks::<4>().0.iter();
         let mut next = |number: &mut f32| {
             if let Some(bytes) = numbers.next() {
@@ -103,7 +103,7 @@ impl Filter {
 
     /// Goes on from an attitude with covariance \[rad^2\] in n and a bias with deviations \[rad/s\] in b, unless the first window
     /// finds a better one. The filter is one that knows nothing yet.
-    pub fn go_on_from(
+    pub fn resume_near(
         &mut self,
         q_nb: UnitQuaternion<f32>,
         covariance_n: Matrix3<f32>,

@@ -63,7 +63,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
         }
         if let Some(found) = shared.attitude_found.take() {
-            estimator.go_on_from(&found, POWER_CUT);
+            estimator.resume_near(&found, POWER_CUT);
         }
         let began = now();
         let estimate = estimator.step(&cycle.sample, &cycle.increments);
@@ -88,7 +88,7 @@ fn go_on(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kep
     if was_in_flight && found == Some(KEPT_BYTES) {
         let pulse = Pulse::recall(memory).unwrap_or_default();
         let outage = resume::outage(Filter::kept_at_us(kept), start.reset, pulse, start.crash.as_ref());
-        estimator.go_on(kept, outage);
+        estimator.resume(kept, outage);
     }
 }
 

@@ -133,7 +133,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
                     shared.change(Cause::Log, |state| state.recovered(resumed));
                 }
                 if !self.shared.set_known.get()
-                    && let Err(error) = self.find_set().await
+                    && let Err(error) = self.find_set()
                 {
                     return self.fail(error);
                 }
@@ -162,8 +162,8 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
     }
 
     /// The set that the chip keeps, or the news that it keeps none: both are known over the next reset.
-    async fn find_set(&mut self) -> Result<(), LogError> {
-        let kept = self.log.kept_set(&mut self.set).await?.unwrap_or_default();
+    fn find_set(&mut self) -> Result<(), LogError> {
+        let kept = self.log.kept_set(&mut self.set)?.unwrap_or_default();
         // A command may have ordered one meanwhile.
         if !self.shared.set_known.replace(true) {
             SET.keep(&mut *self.memory.borrow_mut(), kept);
