@@ -373,6 +373,9 @@ mod tests {
             file("t_s,qw,qx,qy,qz", |k| format!("{},1,0,0,0", 5 - k as i32)),
             "line 3: time does not go on",
         );
-        check(file("t,qw,qx,qy,qz", |k| format!("{},1,0,0,0", 5 * k)), "steps of time");
+        check(
+            file("t,qw,qx,qy,qz", |k| format!("{},1,0,0,0", 0.5 * k as f64)),
+            "steps of time",
+        );
     }
 }
