@@ -7,7 +7,12 @@
 //! Nominal means datasheet scale, no calibration: what the unit measured is in counts, and only a calibration file
 //! says what a count was worth.
 
-use emems::sample::{Kind, NOT_READ, Reading, SENSORS};
+use std::ops::RangeInclusive;
+
+use emems::{
+    sample::{Kind, NOT_READ, Reading, SENSORS},
+    sensor::hmc5883l::OVERFLOW,
+};
 
 /// Values in a packet.
 pub const CHANNEL_COUNT: usize = 36;
@@ -78,11 +83,51 @@ impl Quantity {
         }
     }
 
+    /// Codes of a part that is within its range, and codes that it can give at all: 12 bits, of the gyro's rate 14, of
+    /// which +-4368 are its +-320 deg/s (LIS331HH, HMC5883L, ADIS16265, TMP102 datasheets).
+    fn codes(self) -> (RangeInclusive<i16>, RangeInclusive<i16>) {
+        match self {
+            Quantity::SpecificForce | Quantity::Field => (-2047..=2046, -2048..=2047),
+            Quantity::Rate => (-4367..=4367, -8192..=8191),
+            Quantity::GyroTemperature | Quantity::Temperature => (-2048..=2047, -2048..=2047),
+        }
+    }
+
+    /// Whether some counts are a measurement.
+    pub fn reach(self, counts: i16) -> Reach {
+        let (within, possible) = self.codes();
+        if within.contains(&counts) {
+            Reach::Within
+        } else if possible.contains(&counts) || (self == Quantity::Field && counts == OVERFLOW) {
+            Reach::End
+        } else {
+            Reach::Impossible
+        }
+    }
+
+    /// Nominal SI value of some counts that say how much it was: `None` of an overflow mark and of a code that the part
+    /// cannot give. A value at the end of its range is a bound, and stays.
+    pub fn meant(self, counts: i16) -> Option<f64> {
+        let (_, possible) = self.codes();
+        possible.contains(&counts).then(|| self.si(counts))
+    }
+
     /// Nominal SI value of some counts.
     pub fn si(self, counts: i16) -> f64 {
         let (lsb, zero) = self.scale();
         f64::from(counts) * lsb + zero
     }
+}
+
+/// Whether counts are a measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// They are.
+    Within,
+    /// The part stands at the end of its range, or says that it overflowed: it was that much or more.
+    End,
+    /// The part cannot give this code.
+    Impossible,
 }
 
 /// One value of a packet.
@@ -232,6 +277,23 @@ mod tests {
         check("tg1", 25.0 + 1.7436);
         check("tg3", 25.0);
         check("t1", 25.0);
+    }
+
+    #[test]
+    fn the_end_of_a_range_is_told_from_a_measurement_and_from_a_code_that_no_part_gives() {
+        use Quantity::*;
+        let check = |quantity: Quantity, counts, reach, meant: bool| {
+            assert_eq!(quantity.reach(counts), reach, "{quantity:?} {counts}");
+            assert_eq!(quantity.meant(counts).is_some(), meant, "{quantity:?} {counts}");
+        };
+        check(SpecificForce, 2046, Reach::Within, true);
+        check(SpecificForce, 2047, Reach::End, true);
+        check(SpecificForce, -2048, Reach::End, true);
+        check(SpecificForce, 0x7FFF, Reach::Impossible, false);
+        check(Field, OVERFLOW, Reach::End, false);
+        check(Rate, 4367, Reach::Within, true);
+        check(Rate, -4368, Reach::End, true);
+        check(Temperature, 2048, Reach::Impossible, false);
     }
 
     #[test]
