@@ -8,6 +8,7 @@ pub mod bounds;
 pub mod covariance;
 pub mod deviation;
 pub mod fit;
+pub mod motion;
 pub mod noise;
 pub mod outliers;
 pub mod phase;
@@ -46,13 +47,13 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", conflicts_with = "rate_hz")]
     time: Option<String>,
     /// Sampling rate of a table without times
-    #[arg(long = "rate", value_name = "HZ", value_parser = positive)]
+    #[arg(long = "rate-hz", alias = "rate", value_name = "HZ", value_parser = positive)]
     rate_hz: Option<f64>,
     /// What the columns hold
     #[arg(long, value_enum, default_value = "rate")]
     input: Input,
     /// Unit of the rate; deg/s, deg/h and rad/s give coefficients in a gyro's customary units
-    #[arg(long, default_value = "unit")]
+    #[arg(long = "rates", alias = "unit", value_name = "UNIT", default_value = "unit")]
     unit: String,
     /// Confidence of bounds and intervals
     #[arg(long, default_value_t = 0.95, value_parser = share)]
@@ -63,6 +64,9 @@ pub struct Arguments {
     /// Folder for the page and the tables [default: reports/allan-FILE]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    /// Print verdicts and coefficients as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -129,12 +133,32 @@ pub fn run(arguments: &Arguments) -> Result<(), AllanError> {
         analyses.push(analyse(&name, series, &options, |share| bar.inc((share * 1e6) as u64)));
     }
     bar.finish_and_clear();
+    let page = write(&analyses, arguments)?;
+    if arguments.json {
+        let records: Vec<_> = analyses
+            .iter()
+            .map(|analysis| json(analysis, &arguments.unit))
+            .collect();
+        println!("{}", serde_json::json!({ "records": records, "page": page }));
+        return Ok(());
+    }
     for analysis in &analyses {
         print(analysis, &arguments.unit);
     }
-    let page = write(&analyses, arguments)?;
     println!("{}", page.display());
     Ok(())
+}
+
+fn json(analysis: &Analysis, unit: &str) -> serde_json::Value {
+    let said = report::verdict(analysis);
+    serde_json::json!({
+        "name": analysis.name,
+        "samples": analysis.used,
+        "step_s": analysis.step_s,
+        "good": !said.iter().any(|line| line.starts_with("wrong")),
+        "said": said,
+        "coefficients": report::coefficients(analysis, unit).into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+    })
 }
 
 fn print(analysis: &Analysis, unit: &str) {
@@ -165,7 +189,9 @@ fn write(analyses: &[Analysis], arguments: &Arguments) -> Result<PathBuf, AllanE
         .out
         .clone()
         .unwrap_or_else(|| Path::new("reports").join(format!("allan-{stem}")));
-    let put = |file: PathBuf, text: String| fs::write(&file, text).map_err(|error| AllanError::Write { file, error });
+    let put = |file: PathBuf, text: String| {
+        packets::output::replace_with(&file, text).map_err(|error| AllanError::Write { file, error })
+    };
     fs::create_dir_all(&folder).map_err(|error| AllanError::Write {
         file: folder.clone(),
         error,

@@ -3,6 +3,7 @@
 //! In: files and flags. Out: a report on standard output, and where asked for a set (`--set`, merged into what is there),
 //! or a page (`--page`). The subcommands do the work; what they share is here.
 
+pub(crate) mod checks;
 mod controlled;
 mod ellipsoid;
 
@@ -21,6 +22,18 @@ use crate::{
 pub struct Arguments {
     #[command(subcommand)]
     what: What,
+}
+
+impl Arguments {
+    /// Whether standard output is for programs.
+    pub fn json(&self) -> bool {
+        match &self.what {
+            What::RateTable(arguments) => arguments.json(),
+            What::MultiPosition(arguments) => arguments.json(),
+            What::Ellipsoid(arguments) => arguments.json(),
+            What::Drift(_) => false,
+        }
+    }
 }
 
 #[derive(Clone, Debug, clap::Subcommand)]
@@ -86,6 +99,9 @@ struct Output {
     /// Write a page with residuals to this file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    json: bool,
     /// Part and serial number, kept in the set: TEXT for every channel, or CHANNEL=TEXT, as often as needed
     #[arg(long, value_name = "[CHANNEL=]TEXT")]
     part: Vec<String>,
@@ -98,9 +114,16 @@ struct Output {
     /// Number of the set, to be counted up from calibration to calibration
     #[arg(long, value_name = "NUMBER", requires = "set")]
     number: Option<u32>,
+    /// Write the set even if the calibration is not good
+    #[arg(long, requires = "set")]
+    even_if_not_good: bool,
 }
 
 impl Output {
+    fn json(&self) -> bool {
+        self.json
+    }
+
     /// Prints, and writes what was asked for.
     fn finish(
         &self,
@@ -108,8 +131,19 @@ impl Output {
         mut entries: Vec<Entry>,
         files: &[(&Path, &[u8])],
     ) -> Result<bool, CalibrateError> {
-        print!("{}", report.text());
-        if let Some(path) = &self.set {
+        report.print(self.json);
+        let say = |text: String| {
+            if !self.json {
+                println!("{text}");
+            }
+        };
+        let good = report.wrong.is_empty();
+        if let Some(path) = self.set.as_ref().filter(|_| !good && !self.even_if_not_good) {
+            say(format!(
+                "{} is left as it is: not good (--even-if-not-good writes it)",
+                path.display()
+            ));
+        } else if let Some(path) = &self.set {
             let fail = CalibrateError::of(path);
             let mut set = if path.exists() {
                 read_set(path)?
@@ -127,17 +161,17 @@ impl Output {
             }
             set.merge(entries);
             let text = set.text().map_err(|error| fail(error.to_string()))?;
-            std::fs::write(path, text).map_err(|error| fail(format!("cannot be written: {error}")))?;
-            println!("{}", path.display());
+            packets::output::replace_with(path, text).map_err(|error| fail(format!("cannot be written: {error}")))?;
+            say(path.display().to_string());
         }
         if let Some(path) = &self.page {
             let names: Vec<_> = files.iter().map(|(file, _)| file.display().to_string()).collect();
             report
                 .write(path, &names.join(", "))
                 .map_err(CalibrateError::of(path))?;
-            println!("{}", path.display());
+            say(path.display().to_string());
         }
-        Ok(report.wrong.is_empty())
+        Ok(good)
     }
 }
 
@@ -157,13 +191,23 @@ pub(crate) struct Place {
     #[arg(long, value_enum, default_value = "emems")]
     mount: MountName,
     /// Gravity at the site [m/s2]
-    #[arg(long, default_value_t = 9.80665)]
+    #[arg(
+        long = "gravity-m-s2",
+        alias = "gravity",
+        value_name = "M/S2",
+        default_value_t = 9.80665
+    )]
     gravity: f64,
     /// Latitude of the site [deg], north positive
-    #[arg(long, default_value_t = -23.2111, allow_negative_numbers = true)]
+    #[arg(long = "latitude-deg", alias = "latitude", value_name = "DEG", default_value_t = -23.2111, allow_negative_numbers = true)]
     latitude: f64,
     /// Azimuth of the table's outer axis [deg]; without it the Earth's rate stays in the bias
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(
+        long = "azimuth-deg",
+        alias = "azimuth",
+        value_name = "DEG",
+        allow_negative_numbers = true
+    )]
     azimuth: Option<f64>,
 }
 

@@ -12,6 +12,17 @@ pub struct Arguments {
     what: What,
 }
 
+impl Arguments {
+    /// Whether standard output is for programs.
+    pub fn json(&self) -> bool {
+        match &self.what {
+            What::Apply(arguments) => arguments.json,
+            What::Diff(arguments) => arguments.json,
+            What::Unit(_) => false,
+        }
+    }
+}
+
 #[derive(Clone, Debug, clap::Subcommand)]
 enum What {
     Apply(apply::Arguments),

@@ -79,7 +79,7 @@ pub struct Calibration {
 
 /// Why a channel could not be calibrated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{file}, column {channel}: {why} ({rows} usable rows)")]
+#[error("{file}, column {channel}: {why} ({rows} usable rows{})", without(*.left_out))]
 pub struct CalibrationError {
     /// The file.
     pub file: String,
@@ -87,8 +87,17 @@ pub struct CalibrationError {
     pub channel: String,
     /// Usable rows.
     pub rows: usize,
+    /// Rows without a usable value, most often at the end of the range.
+    pub left_out: usize,
     /// What is not determined.
     pub why: ResponseError,
+}
+
+fn without(rows: usize) -> String {
+    match rows {
+        0 => String::new(),
+        rows => format!("; {rows} have no value, or one at the end of the range: excite less, or say the right --unit"),
+    }
 }
 
 /// Calibrates all channels of a campaign.
@@ -181,6 +190,11 @@ fn fit(
         file: experiment.file.display().to_string(),
         channel: experiment.channels[channel].clone(),
         rows: rows.len(),
+        left_out: experiment
+            .trials
+            .iter()
+            .filter(|trial| trial.values[channel].is_none())
+            .count(),
         why,
     })?;
     if experiment.trials.iter().all(|trial| trial.temperature_c.is_nan()) {

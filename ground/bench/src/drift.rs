@@ -29,7 +29,12 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", requires = "latitude_deg")]
     positions: Option<PathBuf>,
     /// Latitude of the table, south negative
-    #[arg(long = "latitude", value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(
+        long = "latitude-deg",
+        alias = "latitude",
+        value_name = "DEG",
+        allow_negative_numbers = true
+    )]
     latitude_deg: Option<f64>,
     /// Scale factor: columns rate, output
     #[arg(long, value_name = "FILE")]

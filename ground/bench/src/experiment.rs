@@ -7,15 +7,18 @@
 //! `NAME_sigma` or `NAME_n` beside it is a channel, or those named by the caller. Out: an [`Experiment`].
 //!
 //! Left out, and said: cells that are empty, and cells at the limit of the channel's code. Refused, with file, line and
-//! column: half an excitation or one in two units, channels that never change, and unknown units.
+//! column: half an excitation or one in two units, channels that never change, negative sigmas, and excitations that can hardly
+//! be in the unit of their columns' name (specific force at rest far from one g, rates that no gyro measures).
 
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+use packets::magnitude;
 
 use crate::{
     table::{Row, Table, TableError},
     turntable::{Mount, Pose, Site, Turning},
+    units::Units,
 };
 
 /// What excites the channels.
@@ -25,6 +28,16 @@ pub enum Kind {
     Rate,
     /// Accelerometers, excited by specific force [m/s2].
     Force,
+}
+
+impl Kind {
+    /// As a kind of number.
+    pub fn magnitude(self) -> magnitude::Kind {
+        match self {
+            Kind::Rate => magnitude::Kind::Rate,
+            Kind::Force => magnitude::Kind::Force,
+        }
+    }
 }
 
 /// One position or run.
@@ -44,6 +57,8 @@ pub struct Trial {
     pub temperature_c: f64,
     /// Mean output of each channel [counts]; `None` where it was not read.
     pub values: Vec<Option<f64>>,
+    /// Their sigmas as the table states them (`NAME_sigma`).
+    pub stated: Vec<Option<f64>>,
 }
 
 /// A campaign.
@@ -57,6 +72,8 @@ pub struct Experiment {
     pub channels: Vec<String>,
     /// Its rows.
     pub trials: Vec<Trial>,
+    /// Unit that its excitation was read in; `None` where it came from angles.
+    pub declared: Option<Declared>,
     /// What was left out of it, and why.
     pub remarks: Vec<String>,
 }
@@ -72,9 +89,14 @@ pub struct Layout<'a> {
     pub site: Site,
     /// Channels; empty for all columns with a sigma or a count beside them.
     pub channels: &'a [String],
+    /// Units that were told, whatever the columns' names say.
+    pub units: Units,
     /// Code limit of each channel [counts]: beyond it, or at it, the sensor saturates.
     pub limit: &'a dyn Fn(&str) -> f64,
 }
+
+/// A kind of number and the unit it is declared to be in.
+pub type Declared = (magnitude::Kind, magnitude::Unit);
 
 /// Row number and row to the value of every channel.
 pub type Outputs<'a> = dyn Fn(usize, &Row) -> Result<Vec<Option<f64>>, TableError> + 'a;
@@ -110,14 +132,18 @@ impl Experiment {
         channels: Vec<String>,
         outputs: &Outputs,
     ) -> Result<Self, TableError> {
-        let source = Source::of(table, layout.kind)?;
+        let source = Source::of(table, layout.kind, &layout.units)?;
+        source.judge(table, layout)?;
+        let sigmas: Vec<Option<usize>> = (channels.iter())
+            .map(|name| table.column(&format!("{name}_sigma")))
+            .collect();
         let mut remarks = Vec::new();
         let mut trials = Vec::new();
         for (number, row) in table.rows.iter().enumerate() {
             let mut values = outputs(number, row)?;
             for (value, name) in values.iter_mut().zip(&channels) {
                 let why = match *value {
-                    None => "empty, left out".to_string(),
+                    None => "no value (empty or NaN), left out".to_string(),
                     Some(code) if code.abs() >= (layout.limit)(name) => {
                         format!("{code} is at the end of its range, left out")
                     }
@@ -146,6 +172,7 @@ impl Experiment {
                 // A source has components or angles, so there is one.
                 excitation_b: of_angles.or(claimed_b).unwrap_or_default(),
                 temperature_c: temperature.flatten().unwrap_or(f64::NAN),
+                stated: stated(table, row, &sigmas)?,
                 values,
             });
         }
@@ -154,9 +181,21 @@ impl Experiment {
             kind: layout.kind,
             channels,
             trials,
+            declared: source.components.map(|(_, declared)| declared),
             remarks,
         })
     }
+}
+
+fn stated(table: &Table, row: &Row, sigmas: &[Option<usize>]) -> Result<Vec<Option<f64>>, TableError> {
+    let of = |column: &Option<usize>| {
+        let Some(column) = *column else { return Ok(None) };
+        match table.number(row, column)? {
+            Some(sigma) if sigma < 0.0 => Err(table.error(row.line, column, "a sigma is not negative")),
+            sigma => Ok(sigma),
+        }
+    };
+    sigmas.iter().map(of).collect()
 }
 
 fn channels(table: &Table, asked: &[String]) -> Result<Vec<usize>, TableError> {
@@ -188,7 +227,7 @@ fn channels(table: &Table, asked: &[String]) -> Result<Vec<usize>, TableError> {
 
 /// Columns that hold the excitation.
 struct Source {
-    components: Option<([usize; 3], f64)>,
+    components: Option<([usize; 3], Declared)>,
     angles: Option<[usize; 2]>,
     run: Option<[usize; 2]>,
 }
@@ -197,13 +236,17 @@ struct Source {
 type Excited = (Option<Vector3<f64>>, Option<(Pose, Option<Turning>)>, f64);
 
 impl Source {
-    fn of(table: &Table, kind: Kind) -> Result<Self, TableError> {
+    fn of(table: &Table, kind: Kind, told: &Units) -> Result<Self, TableError> {
         let triple =
             |unit: &str, letter: char| ["x", "y", "z"].map(|axis| table.column(&format!("{letter}{axis}_{unit}")));
-        let units: &[(&str, f64)] = match kind {
-            Kind::Rate => &[("rad_s", 1.0), ("deg_s", std::f64::consts::PI / 180.0)],
-            Kind::Force => &[("m_s2", 1.0), ("g", 9.806_65)],
-        };
+        let of = kind.magnitude();
+        let units: Vec<(&str, magnitude::Unit)> = match kind {
+            Kind::Rate => vec!["rad_s", "deg_s"],
+            Kind::Force => vec!["m_s2", "g"],
+        }
+        .into_iter()
+        .zip(of.units().iter().copied())
+        .collect();
         let letter = if kind == Kind::Rate { 'w' } else { 'f' };
         let missing = |why: String| TableError {
             file: table.file.clone(),
@@ -212,14 +255,16 @@ impl Source {
             why,
         };
         let mut components = None;
-        for &(unit, factor) in units {
+        for &(unit, named) in &units {
             match triple(unit, letter) {
                 [Some(_), Some(_), Some(_)] if components.is_some() => {
                     return Err(missing(
                         "says what the unit felt in two units: keep the columns of one".into(),
                     ));
                 }
-                [Some(x), Some(y), Some(z)] => components = Some(([x, y, z], factor)),
+                [Some(x), Some(y), Some(z)] => {
+                    components = Some(([x, y, z], (of, told.told(of).unwrap_or(named))));
+                }
                 [None, None, None] => {}
                 _ => {
                     return Err(missing(format!(
@@ -251,12 +296,38 @@ impl Source {
         })
     }
 
+    /// Whether the components can be in their unit: specific force on a table at rest is near one g, and no table and no
+    /// gyro turns faster than [`magnitude::Kind::possible`].
+    fn judge(&self, table: &Table, layout: &Layout) -> Result<(), TableError> {
+        let Some((columns, (kind, unit))) = self.components else {
+            return Ok(());
+        };
+        if layout.units.told(kind).is_some() {
+            return Ok(());
+        }
+        let mut norms = Vec::new();
+        for row in &table.rows {
+            let mut squares = 0.0;
+            for column in columns {
+                squares += table.required(row, column)?.powi(2);
+            }
+            norms.push(f64::sqrt(squares));
+        }
+        let (what, observed) = match layout.kind {
+            Kind::Rate => ("the largest rate", norms.into_iter().reduce(f64::max)),
+            Kind::Force => ("specific force at rest, the median,", magnitude::median(norms)),
+        };
+        let Some(observed) = observed else { return Ok(()) };
+        magnitude::judge(what, kind, unit, observed, kind.possible())
+            .map_err(|doubt| table.error(0, columns[0], &doubt.to_string()))
+    }
+
     fn of_row(&self, table: &Table, row: &Row) -> Result<Excited, TableError> {
         let mut claimed_b = None;
-        if let Some((columns, factor)) = self.components {
+        if let Some((columns, (_, unit))) = self.components {
             let mut components = [0.0; 3];
             for (component, column) in components.iter_mut().zip(columns) {
-                *component = table.required(row, column)? * factor;
+                *component = table.required(row, column)? * unit.size;
             }
             claimed_b = Some(Vector3::from(components));
         }

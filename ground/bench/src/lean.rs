@@ -144,6 +144,7 @@ mod tests {
                 excitation_b: Mount::EMEMS.force_b(pose, &SITE, [0.0; 2]),
                 temperature_c: f64::NAN,
                 values: (0..3).map(|k| Some(34.0 * force_b[k] + 5.0 + noise())).collect(),
+                stated: Vec::new(),
             }
         };
         Experiment {
@@ -151,6 +152,7 @@ mod tests {
             kind: Kind::Force,
             channels: ["a1x", "a1y", "a1z"].map(String::from).to_vec(),
             trials: poses.iter().map(trial).collect(),
+            declared: None,
             remarks: Vec::new(),
         }
     }

@@ -22,4 +22,5 @@ pub mod spectrum;
 pub mod stretches;
 pub mod table;
 pub mod turntable;
+pub mod units;
 pub mod wiring;

@@ -1,13 +1,13 @@
 //! A raw log: every sample of some channels, in counts.
 //!
 //! In: a stream of the unit's packets, however damaged, or a table with a column a channel. Out: one row of samples a
-//! cycle, `NaN` where a value was not read or a packet is missing. Packets are told from tables by their first frame.
+//! cycle, `NaN` where a value was not read, stood at the end of its part's range, or a packet is missing. Packets are told from tables by their first frame.
 //! Refused: channels the log does not have, and logs without a sample.
 
 use std::path::Path;
 
 use packets::{
-    channel::{self, CHANNELS},
+    channel::{self, CHANNELS, Reach},
     stream::{Bytes5To8, Decoder, Item},
 };
 
@@ -58,14 +58,15 @@ fn packets(file: &Path, bytes: &[u8], channels: &[String]) -> Result<Vec<Vec<f64
         }
         last = Some(reading.counter);
         let counts = channel::counts(&reading);
-        samples.push(
-            places
-                .iter()
-                .map(|&place| counts[place].map_or(f64::NAN, f64::from))
-                .collect(),
-        );
+        samples.push(places.iter().map(|&place| whole(place, counts[place])).collect());
     }
     Ok(samples)
+}
+
+/// Counts that are a measurement: not those at the end of a part's range, which say only that it was more.
+fn whole(place: usize, counts: Option<i16>) -> f64 {
+    let measured = counts.filter(|counts| CHANNELS[place].quantity.reach(*counts) == Reach::Within);
+    measured.map_or(f64::NAN, f64::from)
 }
 
 fn cells(file: &Path, bytes: &[u8], channels: &[String]) -> Result<Vec<Vec<f64>>, TableError> {

@@ -68,6 +68,34 @@ impl Report {
         }
     }
 
+    /// For programs: the verdict, what is wrong, what was noticed, what to do, and the table.
+    pub fn json(&self) -> serde_json::Value {
+        let row = |row: &Vec<String>| -> serde_json::Value {
+            let cells = self.columns.iter().zip(row);
+            cells
+                .map(|(name, cell)| (name.clone(), cell.as_str().into()))
+                .collect::<serde_json::Map<_, _>>()
+                .into()
+        };
+        serde_json::json!({
+            "title": self.title,
+            "good": self.wrong.is_empty(),
+            "wrong": self.wrong,
+            "noticed": self.remarks,
+            "next": self.next,
+            "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
+        })
+    }
+
+    /// Prints it, for people or for programs.
+    pub fn print(&self, json: bool) {
+        if json {
+            println!("{}", self.json());
+        } else {
+            print!("{}", self.text());
+        }
+    }
+
     /// As a page.
     pub fn html(&self, about: &str) -> String {
         let list = |name: &str, lines: &[String]| {
@@ -93,11 +121,13 @@ impl Report {
     ///
     /// # Errors
     /// When the page cannot be written, with its name.
-    pub fn finish(&self, page: Option<&Path>, about: &str) -> Result<(), String> {
-        print!("{}", self.text());
+    pub fn finish(&self, page: Option<&Path>, about: &str, json: bool) -> Result<(), String> {
+        self.print(json);
         if let Some(page) = page {
             self.write(page, about)?;
-            println!("{}", page.display());
+            if !json {
+                println!("{}", page.display());
+            }
         }
         Ok(())
     }
@@ -107,7 +137,8 @@ impl Report {
     /// # Errors
     /// When the file cannot be written, with its name.
     pub fn write(&self, file: &Path, about: &str) -> Result<(), String> {
-        std::fs::write(file, self.html(about)).map_err(|error| format!("{} cannot be written: {error}", file.display()))
+        packets::output::replace_with(file, self.html(about))
+            .map_err(|error| format!("{} cannot be written: {error}", file.display()))
     }
 
     /// Adds a picture, or a remark that it could not be drawn.
@@ -171,6 +202,16 @@ mod tests {
         );
         report.wrong.push("row 2 contradicts the data".into());
         assert!(report.text().ends_with("not good: one thing is wrong\n"));
+    }
+
+    #[test]
+    fn programs_are_told_the_same() {
+        let mut report = report();
+        report.wrong.push("row 2 contradicts the data".into());
+        let json = report.json();
+        assert_eq!(json["good"], false);
+        assert_eq!(json["wrong"][0], "row 2 contradicts the data");
+        assert_eq!(json["rows"][0]["bias"], "-12.58");
     }
 
     #[test]

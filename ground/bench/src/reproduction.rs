@@ -43,7 +43,12 @@ pub struct Reproductions {
     #[arg(long, value_name = "FOLDER", default_value = "../shared/golden")]
     sources: PathBuf,
     /// The page
-    #[arg(long, value_name = "FILE", default_value = "reports/reproductions.html")]
+    #[arg(
+        long = "page",
+        alias = "out",
+        value_name = "FILE",
+        default_value = "reports/reproductions.html"
+    )]
     out: PathBuf,
 }
 

@@ -194,6 +194,7 @@ fn experiment(kind: Kind, channels: usize, rows: impl Iterator<Item = (Vector3<f
         excitation_b,
         temperature_c: f64::NAN,
         values: means.of(&channels),
+        stated: Vec::new(),
     };
     Experiment {
         file: "twin".into(),
@@ -204,6 +205,7 @@ fn experiment(kind: Kind, channels: usize, rows: impl Iterator<Item = (Vector3<f
         },
         trials: rows.enumerate().map(trial).collect(),
         channels,
+        declared: None,
         remarks: Vec::new(),
     }
 }

@@ -9,6 +9,7 @@ use super::{
     bounds::{bounds, edf},
     deviation::{Deviation, Point, octaves, sweep},
     fit::{Finding, Fit, fit},
+    motion::{Motion, motion},
     noise::PowerLaw,
     outliers,
     phase::{Input, Phase},
@@ -70,6 +71,8 @@ pub struct Analysis {
     pub outliers: Vec<usize>,
     /// Samples (of angles, their steps) that are farther from their surroundings than noise goes, and were kept.
     pub suspects: usize,
+    /// Where the record (of angles, their rate) moves instead of standing still.
+    pub motion: Option<Motion>,
     /// Mean and standard deviation of what is left.
     pub moments: (f64, f64),
     /// Deviations.
@@ -91,6 +94,10 @@ pub fn analyse(name: &str, mut series: Series, options: &Options, progress: impl
         Input::Rate => outliers::far(&series, SUSPECT).len(),
         Input::Angle => outliers::far(&steps(&series), SUSPECT).len(),
     };
+    let motion = match options.input {
+        Input::Rate => motion(&series),
+        Input::Angle => motion(&steps(&series)),
+    };
     let phase = Phase::new(&series, options.input);
     let points = sweep(&phase, &octaves(&phase), progress);
     let density = density(&series, options.input);
@@ -101,6 +108,7 @@ pub fn analyse(name: &str, mut series: Series, options: &Options, progress: impl
         gaps,
         outliers,
         suspects,
+        motion,
         moments: moments(&series),
         rows: rows(&phase, &points, options.confidence),
         fit: best_fit(&points, &density, series.step_s, options.confidence),

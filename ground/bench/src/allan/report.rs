@@ -97,6 +97,24 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
             analysis.suspects
         ));
     }
+    if let Some(motion) = &analysis.motion {
+        let at = |k: usize| {
+            format!(
+                "{} at {} s",
+                digits(motion.levels[k]),
+                digits(motion.rows[k] as f64 * analysis.step_s)
+            )
+        };
+        said.push(format!(
+            "wrong: the record moves: {} (sample {}), {} (sample {}), {} times the scatter of a sample; next: record at rest, or \
+             take out the motion",
+            at(0),
+            motion.rows[0] + 1,
+            at(1),
+            motion.rows[1] + 1,
+            digits(motion.sigmas)
+        ));
+    }
     let Some(fit) = &analysis.fit else {
         said.push("wrong: too short to fit any coefficient; next: record at least 64 samples".into());
         return said;

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CalibrateError, Output, Place, read_nominal};
+use super::{CalibrateError, Output, Place, checks, read_nominal};
 use crate::{
     controlled::{self, Calibration, Contradicted, Options},
     experiment::{Experiment, Kind, Layout},
@@ -14,6 +14,7 @@ use crate::{
     set::Entry,
     stretches::{self, Stretch},
     table::{self, Table},
+    units::Units,
     wiring::surely_inverted,
 };
 
@@ -68,7 +69,21 @@ struct Common {
     #[arg(long, value_enum, default_value = "leave-out")]
     contradicted: Contradicted,
     #[command(flatten)]
+    units: Units,
+    #[command(flatten)]
     output: Output,
+}
+
+impl RateTable {
+    pub fn json(&self) -> bool {
+        self.common.output.json()
+    }
+}
+
+impl MultiPosition {
+    pub fn json(&self) -> bool {
+        self.common.output.json()
+    }
 }
 
 pub fn rate_table(arguments: &RateTable) -> Result<bool, CalibrateError> {
@@ -151,6 +166,7 @@ impl Common {
             mount: self.place.mount(),
             site: self.place.site(),
             channels: &self.channels,
+            units: self.units,
             limit: &limit,
         })
     }
@@ -177,9 +193,42 @@ impl Common {
         let found = controlled::calibrate(experiment, &options)?;
         let mut report = describe(experiment, &found, self.contradicted);
         report.remarks.extend(remarks);
+        report.wrong.extend(held_against(experiment, &found, nominal));
         let entries = Entry::controlled(&found, experiment.kind);
         self.output.finish(&report, entries, files)
     }
+}
+
+/// What the nominal unit, the table's own sigmas and the order of the rows say against it.
+fn held_against(experiment: &Experiment, found: &Calibration, nominal: Option<&Nominal>) -> Vec<String> {
+    let declared: Vec<_> = experiment.declared.into_iter().collect();
+    let honest = found.wirings.first().is_none_or(|wiring| wiring.honest());
+    let mut wrong = Vec::new();
+    for (k, channel) in found.channels.iter().enumerate() {
+        let (name, fit) = (&channel.name, &channel.response);
+        if let Some(nominal) = nominal.and_then(|nominal| nominal.channel(name)) {
+            wrong.extend(checks::scale(
+                name,
+                fit.counts_per_unit(),
+                nominal.lsb.recip(),
+                &declared,
+            ));
+            let axis_b = nominal.axis_b.filter(|_| honest);
+            wrong.extend(axis_b.and_then(|axis_b| checks::axis(name, fit.axis_b(), axis_b.into())));
+        }
+        let rows = channel.rows.iter().zip(&fit.residuals).map(|(&row, &residual)| {
+            let trial = &experiment.trials[row];
+            checks::Row {
+                label: format!("row {} (line {})", trial.label, trial.line),
+                along: fit.sensitivity_b.dot(&found.excitation_b[row].unwrap_or_default()),
+                residual,
+                stated: trial.stated.get(k).copied().flatten(),
+            }
+        });
+        let rows: Vec<_> = rows.collect();
+        wrong.extend(checks::residuals(name, &rows, rows.len() - fit.freedom));
+    }
+    wrong
 }
 
 fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradicted) -> Report {
@@ -291,7 +340,11 @@ fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradi
             format!("{:.6}", fit.bias[0]),
             format!("{:.1e}", fit.bias_sigma()),
             format!("{:.2e}", fit.scatter),
-            format!("{left_out:.2e}"),
+            if left_out.is_finite() {
+                format!("{left_out:.2e}")
+            } else {
+                "-".into()
+            },
             channel.rows.len().to_string(),
         ]);
         if fit.freedom == 0 {

@@ -4,12 +4,17 @@ use std::path::PathBuf;
 
 use chart::{Axis, Figure, Layer, Marks, Panel};
 use nalgebra::{Matrix3, Vector3};
+use packets::{
+    channel::{CHANNELS, Quantity},
+    magnitude::{self, Kind, Unit, digits},
+};
 
-use super::{CalibrateError, Output, read_nominal};
+use super::{CalibrateError, Output, checks, read_nominal};
 use crate::{
     coverage::{Coverage, ENOUGH},
     ellipsoid::{Convention, Ellipsoid},
     log,
+    nominal::Nominal,
     report::Report,
     set::Entry,
     stretches,
@@ -26,9 +31,9 @@ pub struct Arguments {
     /// The three channels x, y, z, separated by commas
     #[arg(long, value_delimiter = ',', required = true)]
     channels: Vec<String>,
-    /// Strength of the field [uT], or gravity [m/s2]
-    #[arg(long)]
-    strength: f64,
+    /// Strength of the field [uT], or gravity [m/s2], or in a unit of its own: 0.232gauss, 23200nT, 1g
+    #[arg(long, value_name = "NUMBER[UNIT]", value_parser = strength)]
+    strength: Strength,
     /// Points are the means of stretches at rest of at least this many samples
     #[arg(long, value_name = "SAMPLES")]
     still: Option<usize>,
@@ -40,6 +45,12 @@ pub struct Arguments {
     unit: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
+}
+
+impl Arguments {
+    pub fn json(&self) -> bool {
+        self.output.json()
+    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
@@ -68,9 +79,17 @@ pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
         .map(|v| Vector3::new(v[0], v[1], v[2]))
         .collect();
     let left_out = samples.len() - points.len();
-    let found = Ellipsoid::fit(&points, arguments.strength).map_err(|error| fail(error.to_string()))?;
+    let kind = kind_of(&names[0], channel(&names[0]).map(|channel| channel.sensor.as_str()));
+    let strength = arguments.strength.base(kind).map_err(&fail)?;
+    let found = Ellipsoid::fit(&points, strength).map_err(|error| fail(error.to_string()))?;
 
     let mut report = describe(&found, &points, arguments);
+    report.wrong.extend(held_against(
+        &found,
+        &names,
+        nominal.as_ref(),
+        arguments.strength.declared(kind),
+    ));
     if left_out > 0 {
         report.remarks.push(format!(
             "{left_out} of {} points are saturated or incomplete, left out",
@@ -96,6 +115,132 @@ pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
             .push("without --unit the set takes the triad's axes for the body's".into());
     }
     arguments.output.finish(&report, entries, &[(&arguments.file, &bytes)])
+}
+
+/// A strength as it was written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Strength {
+    value: f64,
+    unit: Option<(Kind, Unit)>,
+}
+
+fn strength(text: &str) -> Result<Strength, String> {
+    let text = text.trim();
+    let known = [Kind::Field, Kind::Force].into_iter();
+    let units = known.flat_map(|kind| kind.units().iter().map(move |unit| (kind, *unit)));
+    // The longest name that fits: mgauss ends in gauss, mg in g.
+    let unit = units
+        .filter(|(_, unit)| text.to_ascii_lowercase().ends_with(&unit.name.to_ascii_lowercase()))
+        .max_by_key(|(_, unit)| unit.name.len());
+    let number = unit.map_or(text, |(_, unit)| text[..text.len() - unit.name.len()].trim_end());
+    let value = number
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite() && *value > 0.0);
+    value
+        .map(|value| Strength { value, unit })
+        .ok_or_else(|| "a positive number, perhaps with uT, nT, gauss, m/s2 or g after it".into())
+}
+
+impl Strength {
+    /// The unit it is taken to be in.
+    fn declared(self, kind: Option<Kind>) -> Option<(Kind, Unit)> {
+        self.unit.or(kind.map(|kind| (kind, kind.base())))
+    }
+
+    /// In uT or m/s2. Without a unit of its own it must be what the kind of sensor can feel.
+    fn base(self, kind: Option<Kind>) -> Result<f64, String> {
+        match (self.unit, kind) {
+            (Some((said, unit)), Some(kind)) if said != kind => Err(format!(
+                "--strength is in {}, which these channels do not measure",
+                unit.name
+            )),
+            (Some((_, unit)), _) => Ok(self.value * unit.size),
+            (None, None) => Ok(self.value),
+            (None, Some(kind)) => {
+                let judged = magnitude::judge("--strength", kind, kind.base(), self.value, kind.possible());
+                judged.map(|()| self.value).map_err(|doubt| {
+                    let unit = doubt.likely.unwrap_or(doubt.declared).name;
+                    let (low, high) = doubt.possible;
+                    let base = doubt.declared.name;
+                    format!(
+                        "--strength {} {base} is not possible ({} to {}): is it {unit}? Write the unit after it, as {0}{unit}",
+                        digits(self.value),
+                        digits(low),
+                        digits(high)
+                    )
+                })
+            }
+        }
+    }
+}
+
+/// What a channel measures, by the unit's description or by its name in packets.
+fn kind_of(name: &str, sensor: Option<&str>) -> Option<Kind> {
+    match sensor {
+        Some("accelerometer") => return Some(Kind::Force),
+        Some("magnetometer") => return Some(Kind::Field),
+        _ => {}
+    }
+    let channel = CHANNELS.iter().find(|channel| channel.name == name)?;
+    match channel.quantity {
+        Quantity::SpecificForce => Some(Kind::Force),
+        Quantity::Field => Some(Kind::Field),
+        _ => None,
+    }
+}
+
+/// [deg] angles between a triad's axes beyond which it is none: what the unit takes at most, and twice its worst (Table 6.1).
+const MOST_ANGLE_DEG: f64 = 10.0;
+
+/// Noise of a point as a share of the field: what is left is no sphere. The parts' noise is 0.1 to 1 %.
+const MOST_NOISE: f64 = 0.05;
+
+/// What the nominal unit and the triad's own shape say against it.
+fn held_against(
+    found: &Ellipsoid,
+    names: &[String; 3],
+    nominal: Option<&Nominal>,
+    declared: Option<(Kind, Unit)>,
+) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let plates = names
+        .each_ref()
+        .map(|name| CHANNELS.iter().find(|channel| channel.name == name));
+    if let [Some(x), Some(y), Some(z)] = plates
+        && (x.plate != y.plate || y.plate != z.plate || x.quantity != y.quantity || y.quantity != z.quantity)
+    {
+        wrong.push(format!(
+            "{} are not the axes of one sensor: name x, y, z of one plate",
+            names.join(", ")
+        ));
+    }
+    let nine = found.nine(Convention::Standard);
+    let declared: Vec<_> = declared.into_iter().collect();
+    for (name, scale) in names.iter().zip(nine.values) {
+        if let Some(channel) = nominal.and_then(|nominal| nominal.channel(name)) {
+            wrong.extend(checks::scale(name, scale, channel.lsb.recip(), &declared));
+        }
+    }
+    let angle_deg = nine.values[6..]
+        .iter()
+        .map(|angle| angle.to_degrees().abs())
+        .fold(0.0, f64::max);
+    if angle_deg > MOST_ANGLE_DEG {
+        wrong.push(format!(
+            "its axes are {angle_deg:.1} deg from square (at most {MOST_ANGLE_DEG} deg is believed): are x, y, z of one sensor, \
+             in this order, and nothing magnetic near?"
+        ));
+    }
+    let field = found.residuals.iter().map(|one| one * one).sum::<f64>() / found.residuals.len() as f64;
+    if field.sqrt() > MOST_NOISE {
+        wrong.push(format!(
+            "the points lie {:.1} % (root mean square) off the ellipsoid, {} counts: was it at rest, and far from iron?",
+            100.0 * field.sqrt(),
+            digits(found.scatter)
+        ));
+    }
+    wrong
 }
 
 fn describe(found: &Ellipsoid, points: &[Vector3<f64>], arguments: &Arguments) -> Report {

@@ -23,7 +23,7 @@ const BAUD: u32 = 115_200;
 ///
 /// Over the umbilical the unit must be in WAIT; it checks the whole set and keeps the one it had if anything is wrong,
 /// and what it then uses is read back and compared. It lasts until the unit's next start. To start with it, build the unit with
-/// EMEMS_CALIBRATION naming the file that --out wrote. The set is for the unit's nominal ranges: 6 g, 1.3 gauss, 320 deg/s.
+/// EMEMS_CALIBRATION naming the file that --image wrote. The set is for the unit's nominal ranges: 6 g, 1.3 gauss, 320 deg/s.
 #[derive(Clone, Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("where").required(true).multiple(true).args(["port", "out"]))]
 pub struct Arguments {
@@ -32,12 +32,15 @@ pub struct Arguments {
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3): load it and read it back
     #[arg(long, value_name = "PORT")]
     port: Option<String>,
-    /// Write the bytes the unit carries, to be compiled in
-    #[arg(long, value_name = "FILE")]
+    /// Write the bytes the unit carries, to be compiled in, to this file
+    #[arg(long = "image", alias = "out", id = "out", value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write a page to this file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 pub fn apply(arguments: &Arguments) -> Result<(), CalibrateError> {
@@ -48,7 +51,7 @@ pub fn apply(arguments: &Arguments) -> Result<(), CalibrateError> {
     let mut report = describe(&set, &image.nominal, checksum(&bytes));
     if let Some(path) = &arguments.out {
         let fail = CalibrateError::of(path);
-        std::fs::write(path, bytes).map_err(|error| fail(format!("cannot be written: {error}")))?;
+        packets::output::replace_with(path, bytes).map_err(|error| fail(format!("cannot be written: {error}")))?;
         report.remarks.push(format!("its bytes are in {}", path.display()));
         report.next.push(format!(
             "to start with it: EMEMS_CALIBRATION={} cargo run --release, by its whole path",
@@ -72,7 +75,11 @@ pub fn apply(arguments: &Arguments) -> Result<(), CalibrateError> {
             .push("it lasts until the unit's next start; to start with it, compile it in (--out)".into());
     }
     report
-        .finish(arguments.page.as_deref(), &arguments.set.display().to_string())
+        .finish(
+            arguments.page.as_deref(),
+            &arguments.set.display().to_string(),
+            arguments.json,
+        )
         .map_err(CalibrateError::of(&arguments.set))
 }
 

@@ -23,6 +23,9 @@ pub struct Diff {
     /// Write a page to this file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A calibration set as the twin's nominal unit
@@ -33,11 +36,16 @@ pub struct Unit {
     /// Unit file it refines
     #[arg(long, value_name = "FILE")]
     unit: PathBuf,
-    /// Where to write
-    #[arg(long, value_name = "FILE")]
+    /// Unit file to write
+    #[arg(long = "refined", alias = "out", value_name = "FILE")]
     out: PathBuf,
     /// Temperature the twin's parameters hold at [degC]; without it each channel's reference
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(
+        long = "temperature-c",
+        alias = "temperature",
+        value_name = "DEGC",
+        allow_negative_numbers = true
+    )]
     temperature: Option<f64>,
 }
 
@@ -96,7 +104,7 @@ pub fn diff(arguments: &Diff) -> Result<bool, CalibrateError> {
     report.picture(picture(&found.moved));
     let about = format!("{} to {}", arguments.earlier.display(), arguments.later.display());
     report
-        .finish(arguments.page.as_deref(), &about)
+        .finish(arguments.page.as_deref(), &about, arguments.json)
         .map_err(CalibrateError::of(&arguments.later))?;
     Ok(report.wrong.is_empty())
 }
@@ -125,7 +133,8 @@ pub fn unit(arguments: &Unit) -> Result<(), CalibrateError> {
     let fail = CalibrateError::of(&arguments.out);
     let refined = unit::refine(&read_text(&arguments.unit)?, &set, arguments.temperature);
     let refined = refined.map_err(|error| CalibrateError::of(&arguments.unit)(error.to_string()))?;
-    std::fs::write(&arguments.out, refined).map_err(|error| fail(format!("cannot be written: {error}")))?;
+    packets::output::replace_with(&arguments.out, refined)
+        .map_err(|error| fail(format!("cannot be written: {error}")))?;
     println!("{}", arguments.out.display());
     Ok(())
 }

@@ -33,6 +33,7 @@ fn trial(excitation_b: Vector3<f64>, noise: &mut dyn FnMut() -> f64) -> Trial {
         excitation_b,
         temperature_c: f64::NAN,
         values: (0..4).map(value).collect(),
+        stated: Vec::new(),
     }
 }
 
@@ -60,6 +61,7 @@ fn campaign(noise: &mut dyn FnMut() -> f64) -> Experiment {
         kind: Kind::Rate,
         channels: ["g1", "g2", "g3", "g4"].map(String::from).to_vec(),
         trials,
+        declared: None,
         remarks: Vec::new(),
     }
 }
@@ -152,6 +154,7 @@ fn intervals_of_multi_position_calibrations_cover_95_of_100() {
             kind: Kind::Force,
             channels: vec!["a1x".into()],
             trials: force_b.iter().map(&mut position).collect(),
+            declared: None,
             remarks: Vec::new(),
         };
         let found = fit(&experiment, &rows, &[], Orders::default(), 0)

@@ -26,16 +26,16 @@ pub struct Arguments {
     #[arg(long)]
     minutes: f64,
     /// Time a run is measured for [s]
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long = "run-s", alias = "run", value_name = "S", default_value_t = 60.0)]
     run: f64,
     /// Time between two runs [s]
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long = "between-s", alias = "between", value_name = "S", default_value_t = 20.0)]
     between: f64,
     /// Rate of the runs [deg/s]
-    #[arg(long, default_value_t = 200.0)]
+    #[arg(long = "rate-deg-s", alias = "rate", value_name = "DEG/S", default_value_t = 200.0)]
     rate: f64,
     /// Steps of the table's angles [deg]
-    #[arg(long, default_value_t = 30.0)]
+    #[arg(long = "step-deg", alias = "step", value_name = "DEG", default_value_t = 30.0)]
     step: f64,
     /// What is wanted, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "scale,axis,bias")]
@@ -43,11 +43,18 @@ pub struct Arguments {
     #[command(flatten)]
     place: Place,
     /// Write the plan to this table
-    #[arg(long, value_name = "FILE")]
+    #[arg(long = "table", alias = "out", value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write a page to this file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Whether the plan goes to standard output.
+    pub fn prints_the_plan(&self) -> bool {
+        self.out.is_none()
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
@@ -79,14 +86,14 @@ pub fn run(arguments: &Arguments) -> Result<(), DesignError> {
     let plan = plan(&means, &arguments.want)?;
     let table = table(&plan);
     match &arguments.out {
-        Some(path) => std::fs::write(path, &table)
+        Some(path) => packets::output::replace_with(path, &table)
             .map_err(|error| DesignError::Missing(format!("{} cannot be written: {error}", path.display())))?,
         None => print!("{table}"),
     }
     let report = describe(&plan, &means, arguments);
     let about = format!("{} min on the table, {}", arguments.minutes, arguments.unit.display());
     report
-        .finish(arguments.page.as_deref(), &about)
+        .finish(arguments.page.as_deref(), &about, false)
         .map_err(DesignError::Missing)
 }
 

@@ -10,7 +10,7 @@ use super::{
     sensitivity::{NAMES, Sensitivity},
     stability::{Interval, Stability},
 };
-use crate::allan::report::digits;
+use crate::{allan::report::digits, calibrate::checks};
 
 /// A residual this many times the root mean square of all is likelier a wrong position or a slip than noise.
 const SUSPICIOUS: f64 = 3.0;
@@ -117,25 +117,35 @@ pub fn scale(found: &Scale, points: &[(f64, f64)]) -> Result<Section, ChartError
         .map(|((rate, _), left)| (*rate, *left))
         .collect();
     let figure = residuals("What a straight line leaves over", "rate", "residual [output]", left)?;
-    // Residuals that bend have their extremes in the middle and at the ends with opposite signs: few sign changes.
-    let mut by_rate: Vec<(f64, f64)> = points
-        .iter()
-        .zip(&found.residuals)
-        .map(|(p, left)| (p.0, *left))
-        .collect();
-    by_rate.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let changes = by_rate.windows(2).filter(|pair| pair[0].1 * pair[1].1 < 0.0).count();
-    let verdict = if by_rate.len() >= 9 && changes <= 3 {
-        "wrong: the residuals bend; next: fit the square and cube of the rate, or check for saturation"
-    } else {
-        "good: the residuals show no bend"
+    let wrong = checks::residuals("the output", &rows_of(found, points), 2);
+    let verdict = match (wrong.is_empty(), points.len() < FEW) {
+        (false, _) => wrong.into_iter().map(|line| format!("wrong: {line}")).collect(),
+        (true, false) => vec!["good: the residuals show no bend".into()],
+        (true, true) => vec![format!(
+            "good, as far as {} rates can tell; next: give at least {FEW} to see a bend",
+            points.len()
+        )],
     };
     Ok(Section {
         title: "Scale factor".into(),
         rows,
-        verdict: vec![verdict.into()],
+        verdict,
         figure: Some(figure),
     })
+}
+
+/// Rates from which on a square and a cube of the rate are seen beside the line.
+const FEW: usize = 8;
+
+/// The rows of the test in the order of the file, as the residuals of any calibration.
+fn rows_of(found: &Scale, points: &[(f64, f64)]) -> Vec<checks::Row> {
+    let row = |(k, ((rate, _), residual)): (usize, (&(f64, f64), &f64))| checks::Row {
+        label: format!("row {} (rate {})", k + 1, digits(*rate)),
+        along: found.factor * rate,
+        residual: *residual,
+        stated: None,
+    };
+    points.iter().zip(&found.residuals).enumerate().map(row).collect()
 }
 
 /// The scale stability test.
@@ -265,8 +275,20 @@ mod tests {
                 .collect();
             scale(&scale::scale(&points, None).expect("scale"), &points).expect("drawn")
         };
-        assert!(section(0.1).text().contains("wrong: the residuals bend"));
+        assert!(section(0.1).text().contains("the residuals bend by"));
         assert!(section(0.0).text().contains("good:"));
+    }
+
+    #[test]
+    fn an_output_far_from_any_line_is_wrong_however_few_its_rows() {
+        let points = [(-2.0, -1.0), (-1.0, -0.5), (0.0, 0.0), (1.0, 0.5), (2.0, 3.0)];
+        let found = scale::scale(&points, None).expect("scale");
+        let section = scale(&found, &points).expect("drawn");
+        assert!(
+            section.is_wrong() && section.text().contains("row 5 (rate 2) lies"),
+            "{}",
+            section.text()
+        );
     }
 
     #[test]

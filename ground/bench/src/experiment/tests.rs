@@ -15,6 +15,7 @@ fn read(kind: Kind, text: &str) -> Result<Experiment, TableError> {
         mount: Mount::EMEMS,
         site: SITE,
         channels: &[],
+        units: Units::default(),
         limit: &|_| 8191.0,
     };
     Experiment::read(&table, &layout)

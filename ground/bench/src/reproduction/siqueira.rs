@@ -49,12 +49,14 @@ pub fn campaign(sources: &Sources<'_>) -> Result<(Experiment, Calibration), Repr
         excitation_b: Vector3::from(*rate),
         temperature_c: f64::NAN,
         values: output.iter().copied().map(Some).collect(),
+        stated: Vec::new(),
     };
     let experiment = Experiment {
         file: "Table 7.4".into(),
         kind: Kind::Rate,
         channels: CHANNELS.map(String::from).to_vec(),
         trials: rates.iter().zip(&outputs).enumerate().map(trial).collect(),
+        declared: None,
         remarks: Vec::new(),
     };
     let options = Options {
