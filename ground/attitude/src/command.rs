@@ -5,25 +5,31 @@
 //! frames from the unit's start on are what the unit had: its estimate comes back bit for bit, and that is said.
 
 use std::{
-    fs,
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufReader, Cursor, Read},
     path::{Path, PathBuf},
     process::Command,
     time::Instant,
 };
 
+use bench::units::Units;
 use emems::{kalman::Params, sample::Reading, unit::Settings};
 use indicatif::ProgressBar;
-use packets::stream::{Bytes5To8, Decoder, Item};
+use packets::{
+    input, output, reach,
+    stream::{Bytes5To8, Decoder, Item},
+};
 
 use crate::{
+    align::{self, Offset},
     broad,
     chapter6::{self, calibrated::NotCalibrated},
     counts,
     flight::{Comparison, Flight},
     log::{Cycle, Cycles},
     methods::{self, NoSet},
-    orbit, peers, plots,
+    orbit, peers,
+    plausible::{self, Implausible},
+    plots,
     recording::{self, RecordingError},
     reference,
 };
@@ -35,10 +41,10 @@ use crate::{
 /// of real recordings with optical truth instead, with --theses it prints the theses' tables beside ours.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --out attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings ../shared/data/broad --peers\n  ground attitude --theses"
+    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --page attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings ../shared/data/broad --peers\n  ground attitude --theses"
 )]
 pub struct Arguments {
-    /// Packets, or CSV (.csv or .csv.gz)
+    /// Packets or CSV, gzip or not
     #[arg(required_unless_present_any = ["recordings", "theses"], conflicts_with_all = ["recordings", "theses"])]
     pub log: Option<PathBuf>,
     /// Calibration set to run beside the nominal one; may be given again
@@ -57,9 +63,15 @@ pub struct Arguments {
         allow_hyphen_values = true
     )]
     pub offset_s: f64,
+    #[command(flatten)]
+    #[allow(missing_docs)] // clap would take the text for the command's.
+    pub units: Units,
     /// Write plots to this HTML page
-    #[arg(long, value_name = "FILE", requires = "log")]
-    pub out: Option<PathBuf>,
+    #[arg(long, alias = "out", value_name = "FILE", requires = "log")]
+    pub page: Option<PathBuf>,
+    /// Print the figures as JSON
+    #[arg(long, requires = "log")]
+    pub json: bool,
     /// A folder of recordings with optical truth: one table, one set of parameters
     #[arg(long, value_name = "DIR", conflicts_with = "theses")]
     pub recordings: Option<PathBuf>,
@@ -84,6 +96,22 @@ pub enum AttitudeError {
         file: String,
         /// Why.
         error: io::Error,
+    },
+    /// It is neither packets nor a table.
+    #[error("{file}: neither packets of the unit nor a table with t_s, gyr_x..; {looks}")]
+    NoLog {
+        /// Which.
+        file: String,
+        /// What it looks like instead.
+        looks: &'static str,
+    },
+    /// Its numbers can hardly be in their units.
+    #[error("{file}: {why}")]
+    Implausible {
+        /// Which.
+        file: String,
+        /// What is wrong, and what to do.
+        why: Implausible,
     },
     /// A calibration set for a log that is not in counts.
     #[error("{0}: a nine-axis log is in SI already; sets are for counts: packets, or CSV of `ground decode --counts`")]
@@ -130,7 +158,8 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
         None => None,
     };
     let never = || AttitudeError::NeverMeet(arguments.reference.as_ref().unwrap_or(&path).display().to_string());
-    let (flight, met) = match read(&path)? {
+    let no_attitude = || AttitudeError::NoAttitude(path.display().to_string());
+    let (flight, met, reference) = match read(&path, &arguments.units)? {
         Log::NineAxis(rows) => {
             if let Some(set) = arguments.sets.first() {
                 return Err(AttitudeError::NotCounts(set.display().to_string()));
@@ -138,42 +167,91 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
             let own = rows.iter().any(|row| row.reference_nb.is_some());
             let steps = broad::replay(broad::Mode::Full).steps(&rows).map(|(step, _)| step);
             let flight = Flight::of(Params::ROOM, steps).shifted(-crate::replay::EPOCH_S);
+            if flight.estimates.is_empty() {
+                return Err(no_attitude());
+            }
             let reference = reference.or_else(|| own.then(|| rows.clone()));
             let met = reference
-                .map(|rows| flight.compare(&rows).ok_or_else(never))
+                .as_ref()
+                .map(|rows| flight.compare(rows).ok_or_else(never))
                 .transpose()?;
-            (flight, met)
+            (flight, met, reference)
         }
-        Log::Unit(cycles) => of_unit(arguments, &cycles, reference.as_deref())?,
+        Log::Unit(cycles) => {
+            let (flight, met) = of_unit(arguments, &cycles, reference.as_deref())?.ok_or_else(no_attitude)?;
+            (flight, met, reference)
+        }
     };
-    if flight.estimates.is_empty() {
-        return Err(AttitudeError::NoAttitude(path.display().to_string()));
-    }
     if reference_missed(arguments, &met) {
         return Err(never());
     }
-    print!("{}", summary(&flight));
-    if let Some(met) = &met {
-        print!("{}", compared(met));
+    let summed = summary(&flight);
+    let said = met.as_ref().map(compared).unwrap_or_default();
+    let offset = reference.as_ref().and_then(|rows| align::offset(&flight, rows));
+    let mut rows = vec![("log".to_string(), named(&path))];
+    rows.extend(
+        arguments
+            .reference
+            .iter()
+            .map(|file| ("reference".to_string(), named(file))),
+    );
+    rows.extend(summed.lines().chain(said.lines()).map(split));
+    rows.extend(offset.iter().map(|offset| split(&warning(arguments, offset))));
+    if arguments.json {
+        let rows: serde_json::Map<_, _> = rows
+            .iter()
+            .map(|(name, value)| (name.clone(), value.as_str().into()))
+            .collect();
+        println!("{}", serde_json::Value::from(rows));
+    } else {
+        print!("{summed}{said}");
+        if let Some(offset) = &offset {
+            println!("{}", warning(arguments, offset));
+        }
     }
-    if let Some(out) = &arguments.out {
-        let page = plots::page(&flight)?;
-        fs::write(out, page).map_err(|error| io_error(out, error))?;
-        println!("{}", out.display());
+    if let Some(file) = &arguments.page {
+        let page = plots::page(&flight, reference.as_deref(), rows)?;
+        output::replace_with(file, page).map_err(|error| io_error(file, error))?;
+        if !arguments.json {
+            println!("{}", file.display());
+        }
     }
     Ok(())
+}
+
+/// A file's name without its folder, which is nobody's business on a page that may be passed on.
+fn named(file: &Path) -> String {
+    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A printed line as a name and its value, which begins in the 29th column.
+fn split(line: &str) -> (String, String) {
+    let (name, value) = line.split_at_checked(28).unwrap_or((line, ""));
+    (name.trim().into(), value.trim().into())
+}
+
+/// What to say of a reference whose clock seems to be off.
+fn warning(arguments: &Arguments, offset: &Offset) -> String {
+    let said = match arguments.reference {
+        Some(_) => format!("--offset-s {:.4}", arguments.offset_s + offset.later_s),
+        None => format!("its times later by {:.4} s", offset.later_s),
+    };
+    format!(
+        "{:<28}the reference fits best with {said} (sigma {:.4} s): error about its mean {:.2} instead of {:.2} deg; used as told",
+        "warning", offset.sigma_s, offset.rms_deg[1], offset.rms_deg[0]
+    )
 }
 
 fn reference_missed(arguments: &Arguments, met: &Option<Comparison>) -> bool {
     arguments.reference.is_some() && met.is_none()
 }
 
-/// The methods beside each other; the last set's flight is what is looked at closer.
+/// The methods beside each other; the last set's flight is what is looked at closer. `None` without an attitude.
 fn of_unit(
     arguments: &Arguments,
     cycles: &[Cycle],
     reference: Option<&[recording::Row]>,
-) -> Result<(Flight, Option<Comparison>), AttitudeError> {
+) -> Result<Option<(Flight, Option<Comparison>)>, AttitudeError> {
     let settings = Settings::NOMINAL;
     let mut sets = vec![methods::compiled_in(&settings)];
     for file in &arguments.sets {
@@ -183,20 +261,34 @@ fn of_unit(
     let began = Instant::now();
     let mut runs = methods::run(sets, &settings, cycles, reference);
     let took_s = began.elapsed().as_secs_f64();
-    print!("{}", methods::format(&runs));
-    println!(
-        "estimated                   {count} cycles in {took_s:.2} s, {:.0} a second",
-        count as f64 / took_s
-    );
-    let Some(last) = runs.pop() else {
-        return Ok(Default::default());
+    if runs.iter().all(|run| run.flight.estimates.is_empty()) {
+        return Ok(None);
+    }
+    // A program gets the figures of the last set; the table beside them is for people.
+    let say = |text: String| {
+        if !arguments.json {
+            print!("{text}");
+        }
     };
-    println!("looked at closer            {}", last.name);
+    say(methods::format(&runs));
+    say(format!(
+        "estimated                   {count} cycles in {took_s:.2} s, {:.0} a second\n",
+        count as f64 / took_s
+    ));
+    let mut tally = reach::Tally::default();
+    cycles.iter().for_each(|cycle| tally.add(&cycle.sample.reading));
+    for (name, value) in tally.rows() {
+        say(format!("{name:<30}{value}\n"));
+    }
+    let Some(last) = runs.pop() else { return Ok(None) };
+    say(format!("looked at closer            {}\n", last.name));
     let [equal, other] = last.flight.replayed;
     if equal + other > 0 {
-        println!("as the unit sent it         {equal} cycles bit for bit, {other} not");
+        say(format!(
+            "as the unit sent it         {equal} cycles bit for bit, {other} not\n"
+        ));
     }
-    Ok((last.flight, last.met))
+    Ok(Some((last.flight, last.met)))
 }
 
 fn io_error(path: &Path, error: io::Error) -> AttitudeError {
@@ -214,48 +306,63 @@ enum Log {
     Unit(Vec<Cycle>),
 }
 
-/// Reads a log, whichever it is.
-fn read(path: &Path) -> Result<Log, AttitudeError> {
-    let name = path.to_string_lossy();
+/// [bytes] a beginning that tells what a file is.
+const HEAD: u64 = 4096;
+
+/// Reads a log, whichever it is; its first bytes tell.
+fn read(path: &Path, units: &Units) -> Result<Log, AttitudeError> {
+    let name = path.display().to_string();
+    let failed = |error| io_error(path, error);
+    let mut bytes = input::open(path).map_err(failed)?;
+    let mut head = Vec::new();
+    bytes.by_ref().take(HEAD).read_to_end(&mut head).map_err(failed)?;
+    let header = String::from_utf8_lossy(head.split(|byte| *byte == b'\n').next().unwrap_or_default()).into_owned();
+    let whole = Cursor::new(head.clone()).chain(bytes);
     let mut cycles = Cycles::new(Settings::NOMINAL);
-    let mut taken = Vec::new();
-    if name.ends_with(".csv") {
-        let opened = || fs::File::open(path).map_err(|error| io_error(path, error));
-        let mut header = String::new();
-        BufReader::new(opened()?)
-            .read_line(&mut header)
-            .map_err(|error| io_error(path, error))?;
-        if counts::is_one(&header) {
-            let packet = |reading: Reading| Item::Packet { offset: 0, reading };
-            let readings = counts::parse(&name, BufReader::new(opened()?))?;
-            taken.extend(readings.into_iter().filter_map(|reading| cycles.take(&packet(reading))));
-            taken.extend(cycles.finish());
-            return Ok(Log::Unit(taken));
-        }
+    if counts::is_one(&header) {
+        let packet = |reading: Reading| Item::Packet { offset: 0, reading };
+        let readings = counts::parse(&name, BufReader::new(whole))?;
+        let mut taken: Vec<Cycle> = (readings.into_iter())
+            .filter_map(|reading| cycles.take(&packet(reading)))
+            .collect();
+        taken.extend(cycles.finish());
+        return Ok(Log::Unit(taken));
     }
-    if name.ends_with(".csv") || name.ends_with(".csv.gz") {
-        return Ok(Log::NineAxis(recording::read(path)?));
+    if header.split(',').any(|column| column.trim() == "t_s") {
+        let rows = recording::parse(&name, BufReader::new(whole))?;
+        let rows = plausible::in_si(rows, units).map_err(|why| AttitudeError::Implausible { file: name, why })?;
+        return Ok(Log::NineAxis(rows));
     }
-    let mut file = fs::File::open(path).map_err(|error| io_error(path, error))?;
-    let bar = ProgressBar::new(file.metadata().map(|metadata| metadata.len()).unwrap_or_default());
+    match packets(whole, cycles).map_err(failed)? {
+        taken if taken.is_empty() => Err(AttitudeError::NoLog {
+            file: name,
+            looks: input::looks_like(&head),
+        }),
+        taken => Ok(Log::Unit(taken)),
+    }
+}
+
+/// The cycles of a stream of packets, without codes that no part can give.
+fn packets(mut bytes: impl Read, mut cycles: Cycles) -> io::Result<Vec<Cycle>> {
+    let bar = ProgressBar::new_spinner();
     let mut decoder = Decoder::new(Bytes5To8::Errors);
-    let mut piece = [0; 65_536];
+    let (mut taken, mut piece) = (Vec::new(), [0; 65_536]);
     loop {
-        let count = file.read(&mut piece).map_err(|error| io_error(path, error))?;
+        let count = bytes.read(&mut piece)?;
         if count == 0 {
             break;
         }
-        taken.extend(
-            decoder
-                .push(&piece[..count])
-                .iter()
-                .filter_map(|item| cycles.take(item)),
-        );
+        for mut item in decoder.push(&piece[..count]) {
+            if let Item::Packet { reading, .. } = &mut item {
+                *reading = reach::without_impossible(*reading);
+            }
+            taken.extend(cycles.take(&item));
+        }
         bar.inc(count as u64);
     }
     taken.extend(cycles.finish());
     bar.finish_and_clear();
-    Ok(Log::Unit(taken))
+    Ok(taken)
 }
 
 fn summary(flight: &Flight) -> String {

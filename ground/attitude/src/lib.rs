@@ -1,5 +1,6 @@
 //! Attitude from a log: the methods on recorded data, beside a reference and beside peers.
 
+pub mod align;
 pub mod broad;
 pub mod chapter6;
 pub mod command;
@@ -9,6 +10,7 @@ pub mod log;
 pub mod methods;
 pub mod orbit;
 pub mod peers;
+pub mod plausible;
 pub mod plots;
 pub mod recording;
 pub mod reference;

@@ -1,19 +1,27 @@
-//! A flight's plots: angles with three standard deviations, innovations with their gates, biases.
+//! A flight's plots: angles with three standard deviations, the error against a reference, innovations with their gates,
+//! biases.
 //!
-//! In: a [`Flight`]. Out: one page of HTML that opens without a network.
+//! In: a [`Flight`], a reference if there is one, what was printed. Out: one page of HTML that opens without a network.
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel, html};
 use emems::kalman::Quantity;
 
-use crate::flight::{Flight, euler_deg};
+use crate::{
+    flight::{Flight, euler_deg},
+    recording::{Row, attitude_at},
+};
 
 /// Most points in a line: more cannot be seen, and an hour at 285 Hz has a million.
 const MOST_POINTS: usize = 4_000;
 
 /// The page.
-pub fn page(flight: &Flight) -> Result<String, ChartError> {
+pub fn page(flight: &Flight, reference: Option<&[Row]>, rows: Vec<(String, String)>) -> Result<String, ChartError> {
     let about = "The unit's filter on a log: attitude with three standard deviations and TRIAD beside it, innovations within their gates, biases.";
-    let blocks = [angles(flight)?, innovations(flight)?, biases(flight)?].map(Block::Figure);
+    let mut blocks = vec![Block::Rows(rows), Block::Figure(angles(flight, reference)?)];
+    if let Some(reference) = reference {
+        blocks.push(Block::Figure(errors(flight, reference)?));
+    }
+    blocks.extend([innovations(flight)?, biases(flight)?].map(Block::Figure));
     Ok(html("Attitude", about, &blocks))
 }
 
@@ -33,7 +41,42 @@ fn thinned(flight: &Flight) -> impl Iterator<Item = &crate::flight::Estimate> {
         .step_by(flight.estimates.len() / MOST_POINTS + 1)
 }
 
-fn angles(flight: &Flight) -> Result<Figure, ChartError> {
+/// The reference at the instants that are drawn.
+fn met<'a>(
+    flight: &'a Flight,
+    reference: &'a [Row],
+) -> impl Iterator<Item = (&'a crate::flight::Estimate, nalgebra::UnitQuaternion<f64>)> {
+    // As `Flight::compare` has it: within a step on both sides.
+    let step_s = match flight.estimates.as_slice() {
+        [first, .., last] => (last.t_s - first.t_s) / (flight.estimates.len() - 1) as f64,
+        _ => 0.0,
+    };
+    thinned(flight).filter_map(move |estimate| Some((estimate, attitude_at(reference, estimate.t_s, 1.5 * step_s)?)))
+}
+
+fn errors(flight: &Flight, reference: &[Row]) -> Result<Figure, ChartError> {
+    let panels = ["x", "y", "z"].into_iter().enumerate().map(|(axis, name)| {
+        let error = met(flight, reference).map(|(estimate, reference_nb)| {
+            let error_b = (reference_nb.inverse() * estimate.q_nb).scaled_axis();
+            (estimate.t_s, error_b[axis].to_degrees())
+        });
+        let band = met(flight, reference).map(|(estimate, _)| {
+            // The covariance is about the axes of n.
+            let nb = estimate.q_nb.to_rotation_matrix();
+            let variance = (nb.transpose() * estimate.covariance_n * nb.matrix())[(axis, axis)];
+            let three = 3.0 * variance.max(0.0).sqrt().to_degrees();
+            (estimate.t_s, -three, three)
+        });
+        let layers = vec![
+            Layer::new("3 standard deviations", 5, Marks::Band(band.collect())),
+            Layer::new("filter minus reference", 1, Marks::Line(error.collect())),
+        ];
+        panel(&format!("error about {name} of b"), "deg", layers)
+    });
+    Figure::of("Error against the reference", 3, &panels.collect::<Vec<_>>())
+}
+
+fn angles(flight: &Flight, reference: Option<&[Row]>) -> Result<Figure, ChartError> {
     let angles = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {
         let of = |estimate: &crate::flight::Estimate| (estimate.t_s, estimate.euler_deg()[axis]);
         let band = thinned(flight).map(|estimate| {
@@ -45,11 +88,16 @@ fn angles(flight: &Flight) -> Result<Figure, ChartError> {
             let (t_s, triad_nb) = estimate.triad_nb?;
             Some((t_s, euler_deg(&triad_nb)[axis]))
         });
-        let layers = vec![
+        let seen = reference.into_iter().flat_map(|rows| met(flight, rows));
+        let seen = broken(seen.map(|(estimate, reference_nb)| (estimate.t_s, euler_deg(&reference_nb)[axis])));
+        let mut layers = vec![
             Layer::new("3 standard deviations", 5, Marks::Band(unwrapped_band(band))),
             Layer::new("TRIAD", 4, Marks::Dots(triad.collect())),
             Layer::new("filter", 0, Marks::Line(broken(thinned(flight).map(of)))),
         ];
+        if !seen.is_empty() {
+            layers.push(Layer::new("reference", 2, Marks::Dashes(seen)));
+        }
         panel(name, "deg", layers)
     });
     let widths = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {

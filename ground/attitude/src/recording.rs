@@ -8,12 +8,10 @@
 //! sensors' columns, cells that are no finite number, and time that does not go forward, each with its line and column.
 
 use std::{
-    fs::File,
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, BufReader},
     path::Path,
 };
 
-use flate2::read::GzDecoder;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// One sample.
@@ -98,12 +96,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>, RecordingError> {
         file: file.clone(),
         error,
     };
-    let opened = File::open(path).map_err(io)?;
-    let bytes: Box<dyn Read> = match path.extension() {
-        Some(extension) if extension == "gz" => Box::new(GzDecoder::new(opened)),
-        _ => Box::new(opened),
-    };
-    parse(&file, BufReader::new(bytes))
+    parse(&file, BufReader::new(packets::input::open(path).map_err(io)?))
 }
 
 /// Reads rows; `file` is what errors call them.

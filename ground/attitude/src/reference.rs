@@ -6,12 +6,10 @@
 //! are far from norm one.
 
 use std::{
-    fs::File,
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, Read},
     path::Path,
 };
 
-use flate2::read::GzDecoder;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::recording::{self, RecordingError, Row};
@@ -29,11 +27,7 @@ pub fn read(path: &Path, offset_s: f64) -> Result<Vec<Row>, RecordingError> {
         file: file.clone(),
         error,
     };
-    let opened = File::open(path).map_err(io)?;
-    let read = match path.extension() {
-        Some(extension) if extension == "gz" => GzDecoder::new(opened).read_to_string(&mut text),
-        _ => BufReader::new(opened).read_to_string(&mut text),
-    };
+    let read = packets::input::open(path).and_then(|mut bytes| bytes.read_to_string(&mut text));
     read.map_err(io)?;
     let header = text.lines().next().unwrap_or_default();
     let own = header.split(',').any(|name| name.trim() == COLUMNS[1]);

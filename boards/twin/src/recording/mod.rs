@@ -52,6 +52,19 @@ pub struct Recording {
     to_s: f64,
 }
 
+/// What one of a file's units is in ours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// [s]
+    pub time: f64,
+    /// [rad/s]
+    pub rate: f64,
+    /// [m/s2]
+    pub force: f64,
+    /// [uT]
+    pub field: f64,
+}
+
 impl Recording {
     /// Reads a file.
     pub fn open(path: &Path) -> Result<Self, FileError> {
@@ -80,6 +93,28 @@ impl Recording {
         }
         (self.from_s, self.to_s) = (self.from_s + from_s, self.from_s + end_s);
         Ok(self)
+    }
+
+    /// A file in other units: what one of each is in s, rad/s, m/s2 and uT.
+    pub fn in_units(mut self, units: Units) -> Self {
+        self.rate_b = self.rate_b.with_times_scaled(units.time).map(|rate| rate * units.rate);
+        self.rate_dot_b = self.rate_b.clone().slopes();
+        self.force_b = self
+            .force_b
+            .with_times_scaled(units.time)
+            .map(|force| force * units.force);
+        self.field_b_ut = self
+            .field_b_ut
+            .with_times_scaled(units.time)
+            .map(|field| field * units.field);
+        self.temperature_c = self.temperature_c.map(|series| series.with_times_scaled(units.time));
+        (self.from_s, self.to_s) = (self.from_s * units.time, self.to_s * units.time);
+        self
+    }
+
+    /// What was recorded at each sample of the rates, with its time on the file's clock.
+    pub fn samples(&self) -> impl Iterator<Item = (f64, Truth)> {
+        self.rate_b.t_s().iter().map(|t_s| (*t_s, self.at(t_s - self.from_s)))
     }
 
     fn columns() -> Vec<&'static str> {
@@ -184,6 +219,24 @@ mod tests {
     fn the_turn_from_s_to_b_keeps_handedness() {
         let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(s_to_b);
         assert_eq!(x.cross(&y), z);
+    }
+
+    #[test]
+    fn a_file_in_other_units_is_the_same_recording() {
+        let deg = 1_f64.to_radians();
+        let units = Units {
+            time: 1e-3,
+            rate: deg,
+            force: 9.80665,
+            field: 100.0,
+        };
+        let scaled = recording().in_units(units);
+        let (was, is) = (recording().at(0.1), scaled.at(1e-4));
+        assert!((is.rate_b - was.rate_b * deg).norm() < ROUNDING);
+        assert!((is.rate_dot_b - was.rate_dot_b * deg * 1e3).norm() < 1e-9);
+        assert!((is.force_b - was.force_b * 9.80665).norm() < ROUNDING);
+        assert!((is.field_b_ut - was.field_b_ut * 100.0).norm() < 1e-9);
+        assert!((scaled.samples().last().unwrap().0 - 0.0105).abs() < ROUNDING);
     }
 
     #[test]

@@ -42,6 +42,14 @@ impl<const N: usize> Series<N> {
         self
     }
 
+    /// With its times in another unit, `factor` of this one.
+    pub fn with_times_scaled(mut self, factor: f64) -> Self {
+        for t_s in &mut self.t_s {
+            *t_s *= factor;
+        }
+        self
+    }
+
     /// The same, unless `each` refuses a value.
     pub fn try_map<E>(
         mut self,
