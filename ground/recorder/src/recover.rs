@@ -4,12 +4,15 @@
 //! Refuses a file larger than a chip and a newer format; otherwise whatever is readable is recovered.
 
 use std::{
-    fs::{self, File},
-    io::{self, BufWriter, Write},
+    io::{self, BufWriter, Read, Write},
     path::{Path, PathBuf},
 };
 
 use emems::{board::ResetCause, crash::CrashCause, flight_log::record::Start};
+use packets::{
+    input, output,
+    stream::{Bytes5To8, Decoder, Item},
+};
 
 use crate::{
     log::{self, LIMIT, Log, LogError},
@@ -25,10 +28,10 @@ const GAPS_LISTED: usize = 100;
 /// corrects what can be corrected, and writes a row for each record. Boots, gaps and damage go to standard error.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --out all.csv\n  ground recover nand.bin --out flight.parquet"
+    after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --table all.csv\n  ground recover nand.bin --table flight.parquet"
 )]
 pub struct Arguments {
-    /// Raw image of the chip, or a dump
+    /// Raw image of the chip or a dump, gzip or not
     pub file: PathBuf,
     /// Values in counts instead of SI
     #[arg(long)]
@@ -37,8 +40,8 @@ pub struct Arguments {
     #[arg(long)]
     pub all_epochs: bool,
     /// Write the table to FILE instead of standard output; Parquet if it ends in .parquet
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
+    #[arg(long, alias = "out", value_name = "FILE")]
+    pub table: Option<PathBuf>,
 }
 
 /// Why nothing was recovered.
@@ -60,6 +63,14 @@ pub enum RecoverError {
         /// Why.
         source: LogError,
     },
+    /// There is no record in it.
+    #[error("{path}: not one record in it: {why}", path = path.display())]
+    Nothing {
+        /// Which.
+        path: PathBuf,
+        /// What it looks like instead.
+        why: &'static str,
+    },
     /// The output cannot be written.
     #[error("the output cannot be written: {0}")]
     Output(#[from] io::Error),
@@ -71,15 +82,23 @@ pub enum RecoverError {
 /// When the file cannot be read or is no log, or the output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), RecoverError> {
     let path = &arguments.file;
-    let log = log::read(&content(path)?).map_err(|source| RecoverError::Log {
+    let content = content(path)?;
+    let log = log::read(&content).map_err(|source| RecoverError::Log {
         path: path.clone(),
         source,
     })?;
-    match &arguments.out {
+    if log.packets.is_empty() && log.headers.is_empty() && log.damage.newer.is_empty() {
+        return Err(RecoverError::Nothing {
+            path: path.clone(),
+            why: nothing(&content),
+        });
+    }
+    match &arguments.table {
         Some(out) if out.extension().is_some_and(|extension| extension == "parquet") => {
-            parquet::create(out, log.packets_of(arguments.all_epochs), !arguments.counts)?;
+            let records = || log.packets_of(arguments.all_epochs);
+            output::replace(out, |file| parquet::write(file, records(), !arguments.counts))?;
         }
-        Some(out) => write_rows(&log, arguments, &mut BufWriter::new(File::create(out)?))?,
+        Some(out) => output::replace(out, |file| write_rows(&log, arguments, file))?,
         None => write_rows(&log, arguments, &mut BufWriter::new(io::stdout().lock()))?,
     }
     write_remarks(&log, arguments.all_epochs, &mut BufWriter::new(io::stderr().lock()))?;
@@ -92,14 +111,35 @@ fn content(path: &Path) -> Result<Vec<u8>, RecoverError> {
         path: path.to_owned(),
         source,
     };
-    let length = fs::metadata(path).map_err(fail)?.len();
+    let too_large = |length| RecoverError::Log {
+        path: path.to_owned(),
+        source: LogError::TooLarge(length),
+    };
+    let length = std::fs::metadata(path).map_err(fail)?.len();
     if length > LIMIT {
-        return Err(RecoverError::Log {
-            path: path.to_owned(),
-            source: LogError::TooLarge(length),
-        });
+        return Err(too_large(length));
     }
-    fs::read(path).map_err(fail)
+    let mut content = Vec::new();
+    let read = input::open(path).and_then(|bytes| bytes.take(LIMIT + 1).read_to_end(&mut content));
+    read.map_err(fail)?;
+    match content.len() as u64 {
+        length if length > LIMIT => Err(too_large(length)),
+        _ => Ok(content),
+    }
+}
+
+/// Why there is no record in a file, as far as its bytes tell.
+fn nothing(content: &[u8]) -> &'static str {
+    let mut decoder = Decoder::new(Bytes5To8::Errors);
+    let head = content.get(..input::HEAD_BYTES).unwrap_or(content);
+    let items = decoder.push(head);
+    if items.iter().any(|item| matches!(item, Item::Packet { .. })) {
+        "it holds packets as the unit sends them; `ground decode` reads those"
+    } else if log::is_image(content) {
+        "it is an image of a recorder in which nothing was recorded, or all was erased"
+    } else {
+        input::looks_like(head)
+    }
 }
 
 fn write_rows(log: &Log, arguments: &Arguments, rows: &mut dyn Write) -> io::Result<()> {
@@ -267,7 +307,7 @@ mod tests {
         let place = tempfile::tempdir().expect("temporary folder");
         let path = place.path().join("claims.bin");
         // Ten gigabytes that take no room.
-        File::create(&path)
+        std::fs::File::create(&path)
             .and_then(|file| file.set_len(10 << 30))
             .expect("sparse file");
         let error = content(&path).expect_err("too large");
@@ -275,6 +315,30 @@ mod tests {
             error.to_string().contains("10737418240 bytes are more than any chip"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn what_is_no_log_is_an_error_and_the_file_that_was_there_stays() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let out = place.path().join("have.csv");
+        std::fs::write(&out, "have").expect("written");
+        let recover = |name: &str, bytes: &[u8]| {
+            let file = place.path().join(name);
+            std::fs::write(&file, bytes).expect("written");
+            let arguments = Arguments {
+                file,
+                counts: true,
+                all_epochs: false,
+                table: Some(out.clone()),
+            };
+            run(&arguments).expect_err(name).to_string()
+        };
+        assert!(recover("empty", b"").contains("it is empty"));
+        assert!(recover("page.html", b"<!doctype html>").contains("web page"));
+        let packet = emems::packet::encode(&emems::sample::Reading::unread(1));
+        assert!(recover("packets.txt", &packet).contains("ground decode"));
+        assert!(recover("cut.gz", b"\x1f\x8b\x08\x00").contains("cut.gz: "));
+        assert_eq!(std::fs::read(&out).expect("there"), b"have");
     }
 
     #[test]
@@ -302,7 +366,7 @@ mod tests {
             file: "none".into(),
             counts: true,
             all_epochs: false,
-            out: None,
+            table: None,
         };
         write_rows(&Log::default(), &arguments, &mut rows).expect("written");
         write_remarks(&Log::default(), false, &mut remarks).expect("written");
