@@ -5,6 +5,7 @@
 //! first [`HEAD`] bytes, where superblock and log begin. Memory does not grow with a stream; an image is bounded by the
 //! largest chip.
 
+mod cycle;
 mod image;
 mod input;
 
@@ -15,10 +16,13 @@ use std::{
 };
 
 use emems::nand::PAGE_BYTES;
-use packets::stream::Bytes5To8;
+use packets::{input::looks_like, stream::Bytes5To8};
 use recorder::log::{self, LogError};
 
-use self::input::Input;
+use self::{
+    cycle::{Contradicted, Cycle},
+    input::Input,
+};
 use crate::{
     digest::{Digest, Entry},
     folder::{self, Folder, FolderError},
@@ -32,14 +36,15 @@ const HEAD: u64 = 1 << 20;
 ///
 /// Reads 156-byte packets (and derived frames) from a file however cut, spliced or mixed with other text: every intact
 /// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale
-/// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell; time is counter times cycle. A raw image of the
+/// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell, and so is one in SI that no part can give; time is
+/// counter times cycle, which derived frames say themselves. A raw image of the
 /// recorder's NAND (528 bytes a page) is recognised and gives its newest epoch's records; `recover` gives the others.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded\n  ground decode nand.bin --out decoded"
 )]
 pub struct Arguments {
-    /// File of packets, gzip if it ends in .gz; - for standard input
+    /// File of packets, gzip or not; - for standard input
     pub file: PathBuf,
     /// Values in counts instead of SI, with counter, error bits and flags
     #[arg(long, conflicts_with = "out")]
@@ -48,12 +53,15 @@ pub struct Arguments {
     /// records.parquet
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Print the summary as JSON
+    #[arg(long, requires = "out")]
+    pub json: bool,
     /// Bytes 5 to 8 are a CRC-16 (streams after Table A.2), not the error identifier
     #[arg(long)]
     pub crc: bool,
-    /// Time between two packets of a stream; an image says it itself
-    #[arg(long, value_name = "TIME", default_value = "200ms", value_parser = cycle)]
-    pub cycle: Duration,
+    /// Time between two packets of a stream; derived frames and an image say it themselves [default: 200ms]
+    #[arg(long, value_name = "TIME", value_parser = cycle)]
+    pub cycle: Option<Duration>,
 }
 
 /// Why a file could not be decoded.
@@ -77,6 +85,22 @@ pub enum DecodeError {
         /// Why.
         source: LogError,
     },
+    /// There is no packet in it.
+    #[error("{path}: not one packet in it: {looks}")]
+    NoPackets {
+        /// Which file.
+        path: PathBuf,
+        /// What it looks like instead.
+        looks: &'static str,
+    },
+    /// Its derived frames contradict the cycle.
+    #[error("{path}: {source}")]
+    Cycle {
+        /// Which file.
+        path: PathBuf,
+        /// How.
+        source: Contradicted,
+    },
     /// Standard output or error cannot be written.
     #[error("the output cannot be written: {0}")]
     Output(#[from] io::Error),
@@ -88,8 +112,9 @@ pub enum DecodeError {
 /// Runs `ground decode`.
 ///
 /// # Errors
-/// When the file cannot be read or the output not written, or it is an image of a newer log; never because of what else is
-/// in the file.
+/// When the file cannot be read, holds no packet, contradicts the cycle that was told, or is an image of a newer log; and when
+/// the output cannot be written. What else is in the file is passed over, and said. Of a file that breaks off, what came
+/// before is written first.
 pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
     let mut input = Input::open(&arguments.file)?;
     // A stream that is still being sent is not kept waiting: its first bytes are text, those of an image are not.
@@ -97,15 +122,31 @@ pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
     if !head.is_ascii() {
         head.extend(input.first(HEAD)?);
     }
+    let looks = looks_like(&head);
+    let no_packets = || DecodeError::NoPackets {
+        path: arguments.file.clone(),
+        looks,
+    };
     let stdout = &mut BufWriter::new(io::stdout().lock());
     let stderr = &mut BufWriter::new(io::stderr().lock());
-    let cycle_s = arguments.cycle.as_secs_f64();
-    match (log::is_image(&head), &arguments.out) {
-        (true, None) => image::to_text(&image::log(input, head)?, arguments.counts, stdout, stderr),
-        (true, Some(parent)) => image::to_folder(&image::log(input, head)?, &name(arguments), parent),
-        (false, None) => to_text(arguments, cycle_s, input.after(head), stdout, stderr),
-        (false, Some(parent)) => to_folder(arguments, cycle_s, input.after(head), parent),
+    if log::is_image(&head) {
+        let log = image::log(input, head)?;
+        if log.packets.is_empty() && log.headers.is_empty() && log.damage.newer.is_empty() {
+            return Err(DecodeError::NoPackets {
+                path: arguments.file.clone(),
+                looks: "it is an image of a recorder in which nothing was recorded, or all was erased",
+            });
+        }
+        return match &arguments.out {
+            None => image::to_text(&log, arguments.counts, stdout, stderr),
+            Some(parent) => image::to_folder(&log, &name(arguments), parent, arguments.json),
+        };
     }
+    let any = match &arguments.out {
+        None => to_text(arguments, input.after(head), stdout, stderr)?,
+        Some(parent) => to_folder(arguments, input.after(head), parent)?,
+    };
+    if any { Ok(()) } else { Err(no_packets()) }
 }
 
 fn name(arguments: &Arguments) -> String {
@@ -120,31 +161,81 @@ fn stem(name: &str) -> &str {
     name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("log")
 }
 
-fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str) -> Result<(), DecodeError> {
+fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str, json: bool) -> Result<(), DecodeError> {
     let (rest, summary, envelope) = digest.finish();
     folder.entries(&rest)?;
     let rows = summary.rows();
     let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
-    print!("{}", folder::text_of(&rows));
-    println!("{}", path.join("index.html").display());
+    let page = path.join("index.html");
+    if json {
+        let rows: serde_json::Map<_, _> = (rows.into_iter())
+            .map(|(name, value)| (name.to_string(), value.into()))
+            .collect();
+        println!("{}", serde_json::json!({ "summary": rows, "page": page }));
+    } else {
+        print!("{}", folder::text_of(&rows));
+        println!("{}", page.display());
+    }
     Ok(())
 }
 
+/// Reads a stream to its end and gives its entries away with their cycle \[s\] once that is known; what came of it. A stream
+/// that breaks off is an error for afterwards.
+#[allow(clippy::type_complexity)] // A pair of what was found and what went wrong at last.
+fn stream(
+    arguments: &Arguments,
+    input: Input,
+    mut put: impl FnMut(f64, &[Entry]) -> Result<(), DecodeError>,
+) -> Result<(Cycle, Digest, Option<DecodeError>), DecodeError> {
+    let mut digest = Digest::new(bytes_5_to_8(arguments));
+    let mut cycle = Cycle::new(arguments.cycle.map(|cycle| cycle.as_secs_f64()));
+    let read = input.read(|piece| {
+        let entries = cycle
+            .take(digest.push(None, piece))
+            .map_err(|source| DecodeError::Cycle {
+                path: arguments.file.clone(),
+                source,
+            })?;
+        if cycle.hopeless() {
+            return Err(DecodeError::NoPackets {
+                path: arguments.file.clone(),
+                looks: "its bytes are no text of the unit",
+            });
+        }
+        if entries.is_empty() {
+            Ok(())
+        } else {
+            put(cycle.s(), &entries)
+        }
+    });
+    let broken = match read {
+        Err(error @ DecodeError::Read { .. }) if cycle.any() => Some(error),
+        other => other.map(|()| None)?,
+    };
+    let rest = cycle.rest();
+    if cycle.any() {
+        put(cycle.s(), &rest)?;
+    }
+    Ok((cycle, digest, broken))
+}
+
+/// Rows and remarks; whether there was a packet.
 fn to_text(
     arguments: &Arguments,
-    cycle_s: f64,
     input: Input,
     rows: &mut dyn Write,
     remarks: &mut dyn Write,
-) -> Result<(), DecodeError> {
+) -> Result<bool, DecodeError> {
     let header = if arguments.counts {
         table::counts_header()
     } else {
         table::si_header()
     };
-    writeln!(rows, "{header}")?;
-    let mut digest = Digest::new(bytes_5_to_8(arguments));
-    let mut put = |entries: &[Entry]| -> io::Result<()> {
+    let mut header = Some(header);
+    let mut put = |cycle_s: f64, entries: &[Entry]| -> Result<(), DecodeError> {
+        if let Some(header) = header.take() {
+            writeln!(rows, "{header}")?;
+        }
         for entry in entries {
             if let Entry::Packet { number, reading, .. } = entry {
                 let t_s = *number as f64 * cycle_s;
@@ -161,20 +252,32 @@ fn to_text(
         }
         Ok(())
     };
-    input.read(|piece| Ok(put(&digest.push(None, piece))?))?;
+    let (cycle, digest, broken) = stream(arguments, input, &mut put)?;
+    if !cycle.any() {
+        return Ok(false);
+    }
     let (rest, summary, _) = digest.finish();
-    put(&rest)?;
+    put(cycle.s(), &rest)?;
     rows.flush()?;
     write!(remarks, "{}", folder::text_of(&summary.rows()))?;
-    Ok(remarks.flush()?)
+    remarks.flush()?;
+    broken.map_or(Ok(true), Err)
 }
 
-fn to_folder(arguments: &Arguments, cycle_s: f64, input: Input, parent: &Path) -> Result<(), DecodeError> {
+/// A folder; none without a packet, and whether there was one.
+fn to_folder(arguments: &Arguments, input: Input, parent: &Path) -> Result<bool, DecodeError> {
     let name = name(arguments);
-    let mut folder = Folder::create(parent, stem(&name), cycle_s)?;
-    let mut digest = Digest::new(bytes_5_to_8(arguments));
-    input.read(|piece| Ok(folder.entries(&digest.push(None, piece))?))?;
-    finish(folder, digest, stem(&name), &name)
+    let mut made: Option<Folder> = None;
+    let (_, digest, broken) = stream(arguments, input, |cycle_s, entries| {
+        let folder = match &mut made {
+            Some(folder) => folder,
+            none => none.insert(Folder::create(parent, stem(&name), cycle_s)?),
+        };
+        Ok(folder.entries(entries)?)
+    })?;
+    let Some(folder) = made else { return Ok(false) };
+    finish(folder, digest, stem(&name), &name, arguments.json)?;
+    broken.map_or(Ok(true), Err)
 }
 
 fn bytes_5_to_8(arguments: &Arguments) -> Bytes5To8 {
@@ -207,8 +310,9 @@ mod tests {
             file: file.into(),
             counts: true,
             out: None,
+            json: false,
             crc: false,
-            cycle: Duration::from_millis(200),
+            cycle: None,
         }
     }
 
@@ -228,7 +332,8 @@ mod tests {
         let (mut rows, mut remarks) = (Vec::new(), Vec::new());
         let mut input = Input::open(&file).expect("open");
         let head = input.first(7).expect("a beginning");
-        to_text(&arguments(&file), 0.2, input.after(head), &mut rows, &mut remarks).expect("decode");
+        let any = to_text(&arguments(&file), input.after(head), &mut rows, &mut remarks).expect("decode");
+        assert!(any);
         let rows = String::from_utf8(rows).expect("text");
         let times: Vec<_> = rows
             .lines()
@@ -242,6 +347,48 @@ mod tests {
             ),
             "{remarks}"
         );
+    }
+
+    #[test]
+    fn what_holds_no_packet_is_an_error_and_leaves_no_folder() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        for (name, bytes, words) in [
+            ("empty", b"".as_slice(), "it is empty"),
+            ("page.html", b"<html>", "web page"),
+            ("counts.csv", b"t_s,counter,a1x\n0,1,2\n", "a table"),
+            ("noise", &[0x81, 0x40, 0x00, 0xFF], "no text"),
+        ] {
+            let file = place.path().join(name);
+            std::fs::write(&file, bytes).expect("written");
+            let out = place.path().join("out");
+            let asked = Arguments {
+                counts: false,
+                out: Some(out.clone()),
+                ..arguments(&file)
+            };
+            for asked in [asked, arguments(&file)] {
+                let error = decode(&asked).expect_err(name).to_string();
+                assert!(error.contains(words), "{name}: {error}");
+            }
+            assert!(!out.exists(), "{name}");
+        }
+    }
+
+    #[test]
+    fn of_a_stream_that_breaks_off_what_came_is_written_before_the_error() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let file = place.path().join("cut.txt.gz");
+        let mut packed = GzEncoder::new(Vec::new(), Compression::none());
+        packed
+            .write_all(&encode(&Reading::unread(2)).repeat(20))
+            .expect("packed");
+        let packed = packed.finish().expect("packed");
+        std::fs::write(&file, &packed[..packed.len() - 300]).expect("written");
+        let (mut rows, mut remarks) = (Vec::new(), Vec::new());
+        let input = Input::open(&file).expect("open");
+        let read = to_text(&arguments(&file), input, &mut rows, &mut remarks);
+        assert!(matches!(read, Err(DecodeError::Read { .. })), "{read:?}");
+        assert!(String::from_utf8_lossy(&rows).lines().count() > 10);
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! A flight of any length in a fixed number of bins: what a plot can show of it.
 //!
 //! In: packets by number, with the interval since the one before where it is known. Out: [`Bin`]s of equal length in
-//! packets, each with the least and most count of every channel, the sensors that failed, packets missed, and flags.
+//! packets, each with the least and most count of every channel, the sensors that failed or stood at the end of their range, packets missed, and flags.
 //! A new packet beyond the last bin merges bins in pairs, so memory is bounded (about 400 KiB) and a short flight keeps
 //! one packet a bin. A peak is never lost, only known less sharply in time.
 
 use emems::sample::Reading;
 
-use packets::channel::{self, CHANNEL_COUNT};
+use packets::{
+    channel::{self, CHANNEL_COUNT, Reach},
+    reach,
+};
 
 /// Bins at most: more than the pixels a plot is wide on paper or screen.
 pub const MOST_BINS: usize = 1200;
@@ -57,6 +60,8 @@ pub struct Bin {
     pub counts: [Option<Range<i16>>; CHANNEL_COUNT],
     /// Sensors that failed in any of them, one bit each.
     pub failed: u16,
+    /// Sensors that stood at the end of their range in any of them, one bit each.
+    pub clipped: u16,
     /// [s] time from the packet before to each of them, where no packet was missed between.
     pub interval_s: Option<Range<f64>>,
     /// Lift-off was asserted in any of them.
@@ -71,6 +76,7 @@ impl Bin {
         missed: 0,
         counts: [None; CHANNEL_COUNT],
         failed: 0,
+        clipped: 0,
         interval_s: None,
         lift_off: false,
         micro_g: false,
@@ -83,6 +89,7 @@ impl Bin {
             *mine = Range::join(*mine, *others);
         }
         self.failed |= other.failed;
+        self.clipped |= other.clipped;
         self.interval_s = Range::join(self.interval_s, other.interval_s);
         self.lift_off |= other.lift_off;
         self.micro_g |= other.micro_g;
@@ -127,8 +134,9 @@ impl Envelope {
             bin.join(&Bin {
                 packets: 1,
                 missed,
-                counts: channel::counts(reading).map(|value| value.map(Range::of)),
+                counts: channel::counts(&reach::without_impossible(*reading)).map(|value| value.map(Range::of)),
                 failed: reading.errors.0,
+                clipped: reach::sensors(reading, Reach::End),
                 interval_s: interval_s.map(Range::of),
                 lift_off: reading.lift_off,
                 micro_g: reading.micro_g,

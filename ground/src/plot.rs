@@ -91,6 +91,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
                     })
                     .collect(),
                 failed: times.spans(|bin| bin.failed & slots != 0),
+                clipped: times.spans(|bin| bin.clipped & slots != 0),
             }
         })
         .collect();
@@ -100,7 +101,10 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
         .zip(names)
         .map(|(colour, name)| (hex(colour), name.to_string()))
         .collect();
-    legend.extend(times.legend(panels.iter().any(|panel| !panel.failed.is_empty())));
+    legend.extend(times.legend(
+        panels.iter().any(|panel| !panel.failed.is_empty()),
+        panels.iter().any(|panel| !panel.clipped.is_empty()),
+    ));
     let svg = drawing(title, FOUR_PANELS, |root| {
         let y = panel::shared_y(&panels, times, lsb);
         for (area, panel) in root.split_evenly((2, 2)).iter().zip(&panels) {
@@ -132,9 +136,10 @@ fn period(times: &Times, summary: &Summary) -> Result<Figure, ChartError> {
             }),
         }],
         failed: Vec::new(),
+        clipped: Vec::new(),
     };
     let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other".to_string())];
-    legend.extend(times.legend(false));
+    legend.extend(times.legend(false, false));
     let svg = drawing(&title, ONE_PANEL, |root| {
         let y = panel::shared_y(
             std::slice::from_ref(&panel),

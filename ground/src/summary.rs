@@ -10,7 +10,7 @@ use emems::{
 };
 
 use packets::{
-    channel,
+    reach::{self, Tally},
     stream::{Reason, Reject, sequence::Step},
 };
 
@@ -86,6 +86,8 @@ pub struct Summary {
     pub cut_off_bytes: u64,
     /// Packets in which each sensor failed, reading order.
     pub failed: [u64; SENSOR_COUNT],
+    /// Packets in which sensors stood at the end of their range or gave impossible codes.
+    pub reach: Tally,
     /// [s] period between packets that follow each other.
     pub period_s: Spread,
     /// [s] from the start of a cycle to the closing of its packet.
@@ -109,6 +111,7 @@ impl Summary {
         for (slot, failed) in self.failed.iter_mut().enumerate() {
             *failed += u64::from(reading.errors.contains(slot));
         }
+        self.reach.add(reading);
         if let Some(period_s) = period_s {
             self.period_s.add(period_s);
         }
@@ -150,8 +153,12 @@ impl Summary {
         let mut rows = vec![
             ("packets", self.packets.to_string()),
             ("missed", self.missed.to_string()),
-            ("packets with sensor errors", self.errors()),
+            (
+                "packets with sensor errors",
+                reach::by_sensor(&self.failed).unwrap_or_else(|| "none".into()),
+            ),
         ];
+        rows.extend(self.reach.rows());
         if self.period_s.count > 0 {
             rows.push(("packet period", self.period_s.milli("ms")));
             rows.push(("packet jitter", format!("{:.4} ms", 1e3 * self.period_s.jitter())));
@@ -177,17 +184,6 @@ impl Summary {
             rows.push(("cut off at the end", format!("{} bytes of a frame", self.cut_off_bytes)));
         }
         rows
-    }
-
-    fn errors(&self) -> String {
-        let failing: Vec<String> = (self.failed.iter().enumerate())
-            .filter(|(_, count)| **count > 0)
-            .map(|(slot, count)| format!("{}: {count}", channel::sensor_name(slot)))
-            .collect();
-        match failing.as_slice() {
-            [] => "none".into(),
-            _ => failing.join(", "),
-        }
     }
 }
 
@@ -230,6 +226,16 @@ mod tests {
                 ),
             ]
         );
+    }
+
+    #[test]
+    fn clipped_sensors_are_told() {
+        let mut summary = Summary::default();
+        let mut clipped = Reading::unread(0);
+        clipped.acc_p[0][2] = 2047;
+        summary.packet(&clipped, Step::First, None);
+        let row = ("packets at the end of range", "accelerometer 1: 1".to_string());
+        assert!(summary.rows().contains(&row), "{:?}", summary.rows());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Decoded packets as CSV: in counts, in nominal SI, and what derived frames add.
 //!
 //! In: [`Entry`] parts. Out: header and rows, without line ends. Time is packet number times cycle; the cell of a value
-//! that was not read is empty. The SI table is the measured CSV of a gap case: `t_s`, then one column a channel.
+//! that was not read is empty, in SI also that of a code which says nothing of how much it was. The SI table is the measured CSV of a gap case: `t_s`, then one column a channel.
 
 use std::fmt::Write;
 
@@ -47,8 +47,10 @@ pub fn si_row(t_s: f64, reading: &Reading) -> String {
     for (channel, value) in CHANNELS.iter().zip(channel::counts(reading)) {
         row.push(',');
         if let Some(value) = value {
-            let (si, decimals) = (channel.quantity.si(value), channel.quantity.decimals());
-            push(&mut row, format_args!("{si:.decimals$}"));
+            let decimals = channel.quantity.decimals();
+            if let Some(si) = channel.quantity.meant(value) {
+                push(&mut row, format_args!("{si:.decimals$}"));
+            }
         }
     }
     row
@@ -241,6 +243,11 @@ mod tests {
         (reading.acc_p[0], reading.errors.0) = ([NOT_READ; 3], 1);
         assert!(counts_row(0.2, &reading).starts_with("0.200,1,0001,1,1,,,,-331,"));
         assert!(si_row(0.2, &reading).starts_with("0.200,,,,-9.73800,"));
+        reading.acc_p[0] = [0x7FFF, 2047, 0];
+        assert!(
+            si_row(0.2, &reading).starts_with("0.200,,60.22264,0.00000,"),
+            "no part gives 964 m/s2"
+        );
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub fn to_text(log: &Log, counts: bool, rows: &mut dyn Write, remarks: &mut dyn 
 }
 
 /// The folder of its packets as of a stream, with what only a log has: every column in Parquet, and its gaps.
-pub fn to_folder(log: &Log, name: &str, parent: &Path) -> Result<(), DecodeError> {
+pub fn to_folder(log: &Log, name: &str, parent: &Path, json: bool) -> Result<(), DecodeError> {
     let period_us = log
         .headers
         .values()
@@ -56,7 +56,7 @@ pub fn to_folder(log: &Log, name: &str, parent: &Path) -> Result<(), DecodeError
         folder.remark(line)?;
     }
     parquet::create(&folder.path().join("records.parquet"), log.packets_of(false), true)?;
-    finish(folder, digest, stem, name)
+    finish(folder, digest, stem, name, json)
 }
 
 #[cfg(test)]
@@ -120,7 +120,7 @@ mod tests {
             remarks.contains("boot 1: records 6 to 6 are missing, after"),
             "{remarks}"
         );
-        to_folder(&log, "nand.bin", place.path()).expect("a folder");
+        to_folder(&log, "nand.bin", place.path(), false).expect("a folder");
         for name in ["counts.csv", "si.csv", "log.txt", "index.html", "records.parquet"] {
             let length = std::fs::metadata(place.path().join("nand").join(name)).map(|file| file.len());
             assert!(length.is_ok_and(|length| length > 100), "{name}");

@@ -1,12 +1,9 @@
 //! A file, gzip or not, or standard input, read once from its beginning, with its offset at hand for whoever complains.
 
 use std::{
-    fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
 };
-
-use flate2::read::MultiGzDecoder;
 
 use super::DecodeError;
 
@@ -23,14 +20,9 @@ pub struct Input {
 impl Input {
     pub fn open(path: &Path) -> Result<Self, DecodeError> {
         let bytes: Box<dyn Read> = if path == Path::new("-") {
-            Box::new(io::stdin().lock())
+            packets::input::unpacked(io::stdin().lock()).map_err(|source| fail(path, 0, source))?
         } else {
-            let file = File::open(path).map_err(|source| fail(path, 0, source))?;
-            if path.extension().is_some_and(|extension| extension == "gz") {
-                Box::new(MultiGzDecoder::new(file))
-            } else {
-                Box::new(file)
-            }
+            packets::input::open(path).map_err(|source| fail(path, 0, source))?
         };
         Ok(Input {
             path: path.into(),

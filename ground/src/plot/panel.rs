@@ -1,7 +1,7 @@
 //! One chart: lines over time with gaps, failures and flight events; or bars.
 //!
 //! In: values by bin. Out: drawing on a part of a figure. Lines break where nothing was read. Along the bottom, a strip
-//! shows where a sensor failed and one where packets were missed; micro-gravity is shaded, lift-off is a vertical line.
+//! shows where a sensor failed, one where packets were missed and one where a sensor stood at the end of its range; micro-gravity is shaded, lift-off is a vertical line.
 
 use std::ops::Range;
 
@@ -21,6 +21,7 @@ use crate::envelope::{Bin, Envelope};
 pub const LEAST_SPAN_LSB: f64 = 12.0;
 
 const FAILED: RGBColor = RGBColor(170, 0, 100);
+const CLIPPED: RGBColor = RGBColor(230, 159, 0);
 const MISSED: RGBColor = RGBColor(90, 90, 90);
 const LIFT_OFF: RGBColor = RGBColor(60, 60, 60);
 const MICRO_G: RGBColor = RGBColor(228, 238, 250);
@@ -63,6 +64,8 @@ pub struct Panel {
     pub traces: Vec<Trace>,
     /// Where a sensor of the panel failed.
     pub failed: Vec<(f64, f64)>,
+    /// Where one stood at the end of its range.
+    pub clipped: Vec<(f64, f64)>,
 }
 
 /// One bar of a bar chart.
@@ -149,10 +152,11 @@ impl<'a> Times<'a> {
     }
 
     /// What of failures, missed packets and events there is to explain.
-    pub fn legend(&self, failed: bool) -> Vec<(String, String)> {
+    pub fn legend(&self, failed: bool, clipped: bool) -> Vec<(String, String)> {
         let entry = |shown: bool, colour, text| shown.then(|| (hex(colour), str::to_string(text)));
         [
             entry(failed, FAILED, "sensor failed"),
+            entry(clipped, CLIPPED, "at the end of its range"),
             entry(!self.missed.is_empty(), MISSED, "packet missed"),
             entry(self.lift_off.is_some(), LIFT_OFF, "lift-off (dashed)"),
             entry(!self.micro_g.is_empty(), MICRO_G, "micro-gravity"),
@@ -178,7 +182,9 @@ pub fn shared_y(panels: &[Panel], times: &Times, lsb: f64) -> Range<f64> {
     let (least, most) = if least <= most { (least, most) } else { (0.0, 0.0) };
     let span = (most - least).max(LEAST_SPAN_LSB * lsb);
     let middle = 0.5 * (least + most);
-    let strips = if !times.missed.is_empty() {
+    let strips = if panels.iter().any(|panel| !panel.clipped.is_empty()) {
+        3.8
+    } else if !times.missed.is_empty() {
         2.6
     } else if panels.iter().any(|panel| !panel.failed.is_empty()) {
         1.4
@@ -244,6 +250,11 @@ impl Panel {
                 .into_iter()
                 .map(|corners| Rectangle::new(corners, FAILED.filled())),
         )?;
+        chart.draw_series(
+            strip(&self.clipped, 2.4)
+                .into_iter()
+                .map(|corners| Rectangle::new(corners, CLIPPED.filled())),
+        )?;
         let missed = strip(&times.missed, 1.2);
         chart.draw_series(
             missed
@@ -308,6 +319,7 @@ mod tests {
                 runs: vec![vec![(0.0, 5.0), (1.0, 5.0)]],
             }],
             failed: Vec::new(),
+            clipped: Vec::new(),
         };
         let y = shared_y(&[panel], &Times::of(&envelope, 0.2), 1.0);
         assert!(
