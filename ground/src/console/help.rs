@@ -12,7 +12,10 @@ use super::input;
 
 const KEYS: [(&str, &str); 6] = [
     ("Enter", "send the line as typed; the unit asks what needs confirming"),
-    ("Tab Esc", "complete, again for the next candidate;  empty the line"),
+    (
+        "Tab Esc",
+        "complete, again for the next;  empty the line (Ctrl-A E B F U K W too)",
+    ),
     ("Up Down", "words sent before;  PgUp PgDn: the log"),
     ("F2 F3", "table or four plots;  group of the plot beside the table"),
     ("F4 F5", "plate;  seconds of the plots  (on an empty line: 1-4, + -)"),

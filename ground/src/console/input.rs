@@ -8,7 +8,10 @@ use emems::command::{COMMANDS, Entry};
 /// The input line.
 #[derive(Default)]
 pub struct Input {
+    /// ASCII only, so that bytes are letters.
     text: String,
+    /// Letters before the cursor.
+    cursor: usize,
     /// What was sent, oldest first.
     sent: Vec<String>,
     /// Which of `sent` is shown.
@@ -26,21 +29,39 @@ impl Input {
     /// Adds a letter; only printable ASCII, the unit knows no other.
     pub fn push(&mut self, letter: char) {
         if letter.is_ascii_graphic() || letter == ' ' {
-            self.text.push(letter);
+            self.text.insert(self.cursor, letter);
+            self.cursor += 1;
             self.edited();
         }
     }
 
-    /// Takes the last letter back.
-    pub fn backspace(&mut self) {
-        self.text.pop();
-        self.edited();
+    /// Letters before the cursor.
+    pub fn cursor(&self) -> usize {
+        self.cursor
     }
 
-    /// Empties the line.
-    pub fn clear(&mut self) {
-        self.text.clear();
-        self.edited();
+    /// Edits the line or moves in it.
+    pub fn edit(&mut self, edit: Edit) {
+        let (cursor, end) = (self.cursor, self.text.len());
+        // A word begins after a blank.
+        let word = || self.text[..cursor].trim_end().rfind(' ').map_or(0, |blank| blank + 1);
+        let (removed, to) = match edit {
+            Edit::Left => (0..0, cursor.saturating_sub(1)),
+            Edit::Right => (0..0, (cursor + 1).min(end)),
+            Edit::Home => (0..0, 0),
+            Edit::End => (0..0, end),
+            Edit::Backspace => (cursor.saturating_sub(1)..cursor, cursor.saturating_sub(1)),
+            Edit::Delete => (cursor..(cursor + 1).min(end), cursor),
+            Edit::ToHome => (0..cursor, 0),
+            Edit::ToEnd => (cursor..end, cursor),
+            Edit::Word => (word()..cursor, word()),
+            Edit::All => (0..end, 0),
+        };
+        if !removed.is_empty() || edit == Edit::All {
+            self.text.replace_range(removed, "");
+            self.edited();
+        }
+        self.cursor = to;
     }
 
     /// The commands the typed text may become.
@@ -60,6 +81,7 @@ impl Input {
             return;
         };
         self.text = word(entry).to_owned();
+        self.cursor = self.text.len();
         self.completing = (candidates.len() > 1).then_some((typed, next));
     }
 
@@ -77,7 +99,7 @@ impl Input {
     /// The word to send, if there is one; the line is empty after.
     pub fn take(&mut self) -> Option<String> {
         let word = self.text.trim().to_owned();
-        self.clear();
+        self.edit(Edit::All);
         if word.is_empty() {
             return None;
         }
@@ -94,12 +116,38 @@ impl Input {
 
     fn recall(&mut self, which: Option<usize>) {
         let Some(which) = which else { return };
-        self.clear();
+        self.edit(Edit::All);
         if let Some(word) = self.sent.get(which) {
             self.text.clone_from(word);
+            self.cursor = self.text.len();
             self.recalled = Some(which);
         }
     }
+}
+
+/// A key's work on the line, as shells have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edit {
+    /// A letter to the left.
+    Left,
+    /// A letter to the right.
+    Right,
+    /// To the beginning (Ctrl-A).
+    Home,
+    /// To the end (Ctrl-E).
+    End,
+    /// Takes the letter before the cursor away.
+    Backspace,
+    /// Takes the letter at the cursor away.
+    Delete,
+    /// All before the cursor (Ctrl-U).
+    ToHome,
+    /// All from the cursor on (Ctrl-K).
+    ToEnd,
+    /// The word before the cursor (Ctrl-W).
+    Word,
+    /// The whole line.
+    All,
 }
 
 /// A command's word as text.
@@ -165,7 +213,7 @@ mod tests {
     fn editing_after_completion_starts_from_the_completed_word() {
         let mut input = typed("g_s");
         input.complete();
-        input.backspace();
+        input.edit(Edit::Backspace);
         assert_eq!(input.text(), "G_S");
         assert_eq!(words(&input), ["G_ST"]);
     }
@@ -185,6 +233,24 @@ mod tests {
             seen.push(input.text().to_owned());
         }
         assert_eq!(seen, ["G_MT", "G_ST", "G_ST", "G_MT", ""]);
+    }
+
+    #[test]
+    fn the_line_is_edited_where_the_cursor_is() {
+        let mut input = typed("G_DL G_ST");
+        let mut check = |edits: &[Edit], text: &str, cursor: usize| {
+            edits.iter().for_each(|edit| input.edit(*edit));
+            assert_eq!((input.text(), input.cursor()), (text, cursor), "{edits:?}");
+        };
+        check(&[Edit::Word], "G_DL ", 5);
+        check(&[Edit::Home, Edit::Right, Edit::Delete], "GDL ", 1);
+        check(&[Edit::Left, Edit::Left, Edit::End, Edit::Backspace], "GDL", 3);
+        check(&[Edit::Left, Edit::ToHome], "L", 0);
+        check(&[Edit::ToEnd, Edit::Backspace, Edit::Delete, Edit::Right], "", 0);
+        "G_MT".chars().for_each(|letter| input.push(letter));
+        input.edit(Edit::Home);
+        input.push('!');
+        assert_eq!(input.text(), "!G_MT");
     }
 
     #[test]

@@ -8,7 +8,10 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::view::{Page, View};
+use super::{
+    input::Edit,
+    view::{Page, View},
+};
 
 /// Times over which may be plotted.
 const WINDOWS_S: [u64; 5] = [10, 30, 60, 180, 600];
@@ -32,7 +35,13 @@ impl View {
         let empty = self.input.text().is_empty();
         match key.code {
             KeyCode::Char('c' | 'd') if key.modifiers == KeyModifiers::CONTROL => return Some(Action::Quit),
-            KeyCode::Char(_) if control => {}
+            KeyCode::Char(letter) if control && !self.help => {
+                if key.modifiers == KeyModifiers::CONTROL
+                    && let Some(edit) = edit(letter)
+                {
+                    self.input.edit(edit);
+                }
+            }
             // Any key closes the help, and does nothing else: nobody sends what he cannot see.
             _ if self.help => self.help = false,
             KeyCode::Char('q') if empty => return Some(Action::Quit),
@@ -41,8 +50,13 @@ impl View {
             KeyCode::Char('+') if empty => self.window = longer(self.window).unwrap_or(self.window),
             KeyCode::Char('-') if empty => self.window = shorter(self.window).unwrap_or(self.window),
             KeyCode::Char(letter) => self.input.push(letter),
-            KeyCode::Backspace => self.input.backspace(),
-            KeyCode::Esc => self.input.clear(),
+            KeyCode::Backspace => self.input.edit(Edit::Backspace),
+            KeyCode::Delete => self.input.edit(Edit::Delete),
+            KeyCode::Left => self.input.edit(Edit::Left),
+            KeyCode::Right => self.input.edit(Edit::Right),
+            KeyCode::Home => self.input.edit(Edit::Home),
+            KeyCode::End => self.input.edit(Edit::End),
+            KeyCode::Esc => self.input.edit(Edit::All),
             KeyCode::Tab => self.input.complete(),
             KeyCode::Up => self.input.older(),
             KeyCode::Down => self.input.newer(),
@@ -66,6 +80,21 @@ impl View {
         }
         None
     }
+}
+
+/// What a letter with Ctrl does to the line, as in shells.
+fn edit(letter: char) -> Option<Edit> {
+    Some(match letter {
+        'a' => Edit::Home,
+        'b' => Edit::Left,
+        'e' => Edit::End,
+        'f' => Edit::Right,
+        'h' => Edit::Backspace,
+        'k' => Edit::ToEnd,
+        'u' => Edit::ToHome,
+        'w' => Edit::Word,
+        _ => return None,
+    })
 }
 
 fn longer(window: Duration) -> Option<Duration> {
@@ -117,6 +146,25 @@ mod tests {
         type_in(&mut view, "G");
         let control_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(view.key(control_c, 0), Some(Action::Quit));
+    }
+
+    #[test]
+    fn a_recalled_word_that_is_emptied_with_control_u_is_not_sent() {
+        let mut view = View::default();
+        type_in(&mut view, "G_DL");
+        press(&mut view, KeyCode::Enter);
+        press(&mut view, KeyCode::Up);
+        let control =
+            |view: &mut View, letter| view.key(KeyEvent::new(KeyCode::Char(letter), KeyModifiers::CONTROL), 0);
+        assert_eq!(control(&mut view, 'u'), None);
+        type_in(&mut view, "XG_M");
+        for letter in ['a', 'f'] {
+            control(&mut view, letter);
+        }
+        press(&mut view, KeyCode::Backspace);
+        press(&mut view, KeyCode::End);
+        type_in(&mut view, "T");
+        assert_eq!(press(&mut view, KeyCode::Enter), Some(Action::Send("G_MT".into())));
     }
 
     #[test]

@@ -13,7 +13,7 @@
 use std::{
     io::{self, IsTerminal},
     path::{Path, PathBuf},
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 mod attitude;
@@ -34,6 +34,7 @@ mod state;
 pub mod stream;
 mod table;
 pub mod view;
+pub mod word;
 
 use line::Line;
 use recording::Recording;
@@ -42,8 +43,8 @@ use session::Session;
 
 /// `ground console`: talk to the unit over its umbilical, see all sensors live, keep everything it says
 ///
-/// Opens the port at 115200 8N1, and opens it again when it was unplugged. Commands are sent as typed; `?` shows the keys
-/// and the unit's commands. The recording holds the received bytes as they came: `ground decode` reads it.
+/// Opens the port at 115200 8N1, and opens it again when it was unplugged. The unit's words are sent as typed, other words are
+/// answered here; `?` shows the keys and the unit's commands. The recording holds the received bytes as they came: `ground decode` reads it.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ground console /dev/ttyUSB0 --record pad.log\n  echo G_ST | ground console /dev/ttyUSB0 --plain"
@@ -62,9 +63,12 @@ pub struct Arguments {
 /// How a console shows itself.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct Options {
-    /// Print lines instead of a screen and read commands from standard input; so without a terminal
+    /// Print lines instead of a screen and read commands from standard input, until that ends; so without a terminal
     #[arg(long)]
     pub plain: bool,
+    /// With --plain: listen for so long after the input has ended, such as 10s or 1h [default: until the reply, 2s at most]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub listen: Option<Duration>,
 }
 
 /// Why a console ended.
@@ -73,6 +77,17 @@ pub enum Error {
     /// Nothing can be recorded, so nothing is shown.
     #[error(transparent)]
     Recording(#[from] recording::OpenError),
+    /// What was named is there and is no port.
+    #[error("{0} is no serial port; name one as /dev/ttyUSB0 or COM3")]
+    NoPort(String),
+    /// The unit said nothing.
+    #[error("no reply to {word} within {wait:?}: is the unit on, and is this its umbilical?")]
+    Silent {
+        /// The last word sent.
+        word: String,
+        /// How long was waited.
+        wait: Duration,
+    },
     /// The terminal failed; the recording is whole up to then.
     #[error("the terminal failed: {0}; --plain does without one")]
     Terminal(#[from] io::Error),
@@ -83,9 +98,21 @@ pub enum Error {
 /// # Errors
 /// See [`run`].
 pub fn console(arguments: &Arguments) -> Result<(), Error> {
+    if is_no_port(Path::new(&arguments.port)) {
+        return Err(Error::NoPort(arguments.port.clone()));
+    }
     let default = || recording::default_path(SystemTime::now());
     let path = arguments.record.clone().unwrap_or_else(default);
     run(SerialLine::new(&arguments.port), &path, arguments.options)
+}
+
+/// Whether a path is there and is something that no port can be.
+fn is_no_port(path: &Path) -> bool {
+    let Ok(there) = path.metadata() else { return false };
+    #[cfg(unix)]
+    return !std::os::unix::fs::FileTypeExt::is_char_device(&there.file_type());
+    #[cfg(not(unix))]
+    return there.is_dir() || there.is_file();
 }
 
 /// A console on `line` until the user quits, recording to `path`.
@@ -96,7 +123,7 @@ pub fn run(line: impl Line, path: &Path, options: Options) -> Result<(), Error> 
     let recording = Recording::open(path, line.name(), SystemTime::now())?;
     let mut session = Session::new(line, recording);
     if options.plain || !io::stdout().is_terminal() || !io::stdin().is_terminal() {
-        plain::run(&mut session)?;
+        plain::run(&mut session, options.listen)?;
     } else {
         screen::run(&mut session)?;
     }
@@ -107,4 +134,27 @@ pub fn run(line: impl Line, path: &Path, options: Options) -> Result<(), Error> 
         recording::commands_path(path).display()
     );
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_port_is_refused_before_anything_is_recorded() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let file = place.path().join("flight.log");
+        std::fs::write(&file, "not a port").expect("written");
+        for port in [place.path(), &file] {
+            let arguments = Arguments {
+                port: port.display().to_string(),
+                record: Some(place.path().join("kept.log")),
+                options: Options::default(),
+            };
+            let error = console(&arguments).expect_err("no port").to_string();
+            assert!(error.contains("is no serial port"), "{error}");
+        }
+        assert!(!place.path().join("kept.log").exists());
+        assert!(!is_no_port(&place.path().join("ttyUSB7")), "it may be plugged in later");
+    }
 }

@@ -53,7 +53,8 @@ fn until_quit(terminal: &mut DefaultTerminal, session: &mut Session<impl Line>) 
                 }
                 match view.key(key, session.model.log.len()) {
                     Some(Action::Quit) => return Ok(()),
-                    Some(Action::Send(word)) => session.send(&word),
+                    Some(Action::Send(word)) if session.typed(&word) => return Ok(()),
+                    Some(Action::Send(_)) => {}
                     None => {}
                 }
             }

@@ -10,6 +10,7 @@ use super::{
     model::{Link, Model, Source},
     recording::Recording,
     stream::Stream,
+    word::{self, Typed},
 };
 
 /// A console session without its screen.
@@ -56,6 +57,22 @@ impl<L: Line> Session<L> {
             Heard::Ended if self.model.link == Link::Ended => {}
             Heard::Ended => self.linked(now, Link::Ended, "the run has ended".into()),
         }
+    }
+
+    /// Takes a typed line: sends it, or answers it here. Whether the user wants to end.
+    pub fn typed(&mut self, line: &str) -> bool {
+        match word::typed(line) {
+            Typed::Send(words) => self.send(&words),
+            Typed::Quit => return true,
+            Typed::Answer(lines) => {
+                let now = self.line.now();
+                self.note(now, &format!("answered here {line}"));
+                for text in lines {
+                    self.model.say(now, Source::Console, text);
+                }
+            }
+        }
+        false
     }
 
     /// Sends a word as typed, with a line end: the unit passes over it, and it ends a half word at once.
@@ -152,6 +169,16 @@ mod tests {
         bench.says(20, b"IT\r\n");
         assert_eq!(bench.log(), ["G_ST", "G_MT ok: WAIT"]);
         assert_eq!(bench.session.model.mode, Some(Mode::Wait));
+    }
+
+    #[test]
+    fn what_the_unit_would_not_answer_is_answered_here_and_not_sent() {
+        let mut bench = bench();
+        assert!(!bench.session.typed("g_st") && bench.session.typed("quit"));
+        assert_eq!(bench.unit.commands(), b"");
+        assert!(bench.log()[0].contains("case counts, the unit knows G_ST"));
+        assert!(!bench.session.typed("G_ST"));
+        assert_eq!(bench.unit.commands(), b"G_ST\r\n");
     }
 
     #[test]

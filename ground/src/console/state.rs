@@ -16,6 +16,9 @@ use super::{
     model::{Link, Model},
 };
 
+/// Lines of it without an attitude.
+pub const LINES: u16 = 3;
+
 /// All of it.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let estimate = model.estimate.iter().flat_map(attitude::lines).map(Line::from);

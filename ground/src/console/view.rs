@@ -71,29 +71,74 @@ const WIDE: u16 = table::WIDTH + 32;
 
 /// Draws a frame.
 pub fn draw(frame: &mut Frame, model: &Model, view: &View) {
+    // On a small terminal a fresh reply comes before the table's last rows.
+    let beside = frame.area().height.saturating_sub(state::LINES + 2);
+    let reply = match view.scroll {
+        0 => reply_rows(model).min(beside.into()) as u16,
+        _ => 0,
+    };
     let log = match view.page {
-        Page::Table => Constraint::Min(2),
+        Page::Table => Constraint::Min(2.max(reply)),
         Page::Plots => Constraint::Length(5),
     };
     let body = match view.page {
-        Page::Table => Constraint::Length(table::HEIGHT),
+        Page::Table => Constraint::Length(table::HEIGHT.min(beside.saturating_sub(2.max(reply)))),
         Page::Plots => Constraint::Min(8),
     };
     let one = Constraint::Length(1);
     let mut lines = state::lines(model);
     if view.page == Page::Table {
         // On a small terminal the table and two lines of log come before the attitude.
-        lines.truncate(frame.area().height.saturating_sub(table::HEIGHT + 4).max(3).into());
+        let most = frame.area().height.saturating_sub(table::HEIGHT + 4).max(state::LINES);
+        lines.truncate(usize::from(if reply > 2 { state::LINES } else { most }));
     }
     let [state, body, log, input, hint] =
         Layout::vertical([Constraint::Length(lines.len() as u16), body, log, one, one]).areas(frame.area());
     frame.render_widget(Paragraph::new(lines), state);
     draw_body(frame, body, model, view);
     draw_log(frame, log, model, view.scroll);
-    frame.render_widget(Paragraph::new(format!("> {}_", view.input.text())).bold(), input);
+    frame.render_widget(Paragraph::new(input_line(&view.input)).bold(), input);
     frame.render_widget(Paragraph::new(hint_text(&view.input)).dim(), hint);
     if view.help {
         help::draw(frame);
+    }
+}
+
+/// The line with its cursor: an underscore at its end, the letter itself reversed elsewhere.
+fn input_line(input: &Input) -> Line<'static> {
+    let (before, after) = input.text().split_at(input.cursor());
+    match after.split_at_checked(1) {
+        None => Line::from(format!("> {before}_")),
+        Some((at, rest)) => Line::from(vec![
+            format!("> {before}").into(),
+            at.to_owned().reversed(),
+            rest.to_owned().into(),
+        ]),
+    }
+}
+
+/// Time for which a reply that is longer than the log has rows is shown over the table.
+const REPLY_SHOWN: Duration = Duration::from_secs(20);
+
+/// Rows that the last word and all that came after it take, while it is fresh.
+fn reply_rows(model: &Model) -> usize {
+    let after = model
+        .log
+        .iter()
+        .rev()
+        .take_while(|line| line.source != Source::Sent)
+        .count();
+    let asked = model.log.len().checked_sub(after + 1).and_then(|at| model.log.get(at));
+    let fresh = |line: &LogLine| model.now.saturating_sub(line.at) < REPLY_SHOWN;
+    match asked {
+        Some(asked) if fresh(asked) => after + 1,
+        // What the console answers itself has no word before it.
+        _ => {
+            let answers = model.log.iter().rev();
+            answers
+                .take_while(|line| line.source == Source::Console && fresh(line))
+                .count()
+        }
     }
 }
 
@@ -120,7 +165,7 @@ fn draw_body(frame: &mut Frame, area: Rect, model: &Model, view: &View) {
 }
 
 fn draw_log(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
-    let area = if area.height > 2 {
+    let area = if area.height > 2 && usize::from(area.height) > reply_rows(model) {
         let title = if scroll > 0 {
             " log, scrolled back: PgDn "
         } else {
@@ -252,6 +297,28 @@ mod tests {
         ] {
             assert!(plots.contains(title), "{title}\n{plots}");
         }
+    }
+
+    #[test]
+    fn at_80_by_24_the_whole_reply_to_a_command_is_seen() {
+        let mut model = model();
+        model.sent(Duration::from_secs(1), "G_HE");
+        let view = View::default();
+        for k in 0..18 {
+            let item = Item::Reply(format!("G_HE word {k}"));
+            model.found(Duration::from_secs(1), Found { at: 0, item });
+        }
+        let rows = screen(&model, &view, 80, 24);
+        assert!(
+            rows[3].ends_with("> G_HE") && rows[21].ends_with("word 17"),
+            "{rows:#?}"
+        );
+        assert_eq!(rows[22], "> _");
+        model.now = Duration::from_secs(60);
+        assert!(
+            screen(&model, &view, 80, 24)[3].contains("x cnt"),
+            "the table comes back"
+        );
     }
 
     #[test]
