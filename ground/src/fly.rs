@@ -102,7 +102,11 @@ pub struct Landed {
 /// See [`FlyError`].
 pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
     let source = source::open(arguments)?;
-    let duration = plan::duration_of(arguments.duration, source.truth.duration_s());
+    let duration = match arguments.duration {
+        // Whoever talks to the unit says when it is enough.
+        None if arguments.console => plan::UNTIL_TOLD,
+        asked => plan::duration_of(asked, source.truth.duration_s()),
+    };
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
     let mut prepared = prepare(arguments, source.world.as_ref(), &source.truth, duration.as_secs_f64())?;
@@ -137,7 +141,12 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
         Ok(remarks)
     };
     let (seen, remarks) = if arguments.console {
-        beside_the_console(arguments, folder, progress, interrupt, flight)?
+        // With an input that ends, a flight whose length was asked for goes on to its end.
+        let options = console::Options {
+            listen: arguments.duration,
+            ..console::Options::default()
+        };
+        beside_the_console(arguments, folder, progress, interrupt, options, flight)?
     } else {
         let mut watch = Watch::new(folder, progress, None, arguments.derived, interrupt.clone());
         let remarks = flight(&mut watch)?;
@@ -197,6 +206,7 @@ fn beside_the_console(
     folder: Folder,
     progress: Progress,
     interrupt: &Interrupt,
+    options: console::Options,
     flight: impl FnOnce(&mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send + 'static,
 ) -> Result<(Seen, Vec<Remark>), FlyError> {
     let (line, unit) = line::channel("the flying unit");
@@ -208,7 +218,7 @@ fn beside_the_console(
             let remarks = flight(&mut watch)?;
             Ok((watch.finish()?, remarks))
         })?;
-    let talked = console::run(line, &kept, console::Options::default());
+    let talked = console::run(line, &kept, options);
     let seen = flying.join().map_err(|_| FlyError::Broken)??;
     talked?;
     Ok(seen)
@@ -228,7 +238,7 @@ fn report(
         "emulated STM32F4, release image"
     };
     let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
-    if seen.flown < planned {
+    if seen.flown < planned && planned != plan::UNTIL_TOLD {
         rows.push((
             "ended",
             format!("when asked to, before the {} s planned", planned.as_secs_f64()),

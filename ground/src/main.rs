@@ -2,11 +2,20 @@
 
 use std::{error::Error, process::ExitCode};
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
 /// The ground side of the e-MEMS attitude sensor unit.
 #[derive(Parser)]
-#[command(name = "ground", version)]
+#[command(name = "ground", version = env!("GROUND_VERSION"), after_help = ground::exit::HELP)]
+struct Words {
+    /// Print no report: only tables and JSON that were asked for, warnings and errors. Files are written, exit codes hold
+    #[arg(long, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
 enum Command {
     Fly(ground::fly::plan::Arguments),
     /// Lists the motions that can be flown
@@ -29,6 +38,8 @@ enum Command {
     Calibration(bench::calibration::Arguments),
     Design(bench::design::command::Arguments),
     Report(bench::reproduction::Arguments),
+    Completions(ground::words::Completions),
+    Man(ground::words::Man),
 }
 
 /// Finds what the twin of a unit lacks
@@ -51,12 +62,27 @@ enum Challenge {
 }
 
 fn main() -> ExitCode {
-    match run(Command::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
+    ground::exit::without_panic_on_closed_output();
+    let words = Words::parse();
+    if words.quiet && !prints_what_was_asked_for(&words.command) {
+        ground::exit::print_nothing();
+    }
+    ground::exit::code(run(words.command))
+}
+
+/// Whether standard output takes a table, a script or JSON, rather than a report for people.
+fn prints_what_was_asked_for(command: &Command) -> bool {
+    match command {
+        Command::Sources | Command::Completions(_) => true,
+        Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
+        Command::Recover(arguments) => arguments.table.is_none(),
+        Command::Design(arguments) => arguments.prints_the_plan(),
+        Command::Calibrate(arguments) => arguments.json(),
+        Command::Calibration(arguments) => arguments.json(),
+        Command::Allan(arguments) => arguments.json,
+        Command::Attitude(arguments) => arguments.json,
+        Command::Gap(arguments) => arguments.case.as_ref().is_some_and(|case| case.json),
+        _ => false,
     }
 }
 
@@ -79,6 +105,8 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Calibration(arguments) => bench::calibration::run(&arguments)?,
         Command::Design(arguments) => bench::design::command::run(&arguments)?,
         Command::Report(arguments) => bench::reproduction::run(&arguments)?,
+        Command::Completions(arguments) => ground::words::completions(&arguments, Words::command())?,
+        Command::Man(arguments) => ground::words::man(&arguments, Words::command())?,
     }
     Ok(())
 }

@@ -15,6 +15,9 @@ use twin::{
 use super::site;
 use crate::{case::instrument::Instrument, table::SLOT_NAMES};
 
+/// How long a flight beside a console lasts at most: longer than anybody sits there, and within the unit's clock.
+pub const UNTIL_TOLD: Duration = Duration::from_secs(100 * 365 * 86_400);
+
 /// How long a motion without an end is flown.
 const ENDLESS_S: f64 = 60.0;
 
@@ -45,7 +48,10 @@ pub struct Arguments {
     /// Recorded motion to fly: CSV (.gz) with t_s, qw, qx, qy, qz and perhaps px_m..pz_m
     #[arg(long, value_name = "FILE", group = "source")]
     pub motion_file: Option<PathBuf>,
-    /// Virtual time to fly, such as 90s, 10min, 24h [default: as long as the motion lasts, or 60s]
+    #[command(flatten)]
+    #[allow(missing_docs)] // clap would take the text for the command's.
+    pub units: bench::units::Units,
+    /// Virtual time to fly, such as 90s, 10min, 24h [default: as long as the motion lasts, or 60s; with --console until told]
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<Duration>,
     /// Which specimen of the unit: biases and noise of its parts

@@ -5,8 +5,14 @@
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
+use attitude::{
+    plausible::{self, Implausible},
+    recording::Row,
+};
+use bench::units::Units;
 use emems::estimate::Site;
 use gap::input::{case::Opened, reference::used};
+use packets::magnitude::Kind;
 use trials::{
     draw::Draw,
     motion::{Style, Wander},
@@ -14,8 +20,8 @@ use trials::{
 use twin::{
     environment::{Environment, World},
     motion::{self, AnyWorld, LIST, Recorded},
-    recording::{FileError, Recording},
-    truth::TruthSource,
+    recording::{self, FileError, Recording},
+    truth::{Truth, TruthSource},
 };
 
 use super::plan::Arguments;
@@ -66,6 +72,14 @@ pub enum SourceError {
     /// No motion has this name.
     #[error("no motion is called {0}; there are {names}", names = names())]
     NoSuchMotion(String),
+    /// Its numbers can hardly be in their units.
+    #[error("{file}: {why}")]
+    Implausible {
+        /// Which.
+        file: String,
+        /// What is wrong, and what to do.
+        why: Implausible,
+    },
     /// A file cannot be flown.
     #[error(transparent)]
     File(#[from] FileError),
@@ -80,7 +94,7 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
         (Some(path), _) => Ok(Source {
             name: stem(path),
             about: format!("recording of a real unit, {}", file_name(path)),
-            truth: Arc::new(Recording::open(path)?),
+            truth: Arc::new(recording(path, &arguments.units)?),
             site: Site::LABORATORY,
             world: None,
         }),
@@ -107,6 +121,29 @@ fn recorded(path: &Path) -> Result<Recorded, FileError> {
         named == path.file_name() && case.text.reference.attitude_sigma_rad > 0.0
     });
     Ok(if errs { used(&record) } else { record })
+}
+
+/// A recording whose numbers can be in their units, or are in those that were said.
+fn recording(path: &Path, units: &Units) -> Result<Recording, SourceError> {
+    let recording = Recording::open(path)?;
+    let row = |(t_s, truth): (f64, Truth)| Row {
+        t_s,
+        rate_b: truth.rate_b,
+        acc_b: Some(truth.force_b),
+        mag_b: Some(truth.field_b_ut),
+        reference_nb: None,
+        scored: true,
+    };
+    plausible::in_si(recording.samples().map(row).collect(), units).map_err(|why| SourceError::Implausible {
+        file: file_name(path).into(),
+        why,
+    })?;
+    Ok(recording.in_units(recording::Units {
+        time: units.size(Kind::Time),
+        rate: units.size(Kind::Rate),
+        force: units.size(Kind::Force),
+        field: units.size(Kind::Field),
+    }))
 }
 
 /// `ground sources`: the motions, a line each.
@@ -177,6 +214,31 @@ mod tests {
             refusal.starts_with("no motion is called roket; there are still, "),
             "{refusal}"
         );
+    }
+
+    #[test]
+    fn a_recording_in_another_unit_is_refused_until_its_unit_is_said() {
+        let place = tempfile::tempdir().expect("temporary folder");
+        let path = place.path().join("log.csv");
+        let rows: String = (0..40)
+            .map(|k| format!("{},0,0,0,0,0,1.0,20,0,-40\n", 0.1 * f64::from(k)))
+            .collect();
+        std::fs::write(
+            &path,
+            format!("t_s,gyr_x,gyr_y,gyr_z,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n{rows}"),
+        )
+        .expect("written");
+        let refusal = recording(&path, &Units::default()).expect_err("g").to_string();
+        assert!(
+            refusal.contains("log.csv: specific force") && refusal.contains("--forces g"),
+            "{refusal}"
+        );
+        let units = Units {
+            forces: Kind::Force.unit("g").ok(),
+            ..Units::default()
+        };
+        let force_b = recording(&path, &units).expect("g").at(1.0).force_b;
+        assert!((force_b.z + 9.80665).abs() < 1e-9, "{force_b}");
     }
 
     #[test]

@@ -1,0 +1,112 @@
+//! How the program ends: exit codes, closed pipes, full disks, and what it says of itself.
+
+use std::{
+    path::Path,
+    process::{Command, Output, Stdio},
+};
+
+fn ground(words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ground"));
+    command.args(words);
+    command
+}
+
+fn run(words: &[&str]) -> Output {
+    ground(words).output().expect("the program runs")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn bad_input_is_code_2_with_the_reason_and_no_output() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let file = |name: &str, bytes: &[u8]| {
+        let path = place.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        path.display().to_string()
+    };
+    let page = file("page.html", b"<!doctype html><p>404");
+    let have = file("have.csv", b"have");
+    for words in [
+        &["decode", &page][..],
+        &["recover", &page, "--table", &have],
+        &["attitude", &page],
+        &["decode", &page, "--no-such-option"],
+    ] {
+        let output = run(words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {}", said(&output));
+        assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "{words:?}");
+    }
+    assert_eq!(std::fs::read(&have).expect("there"), b"have");
+    let rows: String = (0..40)
+        .map(|k| format!("{},0,0,0,0,0,-1.0,20,0,40\n", 0.1 * f64::from(k)))
+        .collect();
+    let log = file(
+        "g.csv",
+        format!("t_s,gyr_x,gyr_y,gyr_z,acc_x,acc_y,acc_z,mag_x,mag_y,mag_z\n{rows}").as_bytes(),
+    );
+    let output = run(&["attitude", &log]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("--forces g"), "{}", said(&output));
+    assert!(
+        !said(&run(&["attitude", &log, "--forces", "g"])).contains("--forces"),
+        "what was said is believed"
+    );
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly_and_a_full_disk_with_an_error() {
+    if !Path::new("/dev/full").exists() {
+        println!("skipped: no /dev/full on this system");
+        return;
+    }
+    for words in [&["sources"][..], &["completions", "bash"]] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let closed = ground(words)
+            .stdout(writer)
+            .stderr(Stdio::piped())
+            .output()
+            .expect("runs");
+        assert_eq!(
+            (closed.status.code(), said(&closed)),
+            (Some(0), String::new()),
+            "{words:?}"
+        );
+        let full = std::fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .expect("a full disk");
+        let full = ground(words)
+            .stdout(full)
+            .stderr(Stdio::piped())
+            .output()
+            .expect("runs");
+        assert_eq!(full.status.code(), Some(1), "{words:?}");
+        let why = said(&full);
+        assert!(
+            why.starts_with("error: ") && !why.contains("panicked"),
+            "{words:?}: {why}"
+        );
+    }
+}
+
+#[test]
+fn it_says_its_commit_its_codes_and_its_words() {
+    let version = String::from_utf8_lossy(&run(&["--version"]).stdout).into_owned();
+    assert!(
+        version.starts_with(concat!("ground ", env!("CARGO_PKG_VERSION"))),
+        "{version}"
+    );
+    let help = String::from_utf8_lossy(&run(&["--help"]).stdout).into_owned();
+    assert!(help.contains("Exit codes: 0 good; 1 not good"), "{help}");
+    let script = String::from_utf8_lossy(&run(&["completions", "bash"]).stdout).into_owned();
+    assert!(script.contains("multi-position"));
+    let place = tempfile::tempdir().expect("temporary folder");
+    let folder = place.path().display().to_string();
+    let quiet = run(&["man", &folder, "--quiet"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty());
+    assert!(place.path().join("ground-calibrate-ellipsoid.1").exists());
+}
