@@ -3,6 +3,8 @@
 //! In: a finished [`crate::diagnose::Diagnosis`]. Out: `verdict.json` ([`verdict`]), a screen of text ([`terminal`]) and an HTML
 //! page with plots ([`page`]). Nothing is decided here.
 
+mod gained;
 pub mod page;
+mod place_shares;
 pub mod terminal;
 pub mod verdict;

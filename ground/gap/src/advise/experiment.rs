@@ -71,11 +71,11 @@ pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, i
     let before = error(pair.nats);
     if pair.nats > TOLD_APART {
         return format!(
-            "{} and {} are apart already ({:.1e} errors). To be sure: {}",
+            "{} and {} are apart already ({:.1e} errors).{}",
             names.0,
             names.1,
             before,
-            confirm.unwrap_or_default()
+            sentence(" To be sure:", confirm)
         );
     }
     let tried = CATALOGUE.iter().filter_map(|experiment| {
@@ -92,17 +92,24 @@ pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, i
             100.0 * before
         ),
         _ => {
-            let other = by_name(names.1)
-                .map(|effect| effect.page().confirm_by)
-                .unwrap_or_default();
-            format!(
-                "No motion tells {} from {}. Change something else: {} Or: {other}",
-                names.0,
-                names.1,
-                confirm.unwrap_or_default()
-            )
+            let other = by_name(names.1).map(|effect| effect.page().confirm_by);
+            // What is there to do for the first of them is alone where nothing is known for the other.
+            let words = [
+                sentence(" Change something else:", confirm.or(other)),
+                match confirm {
+                    Some(_) => sentence(" Or:", other),
+                    None => String::new(),
+                },
+            ];
+            format!("No motion tells {} from {}.{}", names.0, names.1, words.concat())
         }
     }
+}
+
+/// A sentence with its beginning; nothing where there is nothing to say.
+fn sentence(begin: &str, rest: Option<&str>) -> String {
+    rest.filter(|rest| !rest.is_empty())
+        .map_or(String::new(), |rest| format!("{begin} {rest}"))
 }
 
 /// Probability of deciding wrongly between two hypotheses so many nats apart: `Q(sqrt(m/2))`.
@@ -159,6 +166,15 @@ fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f6
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn where_there_is_nothing_to_say_no_sentence_begins() {
+        assert_eq!(sentence(" Or:", Some("turn it.")), " Or: turn it.");
+        assert_eq!(
+            (sentence(" Or:", Some("")), sentence(" Or:", None)),
+            (String::new(), String::new())
+        );
+    }
 
     #[test]
     fn eleven_nats_are_one_percent_and_three_are_eleven() {

@@ -10,6 +10,7 @@
 
 mod environment;
 mod measured;
+mod plausible;
 mod subject;
 mod table;
 mod text;

@@ -11,6 +11,10 @@ pub struct Column {
     pub name: String,
     /// Physical units a count.
     pub lsb: f64,
+    /// What it measures.
+    pub sensor: twin::predict::Kind,
+    /// Physical units that the description adds.
+    pub bias: f64,
     /// Physical units, beyond which it clips.
     pub range: [f64; 2],
     /// Counts at which its code ends, where it has any.

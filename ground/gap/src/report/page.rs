@@ -2,7 +2,12 @@
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Map, Marks, Panel};
 
-use crate::{diagnose::Diagnosis, input::case::Subject, report::terminal, unknown::traces::Trace};
+use crate::{
+    diagnose::Diagnosis,
+    input::case::Subject,
+    report::{place_shares, terminal},
+    unknown::traces::Trace,
+};
 
 /// Rows of a map of probabilities.
 const SHOWN: usize = 10;
@@ -20,11 +25,12 @@ pub fn html(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Result<St
         Block::Figure(residuals(diagnosis)?),
         Block::Heading("Where".to_owned()),
         Block::Text(
-            "Shares of the energy above noise and calibration; each column adds up to 100 %. Regimes: what a quantity of the \
-             motion explains of the energy from row to row (LMG)."
+            "Channels and plates: shares of the energy above noise, as the map below shows it. Octaves: of what is above noise and \
+             calibration. Regimes: what a quantity of the motion explains of the energy from row to row (LMG). Each column adds \
+             up to 100 %."
                 .to_owned(),
         ),
-        shares(diagnosis),
+        shares(subject, diagnosis),
         Block::Figure(map(diagnosis)?),
         Block::Terminal(terminal::places(subject, diagnosis)),
         Block::Figure(posterior(diagnosis)?),
@@ -61,11 +67,11 @@ fn residuals(diagnosis: &Diagnosis) -> Result<Figure, ChartError> {
 }
 
 /// Shares of the excess side by side.
-fn shares(diagnosis: &Diagnosis) -> Block {
+fn shares(subject: &Subject, diagnosis: &Diagnosis) -> Block {
     let place = &diagnosis.place;
     let columns = [
-        ("channel", &place.channels),
-        ("plate", &place.groups),
+        ("channel", &place_shares::channels(diagnosis)),
+        ("plate", &place_shares::groups(subject, diagnosis)),
         ("octave", &place.octaves),
         ("regime", &place.regimes),
     ];

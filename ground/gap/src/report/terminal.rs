@@ -16,6 +16,13 @@ use crate::{
     input::case::Subject,
     thresholds::{HELPED, REMAINS},
 };
+use crate::{diagnose::Diagnosis, input::case::Subject, report::gained::gained};
+
+/// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
+const REMAINS: f64 = 2.5;
+
+/// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
+const HELPED: f64 = 0.8;
 
 /// Detection limits that are printed.
 const LIMITS: usize = 4;
@@ -128,8 +135,14 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     writeln!(text, "{}  {}", subject.opened.text.name, subject.opened.text.about)?;
     writeln!(
         text,
-        "GAP     {:.3} sigma where 1 is perfect; calibration and noise alone: p {:.3}",
-        diagnosis.gap, diagnosis.gate.p
+        "GAP     {:.3} sigma where 1 is perfect; calibration and noise alone: p {:.3}{}",
+        diagnosis.gap,
+        diagnosis.gate.p,
+        if diagnosis.gate.p > place::NO_GAP && !diagnosis.causes.is_empty() {
+            ", on the whole; what is named below stands out on its own"
+        } else {
+            ""
+        }
     )?;
     let (missing, clipped) = subject
         .masked
@@ -144,7 +157,9 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
     place::line(text, diagnosis)?;
     gross(text, subject, diagnosis)?;
     causes::write(text, subject, diagnosis)?;
-    held_out(text, subject, diagnosis)?;
+    if !causes::is_clean(diagnosis) {
+        held_out(text, subject, diagnosis)?;
+    }
     if diagnosis.causes.is_empty() {
         let weakest: Vec<String> = diagnosis
             .limits
@@ -173,20 +188,26 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
 /// The held-out gap in three lines: channels, attitude, what got worse.
 fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
     let shrink = &diagnosis.shrink;
-    let ceiling = diagnosis
-        .ceiling_percent
-        .map_or(String::new(), |percent| format!(" of at most {percent:.1} %"));
     writeln!(
         text,
-        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibrated {:.3}, floor {:.3}); {:.1} % [{:.1}, {:.1}]{ceiling}",
+        "SHRINK  held out: {:.3} -> {:.3} sigma (recalibrated {:.3}, floor {:.3}); {}",
         shrink.before,
         shrink.after,
         shrink.recalibrated,
         shrink.floor,
-        shrink.percent,
-        shrink.interval_percent[0],
-        shrink.interval_percent[1]
+        gained(
+            [shrink.before, shrink.after],
+            shrink.percent,
+            shrink.interval_percent,
+            diagnosis.ceiling_percent
+        )
     )?;
+    if shrink.after < shrink.floor {
+        writeln!(
+            text,
+            "        below the floor: the log is quieter than its description says, or the effect takes up some of its noise"
+        )?;
+    }
     for stage in diagnosis.stages.iter().filter(|stage| stage.unit == "deg") {
         let corrected = stage
             .corrected

@@ -10,7 +10,7 @@ use packets::{
     },
 };
 
-use super::{CaseError, Kind, read_bytes};
+use super::{CaseError, Kind, plausible, read_bytes};
 use crate::input::log::{Column, Log};
 
 /// Reads a log.
@@ -26,7 +26,9 @@ pub fn read_measured(file: &Path, kind: Kind, columns: &[Column], cycle_s: Optio
             "cycle_s",
             "is absent from the unit; packets are numbered, not timed",
         )),
-        (Kind::Csv | Kind::Table, _) => from_csv(file, &bytes, columns),
+        (Kind::Csv | Kind::Table, cycle_s) => {
+            from_csv(file, &bytes, columns, cycle_s.filter(|_| kind == Kind::Csv), kind)
+        }
     }
 }
 
@@ -83,7 +85,7 @@ fn is_before_conversion(number: u64, place: usize, counts: i16) -> bool {
     number == 0 && counts == 0 && CHANNELS[place].quantity == Quantity::Temperature
 }
 
-fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseError> {
+fn from_csv(file: &Path, bytes: &[u8], columns: &[Column], cycle_s: Option<f64>, kind: Kind) -> Result<Log, CaseError> {
     let mut reader = csv::Reader::from_reader(bytes);
     let malformed = |error: csv::Error| CaseError::key(file, "rows", error.to_string());
     let header = reader.headers().map_err(malformed)?.clone();
@@ -105,7 +107,8 @@ fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseEr
     {
         return Err(CaseError::key(file, stranger, "is a column the unit does not describe"));
     }
-    let mut log = Log::empty(columns.len());
+    let mut times_s = Vec::new();
+    let mut rows: Vec<Vec<Option<f64>>> = Vec::new();
     let mut record = csv::StringRecord::new();
     let mut last_s = f64::NEG_INFINITY;
     while reader.read_record(&mut record).map_err(malformed)? {
@@ -130,13 +133,27 @@ fn from_csv(file: &Path, bytes: &[u8], columns: &[Column]) -> Result<Log, CaseEr
             ));
         }
         last_s = start_s;
-        log.begin_row(start_s);
-        for (index, (column, place)) in columns.iter().zip(&places).enumerate() {
-            log.put(index, column, number(*place)?);
-        }
+        times_s.push(start_s);
+        rows.push(places.iter().map(|place| number(*place)).collect::<Result<_, _>>()?);
     }
-    if log.start_s.is_empty() {
+    if times_s.is_empty() {
         return Err(CaseError::key(file, "rows", "has none"));
+    }
+    let of = |channel: usize| rows.iter().filter_map(|row| row[channel]).collect();
+    let values: Vec<Vec<f64>> = (0..columns.len()).map(of).collect();
+    // The rows of a table are commands, apart and few; what contradicts them is found with them.
+    if kind == Kind::Csv
+        && let Some((what, why)) = plausible::doubt(columns, &times_s, &values, cycle_s)
+    {
+        return Err(CaseError::key(file, what, why));
+    }
+    let zeros = plausible::zeros(columns, &values);
+    let mut log = Log::empty(columns.len());
+    for (start_s, row) in times_s.into_iter().zip(rows) {
+        log.begin_row(start_s);
+        for (index, (column, value)) in columns.iter().zip(row).enumerate() {
+            log.put(index, column, value.map(|value| value + zeros[index]));
+        }
     }
     Ok(log)
 }

@@ -245,6 +245,8 @@ fn column(channel: &Channel) -> Column {
     Column {
         name: channel.name.clone(),
         lsb: channel.lsb,
+        sensor: channel.sensor,
+        bias: channel.bias,
         range: channel.range,
         code_range: channel.bits.map(|bits| {
             let half = 1i64 << (bits.clamp(1, 62) - 1);

@@ -7,6 +7,11 @@ use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Out
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
 
+/// Whether nothing is said to be there: no cause, nothing unknown, nothing undecided.
+pub fn is_clean(diagnosis: &Diagnosis) -> bool {
+    diagnosis.causes.is_empty() && diagnosis.none_of_these <= 0.5 && diagnosis.gate.unknown(UNKNOWN_ALONE) <= 0.5
+}
+
 /// Writes what is said of causes.
 pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
     let said = match diagnosis.outcome {
@@ -79,7 +84,7 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
         .take(3)
         .map(|(name, probability)| format!("{name} {probability:.3}"))
         .collect();
-    if !others.is_empty() {
+    if !others.is_empty() && !is_clean(diagnosis) {
         writeln!(text, "OR      {}", others.join(", "))?;
     }
     for set in &diagnosis.indistinguishable {

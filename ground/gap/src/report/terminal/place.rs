@@ -7,6 +7,7 @@ use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     thresholds::NO_GAP,
+    report::place_shares,
     unknown::place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,
@@ -22,6 +23,9 @@ const CELLS: usize = 8;
 /// Share below which a part is not printed.
 const LEAST: f64 = 0.01;
 
+/// Chance above which there is no gap to be anywhere: one in twenty.
+pub const NO_GAP: f64 = 0.05;
+
 /// Where the gap is: shares, cells, when, and at which stage of the pipeline.
 pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
@@ -32,7 +36,7 @@ pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
 
 /// One line of the screen; nothing where there is no gap to be anywhere.
 pub(super) fn line(text: &mut String, diagnosis: &Diagnosis) -> Result {
-    if diagnosis.gate.p > NO_GAP {
+    if diagnosis.gate.p > NO_GAP && diagnosis.causes.is_empty() {
         return Ok(());
     }
     let place = &diagnosis.place;
@@ -53,7 +57,7 @@ pub(super) fn line(text: &mut String, diagnosis: &Diagnosis) -> Result {
         .collect();
     let follows = Some(first(&explaining, 2)).filter(|words| !words.is_empty());
     let parts = [
-        Some(first(&place.channels, 4)),
+        Some(first(&place_shares::channels(diagnosis), 4)),
         Some(first(&octaves, 1)),
         follows.map(|words| format!("follows {words}")),
         place.passage.as_ref().map(when),
@@ -78,7 +82,7 @@ pub fn when(passage: &Passage) -> String {
 
 fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result {
     let place = &diagnosis.place;
-    if diagnosis.gate.p > NO_GAP {
+    if diagnosis.gate.p > NO_GAP && diagnosis.causes.is_empty() {
         writeln!(
             text,
             "no gap beyond calibration and noise (p {:.2}): shares are of little",
@@ -86,8 +90,8 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result 
         )?;
     }
     for (what, parts) in [
-        ("channels", &place.channels),
-        ("plates", &place.groups),
+        ("channels", &place_shares::channels(diagnosis)),
+        ("plates", &place_shares::groups(subject, diagnosis)),
         ("octaves", &place.octaves),
         ("regimes", &place.regimes),
     ] {

@@ -2,7 +2,7 @@
 
 use std::fmt::{Result, Write};
 
-use crate::{diagnose::Diagnosis, holdout::stages::Stage, input::case::Subject};
+use crate::{diagnose::Diagnosis, holdout::stages::Stage, input::case::Subject, report::gained::gained};
 
 /// How far it shrinks: in total, by stage and by channel.
 pub fn shrink(subject: &Subject, diagnosis: &Diagnosis) -> String {
@@ -19,13 +19,15 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result 
         "held-out gap  {:.4} sigma, recalibrated {:.4}, with the effect {:.4}, floor {:.4}",
         shrink.before, shrink.recalibrated, shrink.after, shrink.floor
     )?;
-    let ceiling = diagnosis.ceiling_percent.map_or(String::new(), |percent| {
-        format!("; the true effect could shrink it by {percent:.2} %")
-    });
     writeln!(
         text,
-        "shrink        {:.1} % [{:.1}, {:.1}] of the way to the floor{ceiling}",
-        shrink.percent, shrink.interval_percent[0], shrink.interval_percent[1]
+        "shrink        {}, of the way to the floor",
+        gained(
+            [shrink.before, shrink.after],
+            shrink.percent,
+            shrink.interval_percent,
+            diagnosis.ceiling_percent
+        )
     )?;
     stages(text, &diagnosis.stages)?;
     writeln!(
