@@ -135,6 +135,8 @@ mod tests {
 
     fn gyro() -> Column {
         Column {
+            sensor: twin::predict::Kind::Accelerometer,
+            bias: 0.0,
             name: "g1".to_owned(),
             lsb: 0.001,
             range: [-5.0, 5.0],
