@@ -111,7 +111,7 @@ pub enum AttitudeError {
         /// Which.
         file: String,
         /// What is wrong, and what to do.
-        why: Implausible,
+        why: Box<Implausible>,
     },
     /// A calibration set for a log that is not in counts.
     #[error("{0}: a nine-axis log is in SI already; sets are for counts: packets, or CSV of `ground decode --counts`")]
@@ -330,7 +330,10 @@ fn read(path: &Path, units: &Units) -> Result<Log, AttitudeError> {
     }
     if header.split(',').any(|column| column.trim() == "t_s") {
         let rows = recording::parse(&name, BufReader::new(whole))?;
-        let rows = plausible::in_si(rows, units).map_err(|why| AttitudeError::Implausible { file: name, why })?;
+        let rows = plausible::in_si(rows, units).map_err(|why| AttitudeError::Implausible {
+            file: name,
+            why: Box::new(why),
+        })?;
         return Ok(Log::NineAxis(rows));
     }
     match packets(whole, cycles).map_err(failed)? {

@@ -43,6 +43,7 @@ fn trial(label: String, excitation_b: Vector3<f64>, values: &[f64]) -> Trial {
         excitation_b,
         temperature_c: f64::NAN,
         values: values.iter().copied().map(Some).collect(),
+        stated: Vec::new(),
     }
 }
 
@@ -52,6 +53,7 @@ fn experiment(kind: Kind, channels: &[&str], trials: Vec<Trial>) -> Experiment {
         kind,
         channels: channels.iter().map(|name| (*name).to_string()).collect(),
         trials,
+        declared: None,
         remarks: Vec::new(),
     }
 }

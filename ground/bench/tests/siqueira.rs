@@ -28,12 +28,14 @@ fn campaign() -> Option<Experiment> {
         excitation_b: Vector3::new(rate[0], rate[1], rate[2]),
         temperature_c: f64::NAN,
         values: output.iter().copied().map(Some).collect(),
+        stated: Vec::new(),
     };
     Some(Experiment {
         file: "Table 7.4".into(),
         kind: Kind::Rate,
         channels: CHANNELS.map(String::from).to_vec(),
         trials: rates.iter().zip(&outputs).enumerate().map(trial).collect(),
+        declared: None,
         remarks: Vec::new(),
     })
 }

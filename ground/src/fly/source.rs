@@ -78,7 +78,7 @@ pub enum SourceError {
         /// Which.
         file: String,
         /// What is wrong, and what to do.
-        why: Implausible,
+        why: Box<Implausible>,
     },
     /// A file cannot be flown.
     #[error(transparent)]
@@ -136,7 +136,7 @@ fn recording(path: &Path, units: &Units) -> Result<Recording, SourceError> {
     };
     plausible::in_si(recording.samples().map(row).collect(), units).map_err(|why| SourceError::Implausible {
         file: file_name(path).into(),
-        why,
+        why: Box::new(why),
     })?;
     Ok(recording.in_units(recording::Units {
         time: units.size(Kind::Time),

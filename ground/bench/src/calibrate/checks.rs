@@ -217,7 +217,7 @@ mod tests {
             Row {
                 label: format!("row {}", k + 1),
                 along,
-                residual: left(k, along) + if k % 2 == 0 { 1.0 } else { -1.0 },
+                residual: left(k, along) + if k.is_multiple_of(2) { 1.0 } else { -1.0 },
                 stated: Some(0.5),
             }
         };
