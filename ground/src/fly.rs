@@ -109,7 +109,12 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
     };
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
-    let mut prepared = prepare(arguments, source.world.as_ref(), &source.truth, duration.as_secs_f64())?;
+    // Without an end the scene is that of the motion, or of an hour.
+    let scene_s = match duration {
+        plan::UNTIL_TOLD => source.truth.duration_s().unwrap_or(3_600.0),
+        asked => asked.as_secs_f64(),
+    };
+    let mut prepared = prepare(arguments, source.world.as_ref(), &source.truth, scene_s)?;
     for warning in prepared.iter().flat_map(|prepared| &prepared.warnings) {
         eprintln!("warning: {warning}");
     }

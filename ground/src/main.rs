@@ -73,7 +73,8 @@ fn main() -> ExitCode {
 /// Whether standard output takes a table, a script or JSON, rather than a report for people.
 fn prints_what_was_asked_for(command: &Command) -> bool {
     match command {
-        Command::Sources | Command::Completions(_) => true,
+        // A flight has its own word for it.
+        Command::Fly(_) | Command::Sources | Command::Completions(_) => true,
         Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
         Command::Recover(arguments) => arguments.table.is_none(),
         Command::Design(arguments) => arguments.prints_the_plan(),
