@@ -134,6 +134,8 @@ pub fn columns(unit: &UnitDescription) -> Vec<Column> {
     let column = |channel: &Channel| Column {
         name: channel.name.clone(),
         lsb: channel.lsb,
+        sensor: channel.sensor,
+        bias: channel.bias,
         range: channel.range,
         code_range: None,
         overflow_counts: None,
