@@ -155,6 +155,7 @@ mod tests {
             start_us,
             mode: Mode::Wait,
             health: Health::default(),
+            start: None,
             cycle_us: 5_000,
             slots_us: [NO_SLOT; SENSOR_COUNT],
             increments: Integrator::new(1.0).take(),

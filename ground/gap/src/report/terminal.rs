@@ -11,12 +11,12 @@ pub use place::{places, when};
 pub use shrink::shrink;
 use wrap::wrapped;
 
+use crate::{diagnose::Diagnosis, input::case::Subject, report::gained::gained};
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     thresholds::{HELPED, REMAINS},
 };
-use crate::{diagnose::Diagnosis, input::case::Subject, report::gained::gained};
 
 /// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
 const REMAINS: f64 = 2.5;

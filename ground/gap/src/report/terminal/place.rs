@@ -6,8 +6,8 @@ use super::wrap::wrapped;
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
-    thresholds::NO_GAP,
     report::place_shares,
+    thresholds::NO_GAP,
     unknown::place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,
