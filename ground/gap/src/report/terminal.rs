@@ -11,18 +11,12 @@ pub use place::{places, when};
 pub use shrink::shrink;
 use wrap::wrapped;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, report::gained::gained};
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
-    thresholds::{HELPED, REMAINS},
+    report::gained::gained,
+    thresholds::{HELPED, NO_GAP, REMAINS},
 };
-
-/// [sigma] a channel's held-out gap that noise does not leave in eight rows: one in ten million.
-const REMAINS: f64 = 2.5;
-
-/// Share of a recalibrated channel's held-out gap that must go before an effect counts as helping it.
-const HELPED: f64 = 0.8;
 
 /// Detection limits that are printed.
 const LIMITS: usize = 4;
@@ -138,7 +132,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         "GAP     {:.3} sigma where 1 is perfect; calibration and noise alone: p {:.3}{}",
         diagnosis.gap,
         diagnosis.gate.p,
-        if diagnosis.gate.p > place::NO_GAP && !diagnosis.causes.is_empty() {
+        if diagnosis.gate.p > NO_GAP && !diagnosis.causes.is_empty() {
             ", on the whole; what is named below stands out on its own"
         } else {
             ""

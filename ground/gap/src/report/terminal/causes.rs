@@ -9,7 +9,7 @@ const PRINTED: usize = 4;
 
 /// Whether nothing is said to be there: no cause, nothing unknown, nothing undecided.
 pub fn is_clean(diagnosis: &Diagnosis) -> bool {
-    diagnosis.causes.is_empty() && diagnosis.none_of_these <= 0.5 && diagnosis.gate.unknown(UNKNOWN_ALONE) <= 0.5
+    matches!(diagnosis.outcome, Outcome::Clean)
 }
 
 /// Writes what is said of causes.

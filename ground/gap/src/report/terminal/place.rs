@@ -23,9 +23,6 @@ const CELLS: usize = 8;
 /// Share below which a part is not printed.
 const LEAST: f64 = 0.01;
 
-/// Chance above which there is no gap to be anywhere: one in twenty.
-pub const NO_GAP: f64 = 0.05;
-
 /// Where the gap is: shares, cells, when, and at which stage of the pipeline.
 pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
