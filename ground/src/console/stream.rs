@@ -15,8 +15,8 @@ use emems::{
 /// First byte of a reply line.
 const REPLY_START: u8 = b'>';
 
-/// Longest reply line or derived frame; the unit's own are shorter.
-const LONGEST_LINE: usize = 768;
+/// Longest reply line or derived frame: the frame is the longest thing that the unit says.
+const LONGEST_LINE: usize = emems::derived::DERIVED_BYTES + 64;
 
 /// Unreadable bytes handed out at most at once, so that endless noise is shown while it lasts.
 const LONGEST_UNREAD: usize = 256;

@@ -16,10 +16,10 @@ use super::series::Series;
 const SMOOTH: f64 = 0.6;
 
 /// Range of the means over the sigma of one mean of white samples: 4096 means of white noise have 8.
-const FAR: f64 = 20.0;
+const FAR: f64 = 12.0;
 
-/// [s] the slowest filters of the parts are a quarter of this (ADIS16265: 64 taps at 256 Hz).
-const SHORTEST_S: f64 = 1.0;
+/// [s] the slowest filter of the parts (ADIS16265: 64 taps at 256 Hz): means over less of its output are alike without motion.
+const SHORTEST_S: f64 = 0.25;
 
 /// Blocks in a record: fewer leave their correlation open.
 const LEAST_BLOCKS: usize = 16;
@@ -38,7 +38,7 @@ pub struct Motion {
 /// The motion in a record, at the shortest block that shows it.
 pub fn motion(series: &Series) -> Option<Motion> {
     let scatter = scatter(series)?;
-    let mut block = ((SHORTEST_S / series.step_s).ceil() as usize).max(1);
+    let mut block = ((SHORTEST_S / series.step_s).round() as usize).max(1);
     while series.values.len() / block >= LEAST_BLOCKS {
         if let Some(found) = at(series, block, scatter) {
             return Some(found);
@@ -48,13 +48,13 @@ pub fn motion(series: &Series) -> Option<Motion> {
     None
 }
 
-/// Standard deviation of white samples, from their differences; `None` without any.
+/// Standard deviation of white samples, from their second differences, in which a motion leaves little; `None` without any.
 fn scatter(series: &Series) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for stretch in series.stretches() {
-        for pair in series.values[stretch].windows(2) {
-            sum += (pair[1] - pair[0]).powi(2);
-            count += 2.0;
+        for three in series.values[stretch].windows(3) {
+            sum += (three[2] - 2.0 * three[1] + three[0]).powi(2);
+            count += 6.0;
         }
     }
     (count > 0.0 && sum > 0.0).then(|| f64::sqrt(sum / count))
@@ -113,12 +113,12 @@ mod tests {
 
     #[test]
     fn a_tumbling_flight_moves_and_says_where() {
-        for (count, period_s) in [(600, 12.0), (600, 60.0), (18_000, 12.0)] {
+        for (count, period_s) in [(300, 3.0), (600, 12.0), (600, 60.0), (18_000, 12.0)] {
             let series = record(count, 0.045, 0.0, |t_s| {
                 10.0 * (std::f64::consts::TAU * t_s / period_s).sin()
             });
             let found = motion(&series).expect("motion");
-            assert!(found.sigmas > 20.0 && found.rows[0] < found.rows[1], "{found:?}");
+            assert!(found.sigmas > 3.0 && found.rows[0] < found.rows[1], "{found:?}");
         }
     }
 
