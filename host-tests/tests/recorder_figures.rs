@@ -13,8 +13,9 @@ const MOUNT_CLEAN: u64 = 2_000_000;
 const MOUNT_WORST: u64 = 100_000_000;
 /// [ns] what an append may take.
 const APPEND: u64 = 1_500_000;
-/// Records of a chip with as many bad blocks as its data sheet allows, all 80 of them in the log's part.
-const RECORDS: u32 = (4096 - 4 - 80) * 32;
+/// Records of a chip with as many bad blocks as its data sheet allows, all 80 of them in the log's part: four blocks are the
+/// superblock's, four the kept calibration set's.
+const RECORDS: u32 = (4096 - 4 - 4 - 80) * 32;
 
 /// Chip time of mounts and appends on a chip of full size, a third full.
 #[test]

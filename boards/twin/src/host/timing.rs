@@ -13,9 +13,9 @@ pub const WAKE: Nanos = 8_000;
 /// [ns] the firmware's work around one I2C transaction, besides the wake at its end.
 pub const I2C_OVERHEAD: Nanos = 1_100;
 /// [ns] what a transaction that reads takes more of it.
-pub const I2C_READ: Nanos = 6_000;
+pub const I2C_READ: Nanos = 6500;
 /// [ns] its work at each change of direction inside one.
-pub const I2C_TURN: Nanos = 11_800;
+pub const I2C_TURN: Nanos = 13000;
 /// [ns] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// [ns] the firmware's work around one word.
@@ -25,4 +25,4 @@ pub const UART_START: Nanos = 85_000;
 /// [ns] a byte on a UART, 8N1 at 42 MHz / 365, the divisor nearest to 115200.
 pub const UART_BYTE: Nanos = 86_905;
 /// [ns] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 510_000;
+pub const BOOT: Nanos = 590_000;

@@ -150,6 +150,9 @@ pub struct Surroundings {
     pub field_gradient_sigma_ut_m: Option<f64>,
     /// [degC] temperature at which the nominal parameters hold.
     pub temperature_c: Option<f64>,
+    /// Why the earth's rate is left out of the prediction of a rate table, in words; of the format, and not read: without the
+    /// attitude against north no such prediction is made.
+    pub earth_rate: Option<String>,
 }
 
 /// `[reference]`.

@@ -165,7 +165,7 @@ fn a_damaged_derived_frame_costs_itself_only() {
         &[flipped.as_slice(), GOLDEN, &derived_frame()[..100], GOLDEN].concat(),
         &[(902, 1), (1158, 1)],
         &[
-            "offset 0, 902 bytes: begins like a derived frame, but checksum 4CFF was sent, the fields give ABC1",
+            "offset 0, 902 bytes: begins like a derived frame, but checksum 13D7 was sent, the fields give 62B9",
             "offset 1058, 100 bytes: frame cut off after 100 of 902 bytes",
         ],
     );
