@@ -35,10 +35,10 @@ fn on_host(motion: &str, duration: Nanos, script: &[(Nanos, Vec<u8>)]) -> Tape {
     tape
 }
 
-// Gyro 2 is read within microseconds of its conversion in the first cycle of each second, since the gyros are configured
-// first at a start: the host board takes the conversion on the other side of it, and its rate is off by noise.
+// Open: in packets 0, 5, 10 and on of tumble the rate of gyro 2 differs by a count or so. The cause is not known. The slots of
+// both boards agree within 3 us, and moving the host's clock by 4 us or its words by 2 us does not mend it.
 #[test]
-#[ignore = "the host board's instant of gyro 2's conversion is not the image's to the microsecond"]
+#[ignore = "open: the rate of gyro 2 differs between the boards in one packet of five, cause unknown"]
 fn host_run_and_image_emit_the_same_packets() {
     for (motion, duration) in [("tumble", 60_000 * MS), ("rotation-1", 30_000 * MS)] {
         let bytes = |tape: Tape| tape.telemetry.into_iter().map(|(_, byte)| byte).collect::<Vec<u8>>();
