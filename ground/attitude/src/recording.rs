@@ -227,7 +227,10 @@ fn from_east_north_up(q_ub: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
         std::f64::consts::FRAC_1_SQRT_2,
         0.0,
     );
-    UnitQuaternion::try_new(q_nu * q_ub, 0.5)
+    // A norm beyond the largest number would leave nothing of the quaternion.
+    Some(q_nu * q_ub)
+        .filter(|q_nb| (0.5..2.0).contains(&q_nb.norm()))
+        .map(UnitQuaternion::new_normalize)
 }
 
 #[cfg(test)]

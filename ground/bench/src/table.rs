@@ -17,13 +17,8 @@ mod number;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    fs::File,
-    io::Read,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use flate2::read::MultiGzDecoder;
 pub use number::Decimal;
 
 /// [bytes] largest table that is read, unpacked: a day of the unit's packets is 67 MB.
@@ -226,30 +221,17 @@ impl Table {
     }
 }
 
-/// The bytes of a file, unpacked if its name ends in .gz.
+/// The bytes of a file, unpacked if it is a gzip file.
 ///
 /// # Errors
-/// When it cannot be read, or is beyond [`LARGEST`].
+/// When it cannot be read, is beyond [`LARGEST`], or is a gzip bomb ([`packed`]).
 pub fn bytes(file: &Path) -> Result<Vec<u8>, TableError> {
-    let fail = |why: String| TableError {
+    packed::read(file, LARGEST).map_err(|error| TableError {
         file: file.into(),
         line: 0,
         column: String::new(),
-        why,
-    };
-    let source = File::open(file).map_err(|error| fail(format!("cannot be read: {error}")))?;
-    let mut source: Box<dyn Read> = if file.extension().is_some_and(|extension| extension == "gz") {
-        Box::new(MultiGzDecoder::new(source))
-    } else {
-        Box::new(source)
-    };
-    let mut bytes = Vec::new();
-    let read = source.by_ref().take(LARGEST + 1).read_to_end(&mut bytes);
-    read.map_err(|error| fail(format!("cannot be read: {error}")))?;
-    if bytes.len() as u64 > LARGEST {
-        return Err(fail(format!("is larger than {LARGEST} bytes; cut it into parts")));
-    }
-    Ok(bytes)
+        why: format!("cannot be read: {error}"),
+    })
 }
 
 /// UTF-8 where it is, Latin-1 (whose bytes are the first 256 code points) where not.

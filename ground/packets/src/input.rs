@@ -1,17 +1,14 @@
 //! A file as it is or packed: gzip is told by its first two bytes, not by its name.
 //!
-//! In: a path or a reader. Out: its bytes, unpacked. A gzip stream that ends early is an error of its reader, never an end.
+//! In: a path or a reader. Out: its bytes, unpacked within the limits of [`packed`]. A gzip stream that ends early is an error of its reader, never an end.
 
 use std::{
     fs::File,
-    io::{self, BufRead, BufReader, Read},
+    io::{self, Read},
     path::Path,
 };
 
-use flate2::bufread::MultiGzDecoder;
-
-/// RFC 1952, section 2.3.1.
-const GZIP: [u8; 2] = [0x1F, 0x8B];
+use packed::{Limits, Unpacked};
 
 /// Bytes that tell what a file is.
 pub const HEAD_BYTES: usize = 64 * 1024;
@@ -30,18 +27,12 @@ pub fn open(path: &Path) -> io::Result<Box<dyn Read>> {
     unpacked(File::open(path)?)
 }
 
-/// What a reader has, unpacked.
+/// What a reader has, unpacked: a stream may be of any length, a gzip bomb ends in an error.
 ///
 /// # Errors
 /// When its first bytes cannot be read.
 pub fn unpacked(bytes: impl Read + 'static) -> io::Result<Box<dyn Read>> {
-    let mut bytes = BufReader::with_capacity(HEAD_BYTES, bytes);
-    // One read: a stream that is still being sent is not kept waiting for more than it has.
-    if bytes.fill_buf()?.starts_with(&GZIP) {
-        Ok(Box::new(MultiGzDecoder::new(bytes)))
-    } else {
-        Ok(Box::new(bytes))
-    }
+    Ok(Box::new(Unpacked::new(bytes, Limits::most(u64::MAX))?))
 }
 
 /// What bytes that are not what they should be look like, for people: empty, a web page, an archive, a picture, text or

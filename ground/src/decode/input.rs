@@ -77,6 +77,8 @@ fn fail(path: &Path, offset: u64, source: io::Error) -> DecodeError {
 
 #[cfg(test)]
 mod tests {
+    use flate2::{Compression, write::GzEncoder};
+
     use super::*;
 
     #[test]
@@ -90,5 +92,29 @@ mod tests {
         let cut = place.path().join("cut.gz");
         std::fs::write(&cut, b"\x1f\x8b\x08\x00").expect("write");
         assert!(Input::open(&cut).and_then(|input| input.read(|_| Ok(()))).is_err());
+    }
+
+    /// 512 MiB in 0.5 MB; members of a gzip file follow each other, so one of 8 MiB is packed once.
+    #[test]
+    fn a_gzip_bomb_is_refused_by_name_with_what_to_do() {
+        let mut gzip = GzEncoder::new(Vec::new(), Compression::best());
+        io::copy(&mut io::repeat(b'@').take(8 << 20), &mut gzip).expect("packed");
+        let place = tempfile::tempdir().expect("temporary folder");
+        let bomb = place.path().join("bomb.txt.gz");
+        std::fs::write(&bomb, gzip.finish().expect("packed").repeat(64)).expect("write");
+        let mut given = 0;
+        let read = Input::open(&bomb).and_then(|input| {
+            input.read(|piece| {
+                given += piece.len();
+                Ok(())
+            })
+        });
+        let error = read.expect_err("a bomb").to_string();
+        assert!(error.contains("bomb.txt.gz cannot be read at byte 734"), "{error}");
+        assert!(
+            error.contains("200 times its size") && error.contains("gzip -d"),
+            "{error}"
+        );
+        assert!(given <= packed::Limits::most(0).floor as usize, "{given} bytes unpacked");
     }
 }

@@ -10,7 +10,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::{io, path::Path};
 
 use nalgebra::{Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -199,6 +199,9 @@ pub enum UnitError {
     },
 }
 
+/// [bytes] largest file that is read: 40 channels are 10 kB. A device such as `/dev/zero` has no end.
+const LARGEST: u64 = 16 << 20;
+
 /// How far from one the length of an axis may be: three decimals.
 const AXIS_ROUNDING: f64 = 2e-3;
 
@@ -206,7 +209,8 @@ impl UnitDescription {
     /// Reads a file.
     pub fn open(path: &Path) -> Result<Self, UnitError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
+        let text = packed::read(path, LARGEST).and_then(|bytes| String::from_utf8(bytes).map_err(io::Error::other));
+        match text {
             Ok(text) => Self::read(&text, &file),
             Err(error) => Err(UnitError::Unreadable {
                 file,

@@ -73,6 +73,24 @@ pub enum Fault {
         /// The cell, at most its first 32 bytes.
         text: String,
     },
+    /// A number that no sensor and no clock gives.
+    #[error("line {line}, column {column}: \"{text}\" is beyond {most:e}; check its unit")]
+    Beyond {
+        /// Where.
+        line: u64,
+        /// Where.
+        column: String,
+        /// The cell, at most its first 32 bytes.
+        text: String,
+        /// The largest magnitude.
+        most: f64,
+    },
+    /// A slope that no number holds.
+    #[error("line {line}: its time is too near its neighbours' for a slope; delete one of them")]
+    TooSteep {
+        /// Where.
+        line: u64,
+    },
     /// A line without a time.
     #[error("line {line}, column t_s is empty; every line needs its time")]
     NoTime {
@@ -114,6 +132,12 @@ pub enum Fault {
         rows: usize,
         /// Most bytes that are read, after decompression.
         bytes: u64,
+    },
+    /// A gzip file that grows as no recording does.
+    #[error("unpacks to more than {ratio} times its size; if it is a recording, unpack it with gzip -d")]
+    GzipBomb {
+        /// Most unpacked bytes for one of the file.
+        ratio: u64,
     },
     /// A quaternion that is no attitude.
     #[error("line {line}: the norm of qw,qx,qy,qz is {norm}; an attitude has norm 1")]

@@ -13,8 +13,8 @@
 //! centre of the replayed unit: the plates' lever arms are added by the plant, once, and the recorded unit's own offset from
 //! whatever it turned about is already in its force.
 
-mod bounded;
 mod fault;
+mod lines;
 mod series;
 mod table;
 #[cfg(test)]
@@ -72,7 +72,7 @@ impl Recording {
     }
 
     /// Reads the bytes of a file of that name.
-    pub fn read(bytes: impl Read + 'static, file: &str) -> Result<Self, FileError> {
+    pub fn read(bytes: impl Read, file: &str) -> Result<Self, FileError> {
         Self::of(&Table::read(bytes, file, &Self::columns())?)
     }
 
@@ -123,6 +123,7 @@ impl Recording {
 
     fn of(table: &Table) -> Result<Self, FileError> {
         let in_b = |names: [&str; 3]| Ok(table.series(names)?.series.map(s_to_b));
+        let lines = table.series(GYRO)?.lines;
         let (rate_b, force_b, field_b_ut) = (in_b(GYRO)?, in_b(ACCELEROMETER)?, in_b(MAGNETOMETER)?);
         let temperature_c = match table.has(TEMPERATURE) {
             true => Some(table.series([TEMPERATURE])?.series),
@@ -130,6 +131,10 @@ impl Recording {
         };
         let (from_s, to_s) = rate_b.span_s();
         let rate_dot_b = rate_b.slopes();
+        let steep = |slope: &Vector3<f64>| !slope.iter().all(|value| value.is_finite());
+        if let Some(line) = rate_dot_b.values().iter().zip(lines).find(|(slope, _)| steep(slope)) {
+            return Err(table.error(Fault::TooSteep { line: line.1 }));
+        }
         let file = table.file().to_owned();
         Ok(Self {
             file,

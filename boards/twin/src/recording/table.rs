@@ -2,19 +2,19 @@
 //!
 //! In: the file and the names of the columns that matter; all others are ignored, whatever they hold. An empty cell is
 //! "no sample". Out: [`Series`] of columns that belong together. Refuses, with line and column, what is no number, NaN and
-//! infinity, time that stands or goes back, a ragged line, a vector that is empty in part, a damaged gzip, and more than
-//! [`MAX_ROWS`] lines or [`MAX_BYTES`], so that no file can exhaust memory.
+//! infinity, numbers beyond [`MOST`], time that stands or goes back, a ragged line, a vector that is empty in part, a damaged gzip, more than
+//! [`MAX_ROWS`] lines or [`MAX_BYTES`], and a gzip bomb ([`packed`]), so that no file can exhaust memory or patience.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
 use csv::{ByteRecord, ErrorKind, Reader, ReaderBuilder, Terminator, Trim};
-use flate2::bufread::MultiGzDecoder;
 use nalgebra::SVector;
+use packed::{Limits, TooLarge, Unpacked};
 
-use super::bounded::Bounded;
 use super::fault::{Fault, FileError};
+use super::lines::BoundedLines;
 use super::series::Series;
 
 /// Most lines read: nearly two hours at 300 Hz, and 160 MB of memory.
@@ -22,8 +22,8 @@ pub const MAX_ROWS: usize = 2_000_000;
 /// Most bytes read, after decompression: 256 a line.
 pub const MAX_BYTES: u64 = 256 * MAX_ROWS as u64;
 
-/// The first two bytes of every gzip file (RFC 1952, 2.3.1). The name of the file does not matter.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+/// Largest magnitude of a cell: f64 holds every whole number up to some 1e16, and a difference of two beyond it may overflow.
+const MOST: f64 = 1e15;
 /// No sample. No file can hold it, since NaN is refused.
 const EMPTY: f64 = f64::NAN;
 
@@ -72,14 +72,14 @@ impl Table {
     }
 
     /// Reads the bytes of a file of that name.
-    pub fn read(bytes: impl Read + 'static, file: &str, wanted: &[&str]) -> Result<Self, FileError> {
+    pub fn read(bytes: impl Read, file: &str, wanted: &[&str]) -> Result<Self, FileError> {
         let mut table = Self {
             file: file.to_owned(),
             t_s: Vec::new(),
             lines: Vec::new(),
             columns: Vec::new(),
         };
-        match table.fill(BufReader::new(bytes), wanted) {
+        match table.fill(bytes, wanted) {
             Ok(()) => Ok(table),
             Err(fault) => Err(table.error(fault)),
         }
@@ -145,23 +145,18 @@ impl Table {
         Ok(Located { series, lines })
     }
 
-    fn fill<R: Read + 'static>(&mut self, mut bytes: BufReader<R>, wanted: &[&str]) -> Result<(), Fault> {
-        let start = bytes.fill_buf().map_err(|error| Fault::Unreadable {
+    fn fill(&mut self, bytes: impl Read, wanted: &[&str]) -> Result<(), Fault> {
+        let plain = Unpacked::new(bytes, Limits::most(MAX_BYTES)).map_err(|error| Fault::Unreadable {
             reason: error.to_string(),
         })?;
-        let gzipped = start.starts_with(&GZIP_MAGIC);
-        let plain: Box<dyn Read> = if gzipped {
-            Box::new(MultiGzDecoder::new(bytes))
-        } else {
-            Box::new(bytes)
-        };
+        let gzipped = plain.is_gzip();
         // A line is counted when its end is read, so the last one gets an end too. Blank lines and the carriage returns of
         // Windows are trimmed away here and not by the reader, which would count neither.
         let mut text = ReaderBuilder::new()
             .terminator(Terminator::Any(b'\n'))
             .flexible(true)
             .trim(Trim::All)
-            .from_reader(Bounded::new(plain, MAX_BYTES).chain(&b"\n"[..]));
+            .from_reader(BoundedLines::new(plain).chain(&b"\n"[..]));
         self.rows(&mut text, wanted).map_err(|fault| match fault {
             Fault::Unreadable { .. } if gzipped => Fault::DamagedGzip {
                 line: text.position().line().saturating_sub(1),
@@ -240,7 +235,13 @@ fn number(record: &ByteRecord, place: usize, line: u64, column: &str) -> Result<
     }
     let quoted = || String::from_utf8_lossy(&cell[..cell.len().min(32)]).into_owned();
     match std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok()) {
-        Some(number) if number.is_finite() => Ok(number),
+        Some(number) if number.abs() <= MOST => Ok(number),
+        Some(number) if number.is_finite() => Err(Fault::Beyond {
+            line,
+            column: column.to_owned(),
+            text: quoted(),
+            most: MOST,
+        }),
         Some(_) => Err(Fault::NotFinite {
             line,
             column: column.to_owned(),
@@ -256,7 +257,10 @@ fn number(record: &ByteRecord, place: usize, line: u64, column: &str) -> Result<
 
 fn unreadable(error: csv::Error) -> Fault {
     match error.kind() {
-        ErrorKind::Io(refused) if refused.kind() == io::ErrorKind::FileTooLarge => too_long(),
+        ErrorKind::Io(refused) if refused.kind() == io::ErrorKind::FileTooLarge => match TooLarge::of(refused) {
+            Some(TooLarge::Ratio { ratio }) => Fault::GzipBomb { ratio },
+            _ => too_long(),
+        },
         _ => Fault::Unreadable {
             reason: error.to_string(),
         },

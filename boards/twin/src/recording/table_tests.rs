@@ -81,6 +81,10 @@ fn each_bad_file_is_refused_with_its_place_and_a_remedy() {
             "arm.csv: line 2, column a: \"-inf\" is not finite; leave the cell empty for no sample",
         ),
         (
+            "t_s,a,b\n0,1e300,2\n",
+            "arm.csv: line 2, column a: \"1e300\" is beyond 1e15; check its unit",
+        ),
+        (
             "t_s,a,b\n,1,2\n",
             "arm.csv: line 2, column t_s is empty; every line needs its time",
         ),
@@ -134,6 +138,17 @@ fn a_cut_off_gzip_is_told_from_a_short_file() {
     assert_eq!(
         header_only,
         "arm.csv: the gzip data ends or breaks after line 0; fetch the file again"
+    );
+}
+
+/// 512 MiB of empty lines in 0.5 MB; members of a gzip file follow each other, so one of 8 MiB is packed once.
+#[test]
+fn a_gzip_bomb_is_refused_with_what_to_do() {
+    let empty = gzipped(&"\n".repeat(8 << 20)).repeat(64);
+    let message = read([gzipped("t_s,a,b\n0,1,2\n"), empty].concat()).unwrap_err();
+    assert_eq!(
+        message,
+        "arm.csv: unpacks to more than 200 times its size; if it is a recording, unpack it with gzip -d"
     );
 }
 
