@@ -108,6 +108,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Set, Refusal> {
     if half(4) != VERSION {
         return Err(Refusal::Version(half(4)));
     }
+    if usize::from(half(6)) != ENCODED_BYTES {
+        return Err(Refusal::Length(usize::from(half(6))));
+    }
+    if half(22) != 0 {
+        return Err(Refusal::Code(22));
+    }
     let mut words = bytes[HEADER..ENCODED_BYTES - 4].as_chunks::<4>().0.iter();
     let mut number = || words.next().map_or(f32::NAN, |word| f32::from_le_bytes(*word));
     Ok(Set {

@@ -216,5 +216,7 @@ fn printable(byte: u8) -> char {
     }
 }
 
+// By its path, so that it is found from `ground/hostile` too.
 #[cfg(test)]
+#[path = "stream/tests.rs"]
 mod tests;
