@@ -11,6 +11,7 @@ pub mod exit;
 pub mod fly;
 pub mod folder;
 pub mod plot;
+pub mod sbom;
 pub mod size;
 pub mod summary;
 pub mod table;
