@@ -5,7 +5,7 @@
 
 use std::fs;
 
-use gap::case::Subject;
+use gap::input::case::Subject;
 
 const FILES: [&str; 4] = ["case.toml", "unit.toml", "measured.txt", "motion.csv"];
 const MARK: &[u8] = b"==> ";
