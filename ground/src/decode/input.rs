@@ -115,6 +115,9 @@ mod tests {
             error.contains("200 times its size") && error.contains("gzip -d"),
             "{error}"
         );
-        assert!(given <= packed::Limits::most(0).floor as usize, "{given} bytes unpacked");
+        assert!(
+            given <= packed::Limits::most(0).floor as usize,
+            "{given} bytes unpacked"
+        );
     }
 }
