@@ -46,6 +46,11 @@ impl<I2C> Switch<I2C> {
         }
     }
 
+    /// Whether a transaction or a recovery is under way.
+    pub fn is_held(&self) -> bool {
+        self.shared.try_lock().is_err()
+    }
+
     /// Makes the next transaction select its channel again: to be called when something else has reset the part.
     pub async fn forget(&self) {
         self.shared.lock().await.control = None;

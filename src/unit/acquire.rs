@@ -212,8 +212,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
                 }
                 Ok(_) => {}
                 Err(TimedOut) => {
-                    self.health = self.health.with(Health::BUS_RECOVERED);
-                    self.switch.recover().await;
+                    self.recover().await;
                     break;
                 }
             }
@@ -286,9 +285,17 @@ impl<B: Board> Acquisition<'_, '_, B> {
     async fn abandon(&mut self, slot: usize) {
         self.lose(slot, &"no answer in time");
         if SENSORS[slot].kind != Kind::Gyro {
-            self.health = self.health.with(Health::BUS_RECOVERED);
-            self.switch.recover().await;
+            self.recover().await;
         }
+    }
+
+    /// Frees the bus. Where a transfer still holds it, that is a self-test's, which is cut off then.
+    async fn recover(&mut self) {
+        self.health = self.health.with(Health::BUS_RECOVERED);
+        if self.switch.is_held() {
+            self.shared.bus_wanted.signal(());
+        }
+        self.switch.recover().await;
     }
 
     fn lose(&mut self, slot: usize, why: &dyn Display) {

@@ -138,6 +138,8 @@ pub struct Shared {
     pub self_test_ordered: Signal<NoopRawMutex, ()>,
     /// The sensor under test, by reading order: not to be read.
     pub testing: Cell<Option<usize>>,
+    /// A reading waited for the sensor bus in vain: the self-test in a transfer gives it up.
+    pub bus_wanted: Signal<NoopRawMutex, ()>,
     /// Error identifier of the newest cycle.
     pub errors: Cell<Errors>,
     /// Bytes lost or passed over on the umbilical.
@@ -188,6 +190,7 @@ impl Shared {
             erase_ordered: Cell::default(),
             self_test_ordered: Signal::new(),
             testing: Cell::default(),
+            bus_wanted: Signal::new(),
             errors: Cell::default(),
             umbilical_noise: Cell::default(),
             calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
