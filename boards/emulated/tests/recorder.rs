@@ -1,6 +1,6 @@
 //! The recorder of the release image: its NAND on the FSMC, its supply, and power cuts and resets at random instants of a flight.
 //!
-//! Per change [`CUTS`] cuts; the long set is `EMEMS_CUTS=5000 cargo host-test --test recorder -- --nocapture`. Cuts are drawn
+//! Per change [`CUTS`] cuts; the long set is in `.ci/long`. Cuts are drawn
 //! from the number of their run, which a failure names.
 
 mod bench;
@@ -23,8 +23,8 @@ use twin::{
     run::{Fault, Scheduled},
 };
 
-/// Cuts per change, over runs of [`CUTS_A_RUN`].
-const CUTS: u64 = 200;
+/// Cuts per change, over runs of [`CUTS_A_RUN`]: a run for each of two cores.
+const CUTS: u64 = 40;
 const CUTS_A_RUN: u64 = 20;
 /// [ns] from reset to the first durable record. A cut of the supply takes 250 ms of it: the gyros' start.
 const BACK: Nanos = 400 * MS;
