@@ -85,6 +85,11 @@ impl Adis16265 {
         part
     }
 
+    /// [ns] when its latest frame ended, 0 before the first.
+    pub fn latest_frame(&self) -> Nanos {
+        self.deselected_at
+    }
+
     fn register(&mut self, address: u8) -> &mut u16 {
         // Callers stay within the map; the bound only keeps a mistake from being a panic.
         let word = usize::from(address / 2).min(self.registers.len() - 1);

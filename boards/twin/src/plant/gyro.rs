@@ -25,6 +25,11 @@ impl Gyro {
         }
     }
 
+    /// [ns] when its latest frame ended, 0 before the first.
+    pub fn latest_frame(&self) -> Nanos {
+        self.part.latest_frame()
+    }
+
     /// Dead (`true`), or back with its power-on registers.
     pub(super) fn silence(&mut self, silent: bool, now: Nanos) {
         self.silent = silent;
