@@ -136,7 +136,7 @@ fn level(number: usize, size: Option<f64>) -> Level {
 }
 
 /// Every fault there is a name for.
-pub const WORDS: [Word; 27] = [
+pub const WORDS: [Word; 28] = [
     word(
         "silent",
         Target::Sensor,
@@ -270,6 +270,15 @@ pub const WORDS: [Word; 27] = [
         "hi",
         "the reset pin",
         |_, _, _| Fault::Reset,
+        None,
+    ),
+    word(
+        "panic",
+        Target::Unit,
+        "",
+        "h",
+        "the firmware panics, leaves a crash record and resets itself",
+        |_, _, _| Fault::Panic,
         None,
     ),
     word(
