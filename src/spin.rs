@@ -21,7 +21,7 @@
 //! field  y_k = h_k . (C_bn m + iron)
 //! ```
 //!
-//! **Noise.** The derivatives walk: `w_x'` by [`SPIN_WALK`] [rad/s2/sqrt(s)], and by [`SURPRISED_WALK`] for [`SURPRISED_S`]
+//! **Noise.** The derivatives walk: `w_x'` as `motion` says, and faster for a moment
 //! after the accelerometers contradicted what was believed of a rate that fewer than three gyros see (ignition, yo-yo). What the
 //! gyros' residuals show over a second is taken for their noise if it is more than their samples': vibration is measured, not
 //! assumed. So is what accelerometers disagree on beside the rate. A gyro at its stop is an inequality: it is used, at its stop, only
@@ -31,76 +31,41 @@
 //! field's gate that stays shut opens the angle about the spin, then all.
 //! The field's model error is considered, not estimated (S. F. Schmidt, 1966): it is added to the covariance that is said.
 //!
-//! Refuses to go on (and says so) when a number is no longer one, or when there was no slice for [`LONGEST_GAP_S`].
+//! Refuses to go on (and says so) when a number is no longer one, or when there was no slice for a second.
+//!
+//! A cycle's readings are put in order in `cycle`; `motion` carries the state to each; `gyros`, `accelerometers` and
+//! `magnetometers` correct it.
 
+mod accelerometers;
 pub mod covariance;
+mod cycle;
 pub mod forces;
+mod gyros;
+mod magnetometers;
+mod motion;
 pub mod pad;
 
-use nalgebra::{ComplexField, Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use self::{
     covariance::{
-        ACROSS, ACROSS_UP, ATTITUDE, BIAS, BY_LOAD, Covariance, IRON, LEVER, Row, SEES_SPIN, SPIN, SPIN_UP, STATES,
+        ACROSS, ACROSS_UP, ATTITUDE, BIAS, BY_LOAD, Covariance, IRON, LEVER, SEES_SPIN, SPIN, SPIN_UP, STATES,
     },
-    forces::{Believed, EQUATIONS},
     pad::Pad,
 };
 use crate::{
-    attitude::{dcm_nb, from_rotation_vector, renormalised, sin_cos},
-    calibration::{Measured, Set},
+    attitude::{from_rotation_vector, renormalised, sin_cos},
+    calibration::Set,
     geometry::{PLATES, TRIAD_AXES},
-    increments::{Increments, SLICES, forces::READINGS, slices::BEYOND},
     kalman::{Delays, Known},
-    sample::{Kind, NO_SLOT, NOT_READ, Sample},
 };
 
-/// [rad/s2/sqrt(s)] walk of the spin's derivative: fins and motors change it by that in a second.
-const SPIN_WALK: f32 = 2.0;
-/// [rad/s2/sqrt(s)] the same after a surprise: a yo-yo takes 19 rad/s away in a second.
-const SURPRISED_WALK: f32 = 60.0;
-/// [s] how long a surprise lasts.
-const SURPRISED_S: f32 = 0.6;
-/// [rad/s2/sqrt(s)] walk of the derivative of the rate across: a cone of 1 deg at 0.4 turns a second has 0.1 rad/s2.
-const ACROSS_WALK: f32 = 0.2;
-/// [rad/sqrt(s)] angle noise that no model explains.
-const ANGLE_WALK: f32 = 1e-4;
-/// [rad/s/sqrt(s)] walk of a gyro's bias.
-const BIAS_WALK: f32 = 1.5e-6;
-/// [uT/sqrt(s)] walk of the iron.
-const IRON_WALK: f32 = 0.01;
-/// [s] time constant of the gyros' low-pass (12.7 Hz).
-const GYRO_TAU_S: f32 = 0.0125;
-/// Parts of a slice's noise that its neighbours do not have: trapezoids over two intervals share their ends.
-const SLICE_NOISE: f32 = 0.5;
-/// [s] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
-const FORCE_AGE_S: f32 = 0.006;
-/// [s] by how much a magnetometer's age is not known: uniform over 13.3 ms.
-const FIELD_AGE_S: f32 = 0.003_85;
-/// [uT] what is left of a magnetometer's own bias, beside its noise.
-const FIELD_REST_UT: f32 = 0.12;
 /// Squared gates.
 const GATE: f32 = 25.0;
-/// Square of the standard deviations from which a gyro's sample weighs less.
-const FAR: f32 = 9.0;
-/// Mean square of the force equations' residuals, over what they should be, that is a surprise.
-const SURPRISE: f32 = 4.0;
-/// Of how many readings the force equations' usual residual is the mean.
-const USUAL: f32 = 20.0;
-/// Of how many gyro residuals their noise is the mean: a second of three.
-const ROUGH: f32 = 150.0;
-/// [s] longest time without a slice.
-const LONGEST_GAP_S: f32 = 1.0;
 /// [rad/s] and [1] what noise of the gyros and usual residual of the force equations it begins with: a lift-off shakes before it
 /// can have shown by how much.
 const BEGINS_ROUGH: f32 = 0.01;
 const BEGINS_USUAL: f32 = 10.0;
-/// Packets whose field is refused before the angle about the spin is opened, and before all is.
-const SHUT: [u8; 2] = [3, 10];
-/// [m/s2] of the data sheet's g.
-const STANDARD_GRAVITY: f32 = 9.806_65;
-/// [us] what is stamped later is not of this flight.
-const FAR_US: u64 = 2_000_000;
 
 /// What it begins with.
 #[derive(Clone, Debug)]
@@ -183,22 +148,6 @@ pub struct Spin {
     slice_us: u64,
 }
 
-/// What a cycle brought, in the order of its instants.
-#[derive(Clone, Copy, Debug)]
-enum Event {
-    /// A slice of the gyros.
-    Slice(usize),
-    /// A reading of the accelerometers before the packet's.
-    Force(usize),
-    /// The packet's.
-    Forces,
-    /// The field of a plate.
-    Field(usize),
-}
-
-/// Most events of a cycle.
-const EVENTS: usize = SLICES + READINGS + 1 + PLATES;
-
 impl Spin {
     /// Not inlined: what it builds on the way would lie on the stack under all that the unit does.
     #[inline(never)]
@@ -268,88 +217,6 @@ impl Spin {
         }
     }
 
-    /// Takes a cycle, its axes as `measured`. Whether it can go on.
-    #[inline(never)]
-    pub fn take(&mut self, set: &Set, sample: &Sample, measured: &Measured, increments: &Increments) -> bool {
-        let delays = self.place.delays;
-        let mut events: heapless::Vec<(u64, Event), EVENTS> = heapless::Vec::new();
-        let mut note = |at_us: u64, late_s: f32, event: Event| {
-            let at_us = at_us.saturating_sub((late_s * 1e6) as u64);
-            let near = at_us.abs_diff(self.at_us) < FAR_US;
-            if near {
-                let place = events.iter().position(|(other_us, _)| *other_us > at_us);
-                let _ = events.insert(place.unwrap_or(events.len()), (at_us, event));
-            }
-        };
-        for (k, slice) in increments
-            .slices
-            .iter()
-            .enumerate()
-            .filter(|(_, slice)| !slice.is_none())
-        {
-            let back_us = u64::from(slice.before_us) + u64::from(slice.lasts_us) / 2;
-            note(
-                increments.end_us.saturating_sub(back_us),
-                delays.gyro_s,
-                Event::Slice(k),
-            );
-        }
-        let began_us = increments.end_us.saturating_sub(increments.covered_us.into());
-        for (k, force) in increments
-            .forces
-            .iter()
-            .enumerate()
-            .filter(|(_, force)| !force.is_none())
-        {
-            let since_us = u64::from(force.covered_us) + u64::from(force.after_us);
-            note(began_us.saturating_add(since_us), delays.acc_s, Event::Force(k));
-        }
-        let slots_us = sample.slots_of(Kind::Accelerometer);
-        let (sum_us, slots) = slots_us
-            .iter()
-            .filter(|slot_us| **slot_us != NO_SLOT)
-            .fold((0, 0), |(sum, count), slot_us| (sum + u64::from(*slot_us), count + 1));
-        if let Some(mean_us) = u64::checked_div(sum_us, slots) {
-            note(sample.start_us.saturating_add(mean_us), delays.acc_s, Event::Forces);
-        }
-        for (plate, slot_us) in sample.slots_of(Kind::Magnetometer).iter().enumerate() {
-            if *slot_us != NO_SLOT {
-                note(
-                    sample.start_us.saturating_add((*slot_us).into()),
-                    delays.mag_s,
-                    Event::Field(plate),
-                );
-            }
-        }
-        let mut of_field = [0_u8; 2];
-        for (at_us, event) in &events {
-            self.carry(*at_us);
-            match *event {
-                Event::Slice(k) => {
-                    self.slice_us = *at_us;
-                    self.take_slice(
-                        set,
-                        measured,
-                        &increments.slices[k].quarters,
-                        increments.slices[k].lasts_us,
-                    );
-                }
-                Event::Force(k) => self.take_force(set, &increments.forces[k].acc_p),
-                Event::Forces => self.take_force(set, &sample.reading.acc_p),
-                Event::Field(plate) => {
-                    if let Some(taken) = self.take_field(set, measured, plate) {
-                        of_field[usize::from(taken)] += 1;
-                    }
-                }
-            }
-            self.correct();
-        }
-        self.mind_the_gate(of_field);
-        let end_us = increments.end_us;
-        let gap_s = end_us.saturating_sub(self.slice_us) as f32 * 1e-6;
-        self.covariance.keep_sound() && self.is_finite() && gap_s < LONGEST_GAP_S
-    }
-
     /// [rad/s] the rate in b.
     pub fn rate_b(&self) -> Vector3<f32> {
         Vector3::new(self.spin, 0.0, 0.0) + self.turning_b(self.across)
@@ -403,265 +270,6 @@ impl Spin {
         [Vector3::new(0.0, cos, -sin), Vector3::new(0.0, sin, cos)]
     }
 
-    /// Attitude and angle spun after so long, of either sign.
-    fn carried(&self, dt_s: f32) -> (UnitQuaternion<f32>, f32) {
-        let half = 0.5 * dt_s;
-        let across = [0, 1].map(|axis| (self.across[axis] + half * self.across_up[axis]) * dt_s);
-        let spun = (self.spin + half * self.spin_up) * dt_s;
-        let turned = from_rotation_vector(self.turning_b(across)) * from_rotation_vector(Vector3::new(spun, 0.0, 0.0));
-        let earth = from_rotation_vector(self.place.earth_rate_n * -dt_s);
-        (renormalised(earth * self.q_nb * turned), spun)
-    }
-
-    /// The state at another instant.
-    fn carry(&mut self, at_us: u64) {
-        let dt_s = seconds_between(self.at_us, at_us);
-        self.at_us = at_us;
-        if dt_s == 0.0 {
-            return;
-        }
-        let dcm = dcm_nb(&self.q_nb);
-        let [y_b, z_b] = self.across_b();
-        let axes_n = [dcm.column(0).into_owned(), dcm * y_b, dcm * z_b];
-        self.covariance.predict(&axes_n, dt_s);
-        let (q_nb, spun) = self.carried(dt_s);
-        self.q_nb = q_nb;
-        self.phase = wrapped(self.phase + spun);
-        self.spin += self.spin_up * dt_s;
-        for axis in 0..2 {
-            self.across[axis] += self.across_up[axis] * dt_s;
-        }
-        let lasted_s = dt_s.abs();
-        let surprised = self.surprised_s > 0.0;
-        self.surprised_s -= dt_s;
-        let walk = |of: f32| of * of * lasted_s;
-        let covariance = &mut self.covariance;
-        covariance.open(SPIN_UP, walk(if surprised { SURPRISED_WALK } else { SPIN_WALK }));
-        let across_walk = walk(if surprised { 5.0 * ACROSS_WALK } else { ACROSS_WALK });
-        for axis in 0..2 {
-            covariance.open(ACROSS_UP + axis, across_walk);
-        }
-        for axis in 0..3 {
-            covariance.open(ATTITUDE + axis, walk(ANGLE_WALK));
-            covariance.open(IRON + axis, walk(IRON_WALK));
-        }
-        for gyro in 0..PLATES {
-            covariance.open(BIAS + gyro, walk(BIAS_WALK));
-        }
-    }
-
-    fn take_slice(&mut self, set: &Set, measured: &Measured, quarters: &[i16; PLATES], lasts_us: u16) {
-        let across_b = self.across_b();
-        let turning_b = self.turning_b(self.across);
-        // First-order low-pass, and a mean by trapezoids over two intervals.
-        let lag = self.spin * GYRO_TAU_S;
-        let (_, cos) = sin_cos(self.spin * 0.5e-6 * f32::from(lasts_us));
-        let left = 0.5 * (1.0 + cos) / ComplexField::sqrt(1.0 + lag * lag);
-        let load = self.load();
-        let gives = |quarters: &&i16| **quarters != NOT_READ && quarters.unsigned_abs() != BEYOND.unsigned_abs();
-        self.seen = quarters.iter().filter(gives).count() >= 3;
-        for (k, (quarters, axis)) in quarters.iter().zip(&set.gyro).enumerate() {
-            if *quarters == NOT_READ {
-                continue;
-            }
-            let sees = axis.axis_b.x + self.sees_spin[k];
-            let row: [(usize, f32); 6] = [
-                (SPIN, sees),
-                (ACROSS, left * axis.axis_b.dot(&across_b[0])),
-                (ACROSS + 1, left * axis.axis_b.dot(&across_b[1])),
-                (BIAS + k, 1.0),
-                (SEES_SPIN + k, self.spin),
-                (BY_LOAD + k, load),
-            ];
-            let believed =
-                sees * self.spin + left * axis.axis_b.dot(&turning_b) + self.bias[k] + self.by_load[k] * load;
-            let above_c = measured.gyros_above_c[k];
-            let value = |counts: f32| axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c));
-            let sampled = SLICE_NOISE * axis.noise * axis.noise;
-            if quarters.unsigned_abs() == BEYOND.unsigned_abs() {
-                let stop = value(if *quarters > 0 { STOP_COUNTS } else { -STOP_COUNTS });
-                let residual = stop - believed;
-                // Only where less is believed than there is.
-                if (residual > 0.0) == (*quarters > 0) {
-                    let r = STOP_SD * STOP_SD;
-                    self.covariance.update(&row, residual, r, f32::MAX);
-                }
-                continue;
-            }
-            let residual = value(0.25 * f32::from(*quarters)) - believed;
-            let r = if self.rough > sampled { self.rough } else { sampled };
-            let (off, left_over) = self.covariance.look(&row, residual, 0.0);
-            let of_state = if off > 0.0 { left_over * left_over / off } else { 0.0 };
-            // Where the rate is less known than the gyro, a residual says nothing of noise. What a gate refuses counts as at it.
-            if of_state < r {
-                let shown = (left_over * left_over - of_state).min(GATE * r);
-                self.rough += (shown - self.rough) * (1.0 / ROUGH);
-            }
-            // A jerk is not missed for being one: what is far off weighs less, and is not left out.
-            let far = left_over * left_over * (1.0 / FAR) - of_state;
-            self.covariance
-                .update(&row, residual, if far > r { far } else { r }, f32::MAX);
-        }
-    }
-
-    fn take_force(&mut self, set: &Set, acc_p: &[[i16; 3]; PLATES]) {
-        let mut used = 0;
-        let counts = acc_p.as_flattened();
-        let along = core::array::from_fn(|k| {
-            if !WITHIN.contains(&counts[k]) {
-                return 0.0;
-            }
-            used |= 1 << k;
-            set.acc[k].value(counts[k], 0.0) - self.force_rest[k]
-        });
-        let [y_b, z_b] = self.across_b();
-        let rate_b = self.rate_b();
-        let turned_b = Vector3::new(0.0, rate_b.z, -rate_b.y) * self.spin;
-        let believed = Believed {
-            rate_b,
-            rate_dot_b: Vector3::new(self.spin_up, 0.0, 0.0) + self.turning_b(self.across_up) + turned_b,
-            across_b: [y_b, z_b],
-            lever: self.lever,
-        };
-        let changing = self.spin * self.spin_up * 0.045;
-        let mut reading = forces::Reading {
-            along,
-            used,
-            variance: square(2.0 * FORCE_AGE_S * 2.0 * changing),
-        };
-        let Some(first) = forces::equations(set, &reading, &believed) else {
-            return;
-        };
-        let found = match self.force.replace((self.at_us, first.force_b)) {
-            Some((before_us, before_b)) if before_us < self.at_us => {
-                let dt_s = seconds_between(before_us, self.at_us);
-                let change = (first.force_b - before_b).norm() / dt_s;
-                reading.variance += square(FORCE_AGE_S * change);
-                forces::equations(set, &reading, &believed).unwrap_or(first)
-            }
-            _ => first,
-        };
-        let rows = |k: usize| -> [(usize, f32); forces::SEEN] {
-            let [spin, spin_up, y, z, y_up, z_up, lever] = found.rows[k];
-            [
-                (SPIN, spin),
-                (SPIN_UP, spin_up),
-                (ACROSS, y),
-                (ACROSS + 1, z),
-                (ACROSS_UP, y_up),
-                (ACROSS_UP + 1, z_up),
-                (LEVER, lever),
-            ]
-        };
-        let scale = if self.usual > 1.0 { self.usual } else { 1.0 };
-        let count = found.count.min(EQUATIONS);
-        let off = |covariance: &Covariance| {
-            let each = (0..count).map(|k| covariance.look(&rows(k), found.residuals[k], scale).0);
-            each.sum::<f32>() / count as f32
-        };
-        let mean = off(&self.covariance);
-        // What is usual is learnt of what is no surprise.
-        let surprising = if self.seen { f32::MAX } else { SURPRISE };
-        let shown = scale * mean.min(SURPRISE);
-        self.usual += (shown - self.usual) * (1.0 / USUAL);
-        if mean > surprising && self.surprised_s <= 0.0 {
-            self.surprised_s = SURPRISED_S;
-            self.covariance.open(SPIN_UP, square(SURPRISED_WALK) * 0.1);
-            self.covariance.open(SPIN, square(SURPRISED_WALK * 0.02));
-            for axis in 0..2 {
-                self.covariance.open(ACROSS_UP + axis, square(1.0));
-                self.covariance.open(ACROSS + axis, square(0.05));
-            }
-        }
-        // A reading that contradicts itself weighs less.
-        let left = off(&self.covariance);
-        let scale = if left > 1.0 { scale * left } else { scale };
-        for k in 0..count {
-            self.covariance.update(&rows(k), found.residuals[k], scale, GATE);
-        }
-    }
-
-    /// [g] force along x_b beyond that of the pad.
-    fn load(&self) -> f32 {
-        self.force.map_or(0.0, |(_, force_b)| {
-            (force_b.x - self.pad_force) * (1.0 / STANDARD_GRAVITY)
-        })
-    }
-
-    /// The field of a plate; whether it was taken, `None` if it was not read whole.
-    fn take_field(&mut self, set: &Set, measured: &Measured, plate: usize) -> Option<bool> {
-        let first = 3 * plate;
-        let present = measured.present.of(Kind::Magnetometer) >> first & 0b111;
-        if present != 0b111 {
-            return None;
-        }
-        let dcm = dcm_nb(&self.q_nb);
-        let field_b = dcm.tr_mul(&self.place.field_n_ut);
-        let mut residual_b = Vector3::zeros();
-        let mut noise: f32 = 0.0;
-        for k in first..first + 3 {
-            let axis = &set.mag[k];
-            residual_b += axis.axis_b * (measured.mag[k] - axis.axis_b.dot(&(field_b + self.iron_b)));
-            noise = noise.max(axis.noise);
-        }
-        let white = square(noise) + square(FIELD_REST_UT);
-        // Along the way of the field in b an unknown age is as good as anything.
-        let way_b = self.rate_b().cross(&field_b);
-        let speed = way_b.norm();
-        let along_b = if speed > 1.0 { way_b / speed } else { Vector3::x() };
-        let other_b = if speed > 1.0 {
-            let across_b = along_b.cross(&field_b);
-            across_b / across_b.norm()
-        } else {
-            Vector3::y()
-        };
-        // The third axis lies along the field: it sees no attitude, but norm and scale, which would be taken for the angle between
-        // nose and field. Where that is near a right one, a part of the norm in 300 is two degrees.
-        let axes = [along_b, other_b];
-        let aged = square(FIELD_AGE_S * speed);
-        let mut all = true;
-        for (axis_b, r) in axes.iter().zip([white + aged, white]) {
-            // h . C_bn (m x a) = a . (C_nb h x m)
-            let seen = (dcm * axis_b).cross(&self.place.field_n_ut);
-            let row: [(usize, f32); 6] = [
-                (ATTITUDE, seen.x),
-                (ATTITUDE + 1, seen.y),
-                (ATTITUDE + 2, seen.z),
-                (IRON, axis_b.x),
-                (IRON + 1, axis_b.y),
-                (IRON + 2, axis_b.z),
-            ];
-            let off = self
-                .covariance
-                .update(row.as_slice() as Row, axis_b.dot(&residual_b), r, GATE);
-            all &= off <= GATE;
-        }
-        Some(all)
-    }
-
-    /// A gate that stays shut opens the angle about the spin, and then all.
-    fn mind_the_gate(&mut self, [refused, taken]: [u8; 2]) {
-        if refused + taken == 0 {
-            return;
-        }
-        if taken >= refused {
-            self.refused = 0;
-            return;
-        }
-        self.refused = self.refused.saturating_add(1);
-        let nose_n = dcm_nb(&self.q_nb).column(0).into_owned();
-        let [roll, all] = SHUT;
-        if self.refused.is_multiple_of(roll) {
-            self.covariance.open_attitude(&(nose_n * nose_n.transpose()));
-            self.covariance.open(SPIN, 0.25);
-        }
-        if self.refused >= all {
-            self.refused = 0;
-            self.covariance
-                .open_attitude(&Matrix3::from_diagonal_element(square(0.3)));
-        }
-    }
-
     /// The state has what the scalars found.
     fn correct(&mut self) {
         let error = core::mem::replace(&mut self.covariance.error, [0.0; STATES]);
@@ -700,12 +308,6 @@ impl Spin {
     }
 }
 
-/// [counts] the end of a gyro's range, 320 deg/s.
-const STOP_COUNTS: f32 = 4368.0;
-/// [rad/s] how near its stop a gyro may be said to be beyond it: noise and the slice's own change.
-const STOP_SD: f32 = 0.2;
-/// [counts] an accelerometer that has a value.
-const WITHIN: core::ops::Range<i16> = -2047..2047;
 /// [rad/s] no rocket spins as fast: 30 turns a second.
 const FASTEST: f32 = 200.0;
 
@@ -717,18 +319,6 @@ fn square(x: f32) -> f32 {
 fn seconds_between(from_us: u64, to_us: u64) -> f32 {
     let us = to_us.wrapping_sub(from_us) as i64;
     us as i32 as f32 * 1e-6
-}
-
-/// The same angle within half a turn.
-fn wrapped(angle: f32) -> f32 {
-    const TURN: f32 = core::f32::consts::TAU;
-    if angle > 0.5 * TURN {
-        angle - TURN
-    } else if angle < -0.5 * TURN {
-        angle + TURN
-    } else {
-        angle
-    }
 }
 
 /// The gyros' biases as a vector.

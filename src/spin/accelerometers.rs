@@ -1,0 +1,114 @@
+//! A reading of the accelerometers: what they disagree by is the rate's.
+//!
+//! In: twelve axes. Out: the state corrected by the [`forces`]' equations, what these equations usually leave, and whether they are
+//! a surprise: an ignition, a yo-yo. The force itself moves the gyros' biases.
+
+use nalgebra::Vector3;
+
+use super::{
+    GATE, Spin,
+    covariance::{ACROSS, ACROSS_UP, Covariance, LEVER, SPIN, SPIN_UP},
+    forces::{self, Believed, EQUATIONS},
+    motion::SURPRISED_WALK,
+    seconds_between, square,
+};
+use crate::{calibration::Set, geometry::PLATES};
+
+/// [s] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
+const FORCE_AGE_S: f32 = 0.006;
+/// [s] how long a surprise lasts.
+const SURPRISED_S: f32 = 0.6;
+/// Mean square of the force equations' residuals, over what they should be, that is a surprise.
+const SURPRISE: f32 = 4.0;
+/// Of how many readings the force equations' usual residual is the mean.
+const USUAL: f32 = 20.0;
+/// [m/s2] of the data sheet's g.
+const STANDARD_GRAVITY: f32 = 9.806_65;
+/// [counts] an accelerometer that has a value.
+const WITHIN: core::ops::Range<i16> = -2047..2047;
+
+impl Spin {
+    pub(super) fn take_force(&mut self, set: &Set, acc_p: &[[i16; 3]; PLATES]) {
+        let mut used = 0;
+        let counts = acc_p.as_flattened();
+        let along = core::array::from_fn(|k| {
+            if !WITHIN.contains(&counts[k]) {
+                return 0.0;
+            }
+            used |= 1 << k;
+            set.acc[k].value(counts[k], 0.0) - self.force_rest[k]
+        });
+        let [y_b, z_b] = self.across_b();
+        let rate_b = self.rate_b();
+        let turned_b = Vector3::new(0.0, rate_b.z, -rate_b.y) * self.spin;
+        let believed = Believed {
+            rate_b,
+            rate_dot_b: Vector3::new(self.spin_up, 0.0, 0.0) + self.turning_b(self.across_up) + turned_b,
+            across_b: [y_b, z_b],
+            lever: self.lever,
+        };
+        let changing = self.spin * self.spin_up * 0.045;
+        let mut reading = forces::Reading {
+            along,
+            used,
+            variance: square(2.0 * FORCE_AGE_S * 2.0 * changing),
+        };
+        let Some(first) = forces::equations(set, &reading, &believed) else {
+            return;
+        };
+        let found = match self.force.replace((self.at_us, first.force_b)) {
+            Some((before_us, before_b)) if before_us < self.at_us => {
+                let dt_s = seconds_between(before_us, self.at_us);
+                let change = (first.force_b - before_b).norm() / dt_s;
+                reading.variance += square(FORCE_AGE_S * change);
+                forces::equations(set, &reading, &believed).unwrap_or(first)
+            }
+            _ => first,
+        };
+        let rows = |k: usize| -> [(usize, f32); forces::SEEN] {
+            let [spin, spin_up, y, z, y_up, z_up, lever] = found.rows[k];
+            [
+                (SPIN, spin),
+                (SPIN_UP, spin_up),
+                (ACROSS, y),
+                (ACROSS + 1, z),
+                (ACROSS_UP, y_up),
+                (ACROSS_UP + 1, z_up),
+                (LEVER, lever),
+            ]
+        };
+        let scale = if self.usual > 1.0 { self.usual } else { 1.0 };
+        let count = found.count.min(EQUATIONS);
+        let off = |covariance: &Covariance| {
+            let each = (0..count).map(|k| covariance.look(&rows(k), found.residuals[k], scale).0);
+            each.sum::<f32>() / count as f32
+        };
+        let mean = off(&self.covariance);
+        // What is usual is learnt of what is no surprise.
+        let surprising = if self.seen { f32::MAX } else { SURPRISE };
+        let shown = scale * mean.min(SURPRISE);
+        self.usual += (shown - self.usual) * (1.0 / USUAL);
+        if mean > surprising && self.surprised_s <= 0.0 {
+            self.surprised_s = SURPRISED_S;
+            self.covariance.open(SPIN_UP, square(SURPRISED_WALK) * 0.1);
+            self.covariance.open(SPIN, square(SURPRISED_WALK * 0.02));
+            for axis in 0..2 {
+                self.covariance.open(ACROSS_UP + axis, square(1.0));
+                self.covariance.open(ACROSS + axis, square(0.05));
+            }
+        }
+        // A reading that contradicts itself weighs less.
+        let left = off(&self.covariance);
+        let scale = if left > 1.0 { scale * left } else { scale };
+        for k in 0..count {
+            self.covariance.update(&rows(k), found.residuals[k], scale, GATE);
+        }
+    }
+
+    /// [g] force along x_b beyond that of the pad.
+    pub(super) fn load(&self) -> f32 {
+        self.force.map_or(0.0, |(_, force_b)| {
+            (force_b.x - self.pad_force) * (1.0 / STANDARD_GRAVITY)
+        })
+    }
+}
