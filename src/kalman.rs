@@ -53,6 +53,7 @@ mod passage;
 mod path;
 mod pending;
 mod propagate;
+mod rest;
 mod settle;
 mod start;
 mod state;
@@ -79,6 +80,7 @@ use self::{
     measured::Measured,
     passage::walks,
     pending::{Pace, Pending},
+    rest::Contradicted,
     start::UNKNOWN,
     state::are_finite,
     window::Window,
@@ -131,8 +133,8 @@ pub struct Filter {
     disturbed_s: f32,
     /// The window before was one of rest.
     rested: bool,
-    /// [s] for how long the bias that rest shows has been rejected without a break.
-    bias_rejected_s: f32,
+    /// Rest contradicts the bias without a break.
+    contradicted: Option<Contradicted>,
     /// How it goes on after a reset, until the gyros are heard.
     going: Option<Going>,
     /// [rad^2] covariance in n of an attitude from before, for when the first window finds none.
@@ -165,7 +167,7 @@ impl Filter {
             rejected_s: [0.0; 2],
             disturbed_s: 0.0,
             rested: false,
-            bias_rejected_s: 0.0,
+            contradicted: None,
             going: None,
             known_before: None,
             params,

@@ -20,8 +20,9 @@ impl Filter {
     /// First: the bias at rest, and what the means see of the covariance.
     pub(super) fn look(&mut self) {
         self.correction.begin(self.params.gate);
-        if let Some(bias_b) = self.measured.bias_b {
-            self.compare_rest(&bias_b);
+        match self.measured.bias_b {
+            Some(bias_b) => self.compare_rest(&bias_b),
+            None => self.contradicted = None,
         }
         self.pending
             .passage
@@ -55,35 +56,6 @@ impl Filter {
     pub(super) fn turn(&mut self, rotation: &UnitQuaternion<f32>) {
         self.q_nb = renormalised(rotation * self.q_nb);
         self.window.turn_axes(&dcm_nb(rotation));
-    }
-
-    /// At rest the gyros measure their own bias and the Earth's rate. What rest shows for [`Params::recovery_s`] is true
-    /// whatever was believed before.
-    ///
-    /// [`Params::recovery_s`]: super::Params::recovery_s
-    fn compare_rest(&mut self, bias_b: &Vector3<f32>) {
-        let noise = Noise::white(square(self.params.rest.bias_sd) + self.measured.means.rate_variance);
-        if self.bias_rejected_s >= self.params.recovery_s {
-            self.bias_rejected_s = 0.0;
-            self.covariance.forget_bias(self.params.bias_sd);
-        }
-        let mut accepted = true;
-        for axis in 0..3 {
-            let scalar = Scalar {
-                quantity: Quantity::Bias,
-                predicted: self.bias_b[axis],
-                measured: bias_b[axis],
-                row: Row::Driver(axis),
-                noise,
-            };
-            let start = self.covariance.of_driver(axis);
-            accepted &= compare(&mut self.pending, &mut self.correction, &scalar, &start);
-        }
-        self.bias_rejected_s = if accepted {
-            0.0
-        } else {
-            self.bias_rejected_s + self.measured.means.duration_s
-        };
     }
 
     /// Second. The velocity is bounded: zero is measured of it. What it gained in the window, it gained by the mean tilt.
@@ -144,7 +116,7 @@ impl Filter {
 }
 
 /// A scalar, of whose `P h'` the passage is still to be made.
-fn compare(pending: &mut Pending, correction: &mut Correction, scalar: &Scalar, start: &State) -> bool {
+pub(super) fn compare(pending: &mut Pending, correction: &mut Correction, scalar: &Scalar, start: &State) -> bool {
     let Some((before, own)) = pending.next(start, &scalar.row) else {
         return true;
     };

@@ -35,7 +35,7 @@ impl Filter {
         self.silent_s = 0.0;
         self.rejected_s = [0.0; 2];
         self.disturbed_s = 0.0;
-        self.bias_rejected_s = 0.0;
+        self.contradicted = None;
         self.rested = false;
         self.aligned = true;
         self.settlements = self.settlements.wrapping_add(1);

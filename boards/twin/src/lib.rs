@@ -3,7 +3,6 @@
 pub mod channel;
 pub mod effect;
 pub mod environment;
-pub mod fault;
 pub mod geometry;
 pub mod host;
 pub mod keys;

@@ -1,6 +1,9 @@
 //! The host board's parts.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::{Cell, RefCell},
+    rc::Rc,
+};
 
 use emems::board::{Board, Oscillator, Parts, ResetCause, StackUse};
 
@@ -8,9 +11,8 @@ use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
     nand::NandPins,
-    plight::Plight,
 };
-use crate::{plant::Plant, run::End};
+use crate::plant::Plant;
 
 /// The type that names the host board's parts.
 pub struct Host;
@@ -40,22 +42,22 @@ pub struct Ends {
     pub fed: Fed,
     /// Memory that survives a reset.
     pub kept: Kept,
-    /// What befalls the processor and its ends.
-    pub plight: Rc<Plight>,
+    /// The sensor bus' DMA stands still.
+    pub dma_hung: Rc<Cell<bool>>,
 }
 
 /// The parts of a unit that starts because of `reset`.
 pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Parts<Host> {
     Parts {
-        sensor_bus: SensorBus::new(plant.clone(), ends.plight.clone()),
-        gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate, ends.plight.clone())),
-        telemetry: Transmitter::new(ends.telemetry.clone(), End::Telemetry, ends.plight.clone()),
-        umbilical_tx: Transmitter::new(ends.umbilical.clone(), End::UmbilicalOut, ends.plight.clone()),
-        umbilical_rx: Receiver(ends.spoken.clone(), ends.plight.clone()),
-        discretes: Inputs(plant.clone(), ends.plight.clone()),
+        sensor_bus: SensorBus::new(plant.clone(), ends.dma_hung.clone()),
+        gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate)),
+        telemetry: Transmitter(ends.telemetry.clone()),
+        umbilical_tx: Transmitter(ends.umbilical.clone()),
+        umbilical_rx: Receiver(ends.spoken.clone()),
+        discretes: Inputs(plant.clone()),
         watchdog: ends.fed.clone(),
         retained: ends.kept.clone(),
-        nand: NandPins(plant.clone(), ends.plight.clone()),
+        nand: NandPins(plant.clone()),
         reset,
         oscillator: Oscillator::Crystal,
         stack_use: StackUse::default,

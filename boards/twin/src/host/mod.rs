@@ -9,7 +9,6 @@ mod bus;
 mod clock;
 mod lines;
 mod nand;
-mod plight;
 mod run;
 pub mod timing;
 

@@ -1,9 +1,7 @@
-//! A gyro in its place: itself, dead, babbling or frozen.
+//! A gyro in its place: itself, dead, or babbling.
 //!
 //! Frames in, frames out, as of the [`Adis16265`] behind it unless a fault speaks for it: the lines of a dead one
-//! float and read 0x0000, a babbling one answers noise, a frozen one what it answered first to the same frame.
-
-use std::collections::BTreeMap;
+//! float and read 0x0000, a babbling one answers noise.
 
 use crate::part::{Nanos, SpiPart, adis16265::Adis16265, signal::Noise};
 
@@ -12,24 +10,18 @@ pub struct Gyro {
     part: Adis16265,
     silent: bool,
     babbling: bool,
-    /// Answers since it froze, by the frame they answer.
-    frozen: Option<BTreeMap<u16, u16>>,
-    asked: u16,
-    noise: Noise,
-    /// Words it did not give, gave at random, and gave again.
-    struck: [u64; 3],
+    babble: Noise,
+    babbled: u64,
 }
 
 impl Gyro {
-    pub(super) fn new(part: Adis16265, noise: Noise) -> Self {
+    pub(super) fn new(part: Adis16265, babble: Noise) -> Self {
         Gyro {
             part,
             silent: false,
             babbling: false,
-            frozen: None,
-            asked: 0,
-            noise,
-            struck: [0; 3],
+            babble,
+            babbled: 0,
         }
     }
 
@@ -50,17 +42,6 @@ impl Gyro {
     pub(super) fn babble(&mut self, babbling: bool) {
         self.babbling = babbling;
     }
-
-    /// Answers each frame as it did first from now on (`true`), or is itself again.
-    pub(super) fn freeze(&mut self, frozen: bool) {
-        self.frozen = frozen.then(BTreeMap::new);
-    }
-
-    /// How often each fault did something, by name.
-    pub(super) fn struck(&self) -> [(&'static str, u64); 3] {
-        let [silent, garbage, frozen] = self.struck;
-        [("silent", silent), ("garbage", garbage), ("frozen", frozen)]
-    }
 }
 
 impl SpiPart for Gyro {
@@ -72,20 +53,14 @@ impl SpiPart for Gyro {
 
     fn transfer(&mut self, mosi: u16, now: Nanos) -> u16 {
         if self.silent {
-            self.struck[0] += 1;
             return 0x0000;
         }
         let answer = self.part.transfer(mosi, now);
-        let asked = std::mem::replace(&mut self.asked, mosi);
-        if self.babbling {
-            self.struck[1] += 1;
-            return self.noise.word(self.struck[1]);
-        }
-        let Some(frozen) = &mut self.frozen else {
+        if !self.babbling {
             return answer;
-        };
-        self.struck[2] += 1;
-        *frozen.entry(asked).or_insert(answer)
+        }
+        self.babbled += 1;
+        self.babble.word(self.babbled)
     }
 
     fn deselect(&mut self, now: Nanos) {

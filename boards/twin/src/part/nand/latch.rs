@@ -64,10 +64,6 @@ pub struct K9f1208 {
     protected: bool,
     /// When WP# went high.
     writable_since: Nanos,
-    /// Bytes asked of it while it was dead.
-    pub dead: u64,
-    /// Bytes asked of it while it was not there.
-    pub absent: u64,
 }
 
 impl K9f1208 {
@@ -86,8 +82,6 @@ impl K9f1208 {
             failed: false,
             protected: true,
             writable_since: 0,
-            dead: 0,
-            absent: 0,
         }
     }
 
@@ -190,9 +184,7 @@ impl K9f1208 {
     /// A data byte from the part.
     pub fn read(&mut self, now: Nanos) -> u8 {
         self.settle(now);
-        self.dead += u64::from(self.cells.befalls.dead);
         if self.cells.befalls.absent {
-            self.absent += 1;
             return 0xFF;
         }
         match self.output {
@@ -217,9 +209,7 @@ impl K9f1208 {
     pub fn power_cut(&mut self, now: Nanos, draw: usize) {
         self.settle(now);
         self.tear(now, TEARS[draw % TEARS.len()]);
-        let counted = (self.dead, self.absent);
         *self = K9f1208::new(self.cells.clone());
-        (self.dead, self.absent) = counted;
     }
 
     fn busy(&self, now: Nanos) -> bool {
