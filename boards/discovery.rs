@@ -35,6 +35,7 @@ pub fn init() -> Parts<Discovery> {
         watchdog,
         reset,
         oscillator,
+        brown_out,
     } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PD8, p.PD9, p.DMA1_CH3);
     Parts {
@@ -55,6 +56,7 @@ pub fn init() -> Parts<Discovery> {
         nand: NandPort::absent(),
         reset,
         oscillator,
+        brown_out,
         stack_use,
     }
 }

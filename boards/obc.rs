@@ -36,6 +36,7 @@ pub fn init() -> Parts<Obc> {
         watchdog,
         reset,
         oscillator,
+        brown_out,
     } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PB10, p.PB11, p.DMA1_CH3);
     Parts {
@@ -73,6 +74,7 @@ pub fn init() -> Parts<Obc> {
         ),
         reset,
         oscillator,
+        brown_out,
         stack_use,
     }
 }

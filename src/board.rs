@@ -51,6 +51,8 @@ pub struct Parts<B: Board> {
     pub reset: ResetCause,
     /// What its time comes from.
     pub oscillator: Oscillator,
+    /// What the chip's brown-out reset is set to.
+    pub brown_out: BrownOut,
     /// How much of the stack has been used; may take as long as a packet's encoding.
     pub stack_use: fn() -> StackUse,
 }
@@ -144,6 +146,16 @@ impl Oscillator {
             Oscillator::Internal => "internal",
         }
     }
+}
+
+/// The supply voltage below which the processor is held in reset: what its option bytes say, beside what the board asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct BrownOut {
+    /// [mV] set, at least; 0 is off.
+    pub set_mv: u16,
+    /// [mV] asked for.
+    pub asked_mv: u16,
 }
 
 /// How deep the stack has grown since the start. Both are zero where nobody knows, as on a host.

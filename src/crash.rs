@@ -29,11 +29,18 @@ pub enum CrashCause {
     HardFault,
     /// An exception without a handler.
     UnhandledException,
+    /// The program ran off its stack.
+    StackOverflow,
 }
 
 impl CrashCause {
     /// Every cause, in the order of their codes.
-    const ALL: [CrashCause; 3] = [CrashCause::Panic, CrashCause::HardFault, CrashCause::UnhandledException];
+    const ALL: [CrashCause; 4] = [
+        CrashCause::Panic,
+        CrashCause::HardFault,
+        CrashCause::UnhandledException,
+        CrashCause::StackOverflow,
+    ];
 
     /// Its number in records and frames, from 1.
     pub fn code(self) -> u8 {
@@ -51,7 +58,7 @@ impl CrashCause {
 pub struct CrashRecord {
     /// What happened.
     pub cause: CrashCause,
-    /// Source line of a panic, else the program counter.
+    /// Source line of a panic, stack pointer of a program that ran off its stack, else the program counter.
     pub at: u32,
     /// Link register of a fault.
     pub lr: u32,

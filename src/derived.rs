@@ -16,7 +16,7 @@
 //! ```
 //!
 //! `start` says how the unit started: reset cause 1 (1 power-on, 2 watchdog, 3 software, 4 pin), crash 1 (0 none, 1 panic, 2
-//! hard fault, 3 unhandled exception), starts since power-on 4, 0 2. Version 5 is written; version 4, which had no `start` and 16
+//! hard fault, 3 unhandled exception, 4 stack overflow), starts since power-on 4, 0 2. Version 5 is written; version 4, which had no `start` and 16
 //! digits for both times, is read.
 //!
 //! Numbers of 8 digits are IEEE 754, but for `start`, `health` and `sensors`, which are bits. With the packet of the same counter

@@ -116,6 +116,7 @@ pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
         resume: Resume::recall(&parts.retained),
         crash: CrashRecord::recall(&parts.retained),
         oscillator: parts.oscillator,
+        brown_out: parts.brown_out,
         stack_use: parts.stack_use,
     };
     let shared = Shared::new(settings, start);

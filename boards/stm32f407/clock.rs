@@ -14,11 +14,36 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
-use emems::board::Oscillator;
+use emems::board::{BrownOut, Oscillator};
 
 /// Reads of RCC_CR until the crystal is given up: at least four cycles of the 16 MHz HSI each, so at least 100 ms, as
 /// long as ST's own start-up code waits. A healthy crystal needs 2 ms (STM32F407 datasheet, tSU(HSE)).
 const HSE_READS: u32 = 400_000;
+
+/// [mV] what every board with this chip asks of the brown-out reset: level 3, the highest, because at 168 MHz with five wait
+/// states the chip needs 2.7 V (RM0090 table 10). The factory leaves it off; a programmer sets it (BOR_LEV = 00).
+const BROWN_OUT_MV: u16 = 2700;
+
+/// What the option bytes say of the brown-out reset: the lower end of each level's range (RM0090 section 3.6.1, BOR_LEV).
+pub fn brown_out() -> BrownOut {
+    let set_mv = match FLASH.optcr().read().bor_lev() {
+        0b00 => 2700,
+        0b01 => 2400,
+        0b10 => 2100,
+        _ => 0,
+    };
+    if set_mv < BROWN_OUT_MV {
+        defmt::warn!(
+            "brown-out reset at {=u16} mV, the board asks for {=u16}",
+            set_mv,
+            BROWN_OUT_MV
+        );
+    }
+    BrownOut {
+        set_mv,
+        asked_mv: BROWN_OUT_MV,
+    }
+}
 
 /// Starts the clocks and says what they come from. The HAL would wait for a dead crystal for ever, so the crystal is tried before it is asked to.
 pub fn start() -> (Peripherals, Oscillator) {

@@ -1,7 +1,8 @@
 //! Panics and faults: a crash record in retained memory, then a reset. Nothing here halts.
 //!
 //! In: where the firmware was. Out: [`CrashRecord`], read at the next start. A panic is also logged, since its place
-//! is text; a fault is not, because it may have struck inside the logger.
+//! is text; a fault is not, because it may have struck inside the logger. A program that ran off its stack left no frame
+//! to tell where it was: its record has the stack pointer instead.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -12,7 +13,7 @@ use defmt_rtt as _;
 use embassy_time::Instant;
 use emems::crash::{CrashCause, CrashRecord};
 
-use super::retained;
+use super::{retained, stack};
 
 /// Whether a crash is being dealt with. Another one on the way is not recorded: the first says what went wrong.
 static CRASHING: AtomicBool = AtomicBool::new(false);
@@ -32,8 +33,14 @@ fn panic(info: &PanicInfo) -> ! {
 // nothing but the crash record and never returns.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    let at = &raw const *frame as usize;
     if first() {
-        keep(CrashCause::HardFault, frame.pc(), frame.lr(), "");
+        // Pushing the frame below the stack failed as well, and reading it there would be a fault inside this one.
+        if stack::is_on_a_stack(at, size_of::<ExceptionFrame>()) {
+            keep(CrashCause::HardFault, frame.pc(), frame.lr(), "");
+        } else {
+            keep(CrashCause::StackOverflow, at as u32, 0, "");
+        }
     }
     SCB::sys_reset()
 }

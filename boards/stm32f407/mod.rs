@@ -8,7 +8,7 @@
 //! | telemetry, 115200 8N1 | USART2 | DMA1 stream 6 transmits, channel 4 |
 //! | umbilical, 115200 8N1 | USART3 | DMA1 stream 3 transmits, channel 4; bytes are received one by one |
 //! | NAND, 8 bit | FSMC bank 2 | none |
-//! | supply below 2.9 V | PVD | |
+//! | supply below 2.9 V | PVD, EXTI line 16 | |
 //! | watchdog, 1 s | IWDG | |
 //!
 //! In: the pins. Out: the [`Parts`](emems::board::Parts) of [`Stm32f407`]. All of the firmware's unsafe code is in
@@ -28,7 +28,7 @@ use core::marker::PhantomData;
 
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
-use emems::board::{Board, Oscillator, ResetCause, Watchdog};
+use emems::board::{Board, BrownOut, Oscillator, ResetCause, Watchdog};
 
 pub use self::bus::SensorBus;
 pub use self::gyros::gyros;
@@ -46,6 +46,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
     USART3 => lines::ReceiverInterrupt, usart::InterruptHandler<peripherals::USART3>;
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
+    PVD => nand::SupplyInterrupt;
 });
 
 /// The types of a board with an STM32F407 whose I2C1 is on `Scl` and `Sda`.
@@ -87,12 +88,15 @@ pub struct Started {
     pub reset: ResetCause,
     /// What its clocks come from.
     pub oscillator: Oscillator,
+    /// What its brown-out reset is set to.
+    pub brown_out: BrownOut,
 }
 
 /// Starts the watchdog, then the clocks and the time driver.
 ///
 /// In this order, so that an oscillator that never gets ready ends in a reset and not in a loop of the HAL.
 pub fn start() -> Started {
+    stack::part();
     let reset = retained::reset_cause();
     embassy_stm32::pac::DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
     // SAFETY: `embassy_stm32::init` has not handed out the peripherals yet, and no board file takes this one from them.
@@ -104,5 +108,6 @@ pub fn start() -> Started {
         watchdog: Iwdg(watchdog),
         reset,
         oscillator,
+        brown_out: clock::brown_out(),
     }
 }

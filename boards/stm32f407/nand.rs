@@ -13,12 +13,18 @@
 //! | whole access | 19 | 113 | tWC, tRC 50, tWB 100 |
 //! | data bus driven after (MEMHIZ) | 4 | 23.8 | tDS 20 is within the strobe |
 //!
-//! The supply is watched by the programmable voltage detector at 2.9 V (PLS 7), above the chip's 2.7 V: a program takes
-//! 0.5 ms and an erase 3 ms, which the board's capacitors carry from there (RM0090 section 5.2.3).
+//! The supply is watched by the programmable voltage detector at 2.9 V (PLS 7), above the chip's 2.7 V (RM0090 section
+//! 5.2.3). Its interrupt draws WP#, whatever is under way: below 2.7 V nobody says what an operation does, and a page that
+//! was given up is one that the log knows how to do without. WP# is not lifted before the supply is back.
+
+use core::cell::Cell;
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::interrupt::typelevel::{self, Handler, Interrupt};
 use embassy_stm32::pac;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use emems::nand::k9f1208::NandBus;
 
 /// The bank's common memory space (RM0090 section 36.4.2).
@@ -34,21 +40,60 @@ const FSMC: u8 = 12;
 /// Supply threshold of the voltage detector: 2.9 V.
 const THRESHOLD: u8 = 7;
 
+/// EXTI line of the voltage detector's output (RM0090 section 12.2.5).
+const DETECTOR: usize = 16;
+
+/// WP#, which the driver and the voltage detector's interrupt share; none on a board without a chip.
+static WRITE_PROTECT: Mutex<CriticalSectionRawMutex, Cell<Option<Output<'static>>>> = Mutex::new(Cell::new(None));
+
+/// Draws WP#, or lifts it if the supply is good.
+fn protect(on: bool) {
+    WRITE_PROTECT.lock(|shared| {
+        let mut pin = shared.take();
+        if let Some(pin) = &mut pin {
+            let level = if on || supply_fails() { Level::Low } else { Level::High };
+            pin.set_level(level);
+        }
+        shared.set(pin);
+    });
+}
+
+fn supply_fails() -> bool {
+    pac::PWR.csr1().read().pvdo()
+}
+
+/// The voltage detector: the supply fell below [`THRESHOLD`].
+pub struct SupplyInterrupt;
+
+impl Handler<typelevel::PVD> for SupplyInterrupt {
+    unsafe fn on_interrupt() {
+        protect(true);
+        pac::EXTI.pr(0).write(|w| w.set_line(DETECTOR, true));
+    }
+}
+
 /// The chip's wires, or none on a board without one.
 pub struct NandPort {
-    write_protect: Option<Output<'static>>,
+    present: bool,
 }
 
 impl NandPort {
     /// The chip on the FSMC's pins: D0 to D7, NOE, NWE, NCE2, A16, A17; and WP#.
     pub fn new(pins: [Peri<'static, AnyPin>; 13], write_protect: Peri<'static, AnyPin>) -> Self {
-        let write_protect = Output::new(write_protect, Level::Low, Speed::Low);
+        // Its edges take a fifth of tWW.
+        let write_protect = Output::new(write_protect, Level::Low, Speed::Medium);
+        WRITE_PROTECT.lock(|shared| shared.set(Some(write_protect)));
         pac::RCC.ahb3enr().modify(|w| w.set_fsmcen(true));
         pac::RCC.apb1enr().modify(|w| w.set_pwren(true));
         pac::PWR.cr1().modify(|w| {
             w.set_pls(THRESHOLD);
             w.set_pvde(true);
         });
+        // The detector's output rises when the supply falls (RM0090 section 5.2.3).
+        pac::EXTI.rtsr(0).modify(|w| w.set_line(DETECTOR, true));
+        pac::EXTI.imr(0).modify(|w| w.set_line(DETECTOR, true));
+        // SAFETY: `Irqs` binds the handler, and what it needs is static.
+        unsafe { typelevel::PVD::enable() };
         for pin in pins {
             let mut pin = Flex::new(pin);
             pin.set_as_af_unchecked(
@@ -74,19 +119,17 @@ impl NandPort {
             w.set_ptyp(pac::fsmc::vals::Ptyp::NANDFLASH);
             w.set_pbken(true);
         });
-        NandPort {
-            write_protect: Some(write_protect),
-        }
+        NandPort { present: true }
     }
 
     /// A board without a chip: every answer is what a bus without one reads.
     #[allow(dead_code, reason = "each board uses one of the two")]
     pub fn absent() -> Self {
-        NandPort { write_protect: None }
+        NandPort { present: false }
     }
 
     fn put(&self, at: *mut u8, byte: u8) {
-        if self.write_protect.is_some() {
+        if self.present {
             // SAFETY: `new` has switched the bank on, whose space this is, and there is one port: the pins are gone.
             unsafe { at.write_volatile(byte) }
         }
@@ -107,7 +150,7 @@ impl NandBus for NandPort {
     }
 
     fn read(&mut self, bytes: &mut [u8]) {
-        if self.write_protect.is_none() {
+        if !self.present {
             return bytes.fill(0xFF);
         }
         for byte in bytes {
@@ -117,12 +160,10 @@ impl NandBus for NandPort {
     }
 
     fn protect(&mut self, on: bool) {
-        if let Some(pin) = &mut self.write_protect {
-            pin.set_level(if on { Level::Low } else { Level::High });
-        }
+        protect(on);
     }
 
     fn power_good(&mut self) -> bool {
-        !pac::PWR.csr1().read().pvdo()
+        !supply_fails()
     }
 }

@@ -15,7 +15,7 @@ use super::{
     clock::{Clock, now},
 };
 use crate::{
-    board::{Oscillator, ResetCause, StackUse},
+    board::{BrownOut, Oscillator, ResetCause, StackUse},
     calibration::{Ranges, Set, load::Arriving},
     crash::CrashRecord,
     derived::{self, DERIVED_BYTES, Derived, Health},
@@ -83,6 +83,8 @@ pub struct Start {
     pub crash: Option<CrashRecord>,
     /// What its time comes from.
     pub oscillator: Oscillator,
+    /// What the chip's brown-out reset is set to.
+    pub brown_out: BrownOut,
     /// How much of the stack has been used.
     pub stack_use: fn() -> StackUse,
 }

@@ -219,10 +219,12 @@ fn status(shared: &Shared) {
     }
     let stack = (shared.start.stack_use)();
     shared.say(format_args!(
-        "G_ST clock {} stack {} of {} bytes",
+        "G_ST clock {} stack {} of {} bytes brown-out {} mV of {}",
         shared.start.oscillator.name(),
         stack.used,
-        stack.size
+        stack.size,
+        shared.start.brown_out.set_mv,
+        shared.start.brown_out.asked_mv
     ));
 }
 

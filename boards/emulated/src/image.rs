@@ -9,6 +9,7 @@ use std::{
 };
 
 use defmt_decoder::Table;
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rigless::symbols::Symbols;
 
 pub use crate::toolchain::{build, build_package};
@@ -143,10 +144,39 @@ impl Image {
         (self.symbols.get(name)).map_err(|_| ImageError::NoSymbol(self.path.clone(), name.into()))
     }
 
+    /// This image with the first word of the function whose mangled name contains `part` written over, as a fault of the
+    /// flash or of the firmware itself would.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::NoSymbol`].
+    pub fn with_code(&self, part: &str, word: u32) -> Result<Self, ImageError> {
+        let mut bytes = self.placed.bytes().to_vec();
+        let at = offset_of(&bytes, part).ok_or_else(|| ImageError::NoSymbol(self.path.clone(), part.into()))?;
+        bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        Image::new(&self.path, bytes)
+    }
+
     /// The table of log strings; `None` for an image that logs nothing, or in a format this reader does not know.
     pub fn log_table(&self) -> Option<Table> {
         Table::parse(self.placed.bytes()).ok().flatten()
     }
+}
+
+/// Where in an ELF file the first word of a function stands, by a piece of its mangled name.
+fn offset_of(elf: &[u8], part: &str) -> Option<usize> {
+    let file = object::File::parse(elf).ok()?;
+    let is_it = |name: &str| name.contains(part) && !name.contains("drop_in_place");
+    let symbol = file
+        .symbols()
+        .find(|symbol| symbol.kind() == SymbolKind::Text && symbol.name().is_ok_and(is_it))?;
+    // Bit 0 of a function's value says Thumb.
+    let address = symbol.address() & !1;
+    file.sections().find_map(|section| {
+        let (first, _) = section.file_range()?;
+        let within = address.checked_sub(section.address())?;
+        (within + 4 <= section.size()).then(|| usize::try_from(first + within).ok())?
+    })
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use rigless::{
         stm32f427::{
             Stm32f427,
             generated::{
-                dma2,
+                dma2, exti, flash,
                 rcc::{Register, cr, csr},
             },
             peripherals::{gpio::Pin, i2c::I2c, rcc, spi::Select},
@@ -40,6 +40,8 @@ const HSE_HZ: u64 = 8_000_000;
 /// [mV] the supply, and where it sags to: below the voltage detector's 2.9 V, above the reset's 1.8 V.
 const SUPPLY_MV: u32 = 3300;
 const SAGGING_MV: u32 = 2800;
+/// EXTI line of the voltage detector (RM0090 section 12.2.5).
+const VOLTAGE_DETECTOR: u32 = 16;
 const NAME: &str = "emems";
 /// Index of USART2 in the part's serial ports: telemetry.
 const TELEMETRY: usize = 1;
@@ -59,6 +61,8 @@ struct Slots {
     dma1: usize,
     tim5: usize,
     rcc: usize,
+    exti: usize,
+    flash: usize,
 }
 
 /// The microcontroller with the stand's own models in three of its slots.
@@ -109,6 +113,8 @@ impl Wired {
             dma1: bus.slot("DMA1")?,
             tim5: bus.slot("TIM5")?,
             rcc: bus.slot("RCC")?,
+            exti: bus.slot("EXTI")?,
+            flash: bus.slot("FLASH")?,
         };
         Ok(Wired {
             part,
@@ -154,13 +160,24 @@ impl Wired {
 
     /// The next reset is one of switching on, by its flags, with the supply as it should be.
     pub fn cut_power(&mut self) {
-        self.sag(false);
+        let _ = self.sag(false);
         self.power_cut = true;
     }
 
-    /// The supply sags below what the voltage detector watches for, or is back.
-    pub fn sag(&mut self, sagging: bool) {
+    /// The supply sags below what the voltage detector watches for, or is back; whether that is an interrupt. The model has no
+    /// EXTI: its registers only keep what the firmware wrote.
+    pub fn sag(&mut self, sagging: bool) -> bool {
         self.part.part.set_supply(if sagging { SAGGING_MV } else { SUPPLY_MV });
+        let registers = self.part.bus_mut().slot_mut(self.slots.exti).registers_mut();
+        let unmasked = registers.get(exti::Register::Imr) & registers.get(exti::Register::Rtsr);
+        sagging && unmasked >> VOLTAGE_DETECTOR & 1 == 1
+    }
+
+    /// Sets the option bytes' BOR_LEV.
+    pub fn set_brown_out(&mut self, level: u32) {
+        let registers = self.part.bus_mut().slot_mut(self.slots.flash).registers_mut();
+        let options = flash::optcr::BOR_LEV.set(registers.get(flash::Register::Optcr), level.into());
+        registers.set(flash::Register::Optcr, options);
     }
 
     /// EN of a stream stays set until the item under way is through (RM0090 section 10.3.17), and here it never is.

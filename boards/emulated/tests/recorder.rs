@@ -108,6 +108,30 @@ fn a_failing_supply_begins_no_operation() {
     assert_eq!(missing.iter().filter(late).count(), 0, "{missing:?} {}", tape.said());
 }
 
+/// Fault F20: the voltage detector's interrupt draws WP# at once, whatever is under way.
+#[test]
+fn a_supply_that_fails_in_the_middle_of_an_operation_draws_write_protect() {
+    let (mut under_way, quarter) = (0, MS / 4);
+    // A record is programmed soon after its packet closes, 10 ms after each cycle began.
+    let cycle = flown(&[], 1_400 * MS).0.packets()[4].0 - 23_541 * 1_000;
+    for step in 40..64 {
+        let at = cycle + step * quarter;
+        let (_, before) = flown(&[], at);
+        if before.is_protected() {
+            continue;
+        }
+        under_way += 1;
+        let fails = Scheduled {
+            at,
+            fault: Fault::SupplyFailing(true),
+        };
+        let (_, after) = flown(&[fails], at + 5_000);
+        assert!(after.is_protected(), "{step}: WP# is high 5 us after the supply failed");
+        break;
+    }
+    assert!(under_way > 0, "no instant was in the middle of an operation");
+}
+
 /// The shortest time after which a record was durable, by faults that leave less and less of it.
 #[test]
 fn a_record_is_durable_400_ms_after_a_power_cut_and_sooner_after_a_reset() {

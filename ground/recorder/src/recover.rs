@@ -239,6 +239,7 @@ fn started(start: &Start) -> String {
                 crash.at, crash.lr, crash.cfsr
             ),
             CrashCause::UnhandledException => format!("exception {} without a handler", crash.at as i32),
+            CrashCause::StackOverflow => format!("stack overflow, its pointer at {:08X}", crash.at),
         };
         format!("; crash before it: {at}, after {:.3} s", crash.uptime_us as f64 * 1e-6)
     });

@@ -3,7 +3,8 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 
 use rigless::{
-    emulator::{Driver, Host, Stop},
+    device::Level,
+    emulator::{Driver, Host, InterruptLine, Stop},
     session::Session,
     soc::Width,
     time::VirtualNanos,
@@ -23,6 +24,9 @@ use crate::{
 /// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
 const RETAINED: u64 = 0x2001_E000;
 const RETAINED_BYTES: u64 = 8192;
+
+/// The interrupt of EXTI line 16, RM0090 table 62.
+const VOLTAGE_DETECTOR: InterruptLine = InterruptLine::new(1).expect("a line of the core");
 
 /// The core's side: what happens at the instants at which the run stops.
 pub(super) struct Pilot {
@@ -55,7 +59,14 @@ impl Pilot {
                     session.reset_by_pin(stop.at, stop.instruction_count, host);
                 }
                 Fault::DmaHung => session.board_mut().mcu.hang_dma(),
-                Fault::SupplyFailing(failing) => session.board_mut().mcu.sag(failing),
+                Fault::SupplyFailing(failing) => {
+                    if session.board_mut().mcu.sag(failing) {
+                        // An edge: the line to the core falls again at once, and its interrupt stays pending.
+                        for level in [Level::High, Level::Low] {
+                            host.set_interrupt(VOLTAGE_DETECTOR, level);
+                        }
+                    }
+                }
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }
         }

@@ -5,7 +5,7 @@ use std::{
     rc::Rc,
 };
 
-use emems::board::{Board, Oscillator, Parts, ResetCause, StackUse};
+use emems::board::{Board, BrownOut, Oscillator, Parts, ResetCause, StackUse};
 
 use super::{
     bus::{Gyro, SensorBus},
@@ -60,6 +60,10 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         nand: NandPins(plant.clone()),
         reset,
         oscillator: Oscillator::Crystal,
+        brown_out: BrownOut {
+            set_mv: 2700,
+            asked_mv: 2700,
+        },
         stack_use: StackUse::default,
     }
 }
