@@ -4,10 +4,11 @@
 //! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::hold::Held`]).
 //!
 //! Refuses, naming file and key: a missing file, a key that is absent or of the wrong type, windows that are empty,
-//! run backwards or overlap, a window without a sample, a motion that ends before the log does, a clock that never
+//! run backwards or overlap, a window without a sample, a sigma or a correlation time that cannot be, a motion that ends before the log does, a clock that never
 //! meets the motion's, channels the packets do not have. Lost, missing and clipped samples are not errors: they are
 //! left out and counted in [`crate::input::log::Masked`].
 
+mod allowance;
 mod environment;
 mod measured;
 mod plausible;
@@ -27,6 +28,7 @@ use crate::input::{
     windows::{Span, Windows},
 };
 
+pub use allowance::{Bars, SlowErrors};
 pub use measured::read_measured;
 pub use subject::Subject;
 pub use table::{Position, read_table};
@@ -119,7 +121,7 @@ pub struct CaseFile {
     pub windows: WindowPairs,
 }
 
-/// `[matters]`; of the format, and not used yet.
+/// `[matters]`: see [`Bars`].
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Matters {
@@ -142,11 +144,11 @@ pub struct Surroundings {
     /// [uT] how well that field is known and how uniform it is.
     #[serde(default)]
     pub field_sigma_ut: f64,
-    /// [uT] how much it changes during the log; of the format, and not used: what the field does is searched for.
+    /// [uT] how much it changes during the log.
     pub field_wander_sigma_ut: Option<f64>,
-    /// [s] over which it stays alike; of the format, and not used.
+    /// [s] over which it stays alike.
     pub field_correlation_s: Option<f64>,
-    /// [uT/m] how much it changes with the place; of the format, and not used.
+    /// [uT/m] how much it changes with the place.
     pub field_gradient_sigma_ut_m: Option<f64>,
     /// [degC] temperature at which the nominal parameters hold.
     pub temperature_c: Option<f64>,
@@ -162,7 +164,7 @@ pub struct ReferenceSigmas {
     /// [rad] of its attitude.
     #[serde(default)]
     pub attitude_sigma_rad: f64,
-    /// [s] over which its error stays alike; of the format, and not used: a second is taken for all.
+    /// [s] over which its error stays alike.
     pub attitude_correlation_s: Option<f64>,
     /// [m] of its position.
     #[serde(default)]

@@ -11,7 +11,9 @@ use twin::{
     predict::{Accuracy, Channel, Feel, Kind, Scene, Twin, UnitDescription},
 };
 
-use super::{CaseError, Opened, Position, environment::environment, read_table};
+use super::{
+    Bars, CaseError, Opened, Position, SlowErrors, allowance::allowance, environment::environment, read_table,
+};
 use crate::input::{
     gross::{Gross, put_right},
     hold::Held,
@@ -41,6 +43,10 @@ pub struct Subject {
     pub twin: Twin,
     /// How well the reference knows.
     pub reference: Reference,
+    /// How reference and field err slowly.
+    pub slow: SlowErrors,
+    /// What is too small to care about.
+    pub bars: Bars,
     /// What may be fitted.
     pub fit: Fit,
     /// What only judges.
@@ -78,6 +84,7 @@ impl Subject {
             return Subject::of_table(opened, unit);
         }
         let environment = environment(&opened, &unit)?;
+        let (slow, bars) = allowance(&opened)?;
         let columns: Vec<Column> = unit.channels.iter().map(column).collect();
         let mut log = opened.log(&columns, unit.cycle_s)?;
         let name = opened.text.motion.clone().unwrap_or_default();
@@ -135,6 +142,8 @@ impl Subject {
         Ok(Subject {
             twin,
             reference,
+            slow,
+            bars,
             opened,
             fit,
             held,
@@ -158,6 +167,7 @@ impl Subject {
             return Err(CaseError::key(&file, &channel.name, problem));
         }
         let environment = environment(&opened, &unit)?;
+        let (slow, bars) = allowance(&opened)?;
         let mut positions = read_table(&file, &unit.channels)?;
         let gross = put_right(&mut positions, &mut unit.channels);
         let columns: Vec<Column> = unit.channels.iter().map(column).collect();
@@ -180,6 +190,8 @@ impl Subject {
         Ok(Subject {
             twin: Twin::new(unit, environment, Scene::table(&used), starts_s)?,
             reference: Reference::stated(accuracy(&opened)),
+            slow,
+            bars,
             opened,
             fit,
             held,

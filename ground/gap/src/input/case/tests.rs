@@ -204,3 +204,71 @@ fn a_cell_that_is_no_number_is_named_by_line_and_column() {
         &["line 5", "t_s"],
     );
 }
+
+/// The case with lines added to its environment, and tables to its end.
+fn with(environment: &str, tables: &str) -> String {
+    CASE.replace("[windows]", &format!("{environment}\n[windows]")) + tables
+}
+
+#[test]
+fn slow_errors_and_bars_are_read_or_have_the_usual_values() {
+    let usual = opened("case.toml", Some(CASE)).expect("opens");
+    assert_eq!((usual.bars.attitude_deg, usual.bars.gap_sigma), (0.5, 0.05));
+    // What is exact errs by nothing.
+    assert_eq!(usual.slow.attitude_sigma_rad, 0.0);
+    assert_eq!(
+        (usual.slow.field_wander_sigma_ut, usual.slow.field_gradient_sigma_ut_m),
+        (0.0, 0.0)
+    );
+    let room = opened("case.toml", Some(&with("field_sigma_ut = 0.8", ""))).expect("opens");
+    assert_eq!(
+        (room.slow.field_wander_sigma_ut, room.slow.field_correlation_s),
+        (0.15, 10.0)
+    );
+    assert_eq!(room.slow.field_gradient_sigma_ut_m, 1.5);
+    assert_eq!(room.slow.attitude_correlation_s, 20.0);
+    let stated = with(
+        "field_wander_sigma_ut = 0.4\nfield_correlation_s = 7.0\nfield_gradient_sigma_ut_m = 0.2",
+        "[reference]\nattitude_sigma_rad = 0.004\nattitude_correlation_s = 9.0\n[matters]\nattitude_deg = 2.0\ngap_sigma = 0.3\n",
+    );
+    let stated = opened("case.toml", Some(&stated)).expect("opens");
+    let slow = stated.slow;
+    assert_eq!((slow.attitude_sigma_rad, slow.attitude_correlation_s), (0.004, 9.0));
+    assert_eq!((slow.field_wander_sigma_ut, slow.field_correlation_s), (0.4, 7.0));
+    assert_eq!(slow.field_gradient_sigma_ut_m, 0.2);
+    assert_eq!((stated.bars.attitude_deg, stated.bars.gap_sigma), (2.0, 0.3));
+}
+
+#[test]
+fn slow_errors_and_bars_that_cannot_be_are_refused_by_name() {
+    let of_environment = [
+        ("field_wander_sigma_ut", "-0.1"),
+        ("field_wander_sigma_ut", "nan"),
+        ("field_correlation_s", "0.0"),
+        ("field_correlation_s", "inf"),
+        ("field_gradient_sigma_ut_m", "1e6"),
+    ];
+    for (key, value) in of_environment {
+        let text = with(&format!("{key} = {value}"), "");
+        check(
+            "case.toml",
+            Some(&text),
+            &["case.toml", &format!("environment.{key}"), "must be"],
+        );
+    }
+    let of_tables = [
+        ("reference", "attitude_sigma_rad", "4.0"),
+        ("reference", "position_sigma_m", "-1.0"),
+        ("reference", "attitude_correlation_s", "-20.0"),
+        ("matters", "attitude_deg", "0.0"),
+        ("matters", "gap_sigma", "nan"),
+    ];
+    for (table, key, value) in of_tables {
+        let text = with("", &format!("[{table}]\n{key} = {value}\n"));
+        check(
+            "case.toml",
+            Some(&text),
+            &["case.toml", &format!("{table}.{key}"), "must be"],
+        );
+    }
+}
