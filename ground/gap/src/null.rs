@@ -4,6 +4,7 @@
 //! its noise, and on it a linear Gaussian fit ([`joint`]) of what the [`calibration`] and the reference leave open: normal
 //! equations with the calibration marginalised ([`normal`]), their [`evidence`], and the finished [`model`]. A [`misfit`] that
 //! looks like noise is told from noise by how long it stays alike. An effect that comes and goes is on in an [`interval`].
+//! What errs slowly, alike in several channels, is taken out by one Kalman pass over a residual and every column ([`whitening`]).
 //!
 //! With thousands of samples any error of 0.1 % is significant. That is why the calibration is marginalised everywhere: none of
 //! what it leaves open is an effect.
@@ -16,3 +17,4 @@ pub mod misfit;
 pub mod model;
 pub mod normal;
 pub mod problem;
+pub mod whitening;
