@@ -46,6 +46,19 @@ fn main() -> Result<(), Box<dyn Error>> {
             d.shrink.interval_percent,
             d.withdrawn
         );
+        let left = &d.remainder;
+        println!(
+            "   {}: {} {:.3?} {} sigma {:.2} deg {:.2?} present {:.3} (ln BF {:.1}) matters {:.3}",
+            d.outcome.word(),
+            left.what,
+            left.size,
+            left.unit,
+            left.sigma[1],
+            left.attitude_deg,
+            left.present,
+            left.log_bayes_factor,
+            left.matters
+        );
         for c in &d.causes {
             println!(
                 "   {} at {} P {:.3} gain {:.0} share {:.2} {} {}",

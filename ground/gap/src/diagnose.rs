@@ -4,6 +4,9 @@
 //! a model that no longer changes; if its effects do not shrink their gap, they are withdrawn, and where nothing explains a
 //! gap, they say whether it is there too.
 
+use nalgebra::DVector;
+use twin::effect::Texture;
+
 use crate::{
     advise::{
         confusion,
@@ -16,6 +19,7 @@ use crate::{
         events::Events,
         floor::floor,
         judge::Finished,
+        remainder,
         shrink::{Shrink, ceiling_percent},
         stages::Stage,
     },
@@ -23,7 +27,7 @@ use crate::{
     library::hypotheses::Library,
     null::{
         model::Model,
-        problem::{Component, Problem},
+        problem::{Component, Frame, Problem},
     },
     probability::{
         cause::{Cause, share_out},
@@ -31,11 +35,12 @@ use crate::{
         outcome::{Outcome, is_unexplained},
         posterior::Believed,
     },
-    search::{explanation::Explanation, odds::alone, readings::attribute},
-    thresholds::{DOUBTFUL, SAID, UNKNOWN_ALONE},
+    search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
+    thresholds::{DOUBTFUL, SAID},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
+        remainder::{Remainder, Setting},
         traces::{Trace, cells, traces},
         views,
     },
@@ -53,8 +58,12 @@ pub struct Diagnosis {
     pub alternatives: Vec<(&'static str, f64)>,
     /// Sets this motion cannot tell apart.
     pub indistinguishable: Vec<Vec<&'static str>>,
-    /// Probability that something outside the library is needed.
+    /// Probability that what is left matters and no cause explains it.
     pub none_of_these: f64,
+    /// What is left beneath what is named, and how large it is.
+    pub remainder: Remainder,
+    /// [prior sigmas] by how much the calibration is off without effects, most first.
+    pub strains: Vec<(String, f64)>,
     /// What it all comes to.
     pub outcome: Outcome,
     /// What the causes leave.
@@ -189,14 +198,14 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &left,
     );
     let alternatives = believed.alternatives(&library, &explanation);
-    let mut none_of_these = believed.unknown;
-    if believed.causes.is_empty() {
-        if !believed.unnamed.is_empty() {
-            // What is not likely enough to be said may be there, or something else.
-            (left, shrink) = all_there_was();
-        }
-        none_of_these = none_of_these.max(left.unknown(UNKNOWN_ALONE) * believed.none_is_there());
+    let is_named = !believed.causes.is_empty();
+    if !is_named && !believed.unnamed.is_empty() {
+        // What is not likely enough to be said may be there, or something else.
+        (left, shrink) = all_there_was();
     }
+    progress("remainder", 0.0);
+    let remainder = remains(subject, is_named.then_some(&explanation), events.is_some());
+    let none_of_these = remainder.matters * if is_named { 1.0 } else { believed.none_is_there() };
     let Believed {
         mut causes,
         keys,
@@ -206,7 +215,6 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let is_decided = causes.iter().all(|cause| cause.probability >= SAID);
     share_out(&mut causes);
 
-    let is_named = !causes.is_empty();
     let mut once = model.components.iter().filter_map(|component| component.span);
     if is_named && let Some(on) = once.find(|on| on.every_s.is_none()) {
         // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
@@ -236,7 +244,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             explanation.signal_to_noise(&quiet),
         )
     });
-    let outcome = Outcome::of(causes.len(), none_of_these, &gate);
+    let is_recalibrated = shrink.before - shrink.recalibrated > subject.bars.gap_sigma;
+    let outcome = Outcome::of(causes.len(), remainder.matters, none_of_these, is_recalibrated);
     Diagnosis {
         place,
         ceiling_percent: ceiling,
@@ -251,6 +260,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         indistinguishable: confusion::sets(&library, found),
         outcome,
         none_of_these,
+        remainder,
+        strains: strains(&problem, &quiet),
         leftover: left,
         shrink,
         alone: alone(&library, found),
@@ -269,6 +280,39 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         causes,
         withdrawn,
     }
+}
+
+/// What is left of the log beneath what is named; `is_random` where that happens at instants of its own.
+fn remains(subject: &Subject, named: Option<&Explanation>, is_random: bool) -> Remainder {
+    let scatter = named.and_then(|named| named.scatter.as_ref());
+    let scattered = scatter.map_or(&[][..], |scatter| &scatter.channels);
+    // Of a walk, and of what makes other readings of those beneath it, a mean over time is no remainder.
+    let is_hidden = |scatter: &Scatter| scatter.effect.page().texture == Texture::Walk || !scatter.beneath.is_empty();
+    let wanders = scatter.is_some_and(is_hidden);
+    let as_described = vec![1.0; subject.twin.unit().channels.len()];
+    let setting = Setting {
+        slow: &subject.slow,
+        bars: &subject.bars,
+        louder: named.map_or(&as_described, |named| &named.louder),
+        scattered,
+        wandering: if wanders { scattered } else { &[] },
+    };
+    let components = named.map_or(&[][..], |named| &named.model.components);
+    remainder::of_log(subject, components, &setting, named.is_some() && is_random)
+}
+
+/// By how many prior sigmas a model moves the calibration, most first.
+fn strains(problem: &Problem, model: &Model) -> Vec<(String, f64)> {
+    let channels = problem.frames.iter().zip(&model.fitted.nuisance);
+    let of_channel = |(frame, found): (&Frame, &DVector<f64>)| {
+        let names = frame.nuisance_names.iter().map(|(name, _)| name.clone());
+        names
+            .zip(found.iter().copied().collect::<Vec<f64>>())
+            .collect::<Vec<_>>()
+    };
+    let mut strains: Vec<(String, f64)> = channels.flat_map(of_channel).collect();
+    strains.sort_by(|one, other| other.1.abs().total_cmp(&one.1.abs()));
+    strains
 }
 
 /// What an explanation leaves.

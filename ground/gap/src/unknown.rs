@@ -2,11 +2,17 @@
 //!
 //! In: a finished model. Out: [`adequacy::Leftover`], a probability of as much by chance with the aspects that say otherwise,
 //! by logs simulated from the model; [`place::Place`], the shares of the gap by channel, group, octave, regime and time; and
-//! [`traces`] of the channels that stand out. [`views`] says what each channel is looked at with.
+//! [`traces`] of the channels that stand out. [`views`] says what each channel is looked at with. How large it is, and whether that
+//! matters, says [`remainder::Remainder`].
 
 pub mod adequacy;
+mod binned;
+pub mod discrepancy;
+mod fast;
 pub mod octaves;
 pub mod place;
+pub mod remainder;
 pub mod shapley;
+pub mod slow;
 pub mod traces;
 pub mod views;

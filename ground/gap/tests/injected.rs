@@ -118,7 +118,7 @@ fn what_the_unit_can_correct_is_an_entry_of_its_calibration_set() {
 }
 
 /// `verdict.json` as the format's page prints it.
-const FORMAT: &str = r#"{ "case": "S07", "format": "gap-verdict/1",
+const FORMAT: &str = r#"{ "case": "S07", "format": "gap-verdict/2",
   "gap":  { "before": 7.41, "floor": 1.00, "units": "sigma" },
   "where": [ { "channels": ["g2"], "share": 0.83, "when": "rate about y above 60 deg/s" } ],
   "causes": [ { "effect": "gyro-scale", "channels": ["g2"], "probability": 0.97,
@@ -126,6 +126,11 @@ const FORMAT: &str = r#"{ "case": "S07", "format": "gap-verdict/1",
   "alternatives": [ { "effect": "gyro-nonlinearity", "probability": 0.02 } ],
   "indistinguishable": [ ["gyro-scale", "reference-scale"] ],
   "none_of_these": 0.01,
+  "outcome": "named",
+  "remainder": { "present": 0.2, "log_bayes_factor": 1.5, "what": "a slow error of g2", "channels": ["g2"],
+                 "size": { "value": 0.002, "interval_90": [0.001, 0.003], "unit": "rad/s" },
+                 "sigma": { "value": 0.1, "interval_90": [0.05, 0.15], "unit": "sigma" },
+                 "attitude_deg": { "value": 0.3, "interval_90": [0.1, 0.4], "unit": "deg" }, "matters": 0.01 },
   "next_experiment": "next",
   "shrink": { "hold_before": 7.35, "hold_recalibrated": 6.90, "hold_after": 1.08, "percent": 98.7, "interval_percent": [98.1, 99.1] } }"#;
 
@@ -150,6 +155,8 @@ fn check_shape(expected: &Value, found: &Value, at: &str) {
             }
         }
         (Value::Number(_), Value::Number(_)) | (Value::String(_), Value::String(_)) => {}
+        // Not everything that is left makes an error of attitude.
+        (_, Value::Null) if at.ends_with("/attitude_deg") => {}
         _ => panic!("{at}: {found} where the format has {expected}"),
     }
 }

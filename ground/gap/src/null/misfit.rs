@@ -36,8 +36,8 @@ fn factor(rest: &[f64]) -> f64 {
     }
 }
 
-/// Samples that count as one.
-fn correlation_time(rest: &[f64], energy: f64) -> f64 {
+/// Samples that count as one, of a residual of this energy.
+pub fn correlation_time(rest: &[f64], energy: f64) -> f64 {
     let least = 2.0 / (rest.len() as f64).sqrt();
     let alike = |lag: usize| rest.iter().zip(&rest[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
     let sum: f64 = (1..rest.len() / LONGEST)

@@ -1,38 +1,50 @@
 //! The outcome of a diagnosis: decided here, once, and told by whoever tells it.
 //!
-//! In: how many causes are named, how likely it is that something outside the library is needed, and the judgement of
-//! "calibration and noise are enough". Out: an [`Outcome`].
+//! In: how many causes are named, how likely it is that what is left matters, and that no cause explains it, and how far calibration alone
+//! shrinks the gap. Out: an [`Outcome`].
 
-use crate::{
-    thresholds::{SAID, UNKNOWN_ALONE},
-    unknown::adequacy::Leftover,
-};
+use crate::thresholds::SAID;
 
 /// What a diagnosis comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Calibration and noise are enough.
     Clean,
-    /// At least one cause is likelier than not.
+    /// They are once the calibration is fitted anew.
+    Recalibrate,
+    /// At least one cause is likelier than not, and nothing that matters is left.
     Named,
-    /// There is a gap, but no cause of it is likelier than not.
+    /// At least one cause is, and what is left matters.
+    PartlyNamed,
+    /// What is there matters, but no cause of it is likelier than not.
     Undecided,
-    /// There is a gap, and nothing in the library explains it.
+    /// What is there matters, and nothing in the library explains it.
     Unknown,
 }
 
 impl Outcome {
-    /// Of so many causes, with this probability of something outside the library, where `gate` judges the log without
-    /// effects.
-    pub fn of(causes: usize, none_of_these: f64, gate: &Leftover) -> Self {
-        if causes > 0 {
-            Outcome::Named
-        } else if is_unexplained(none_of_these) {
-            Outcome::Unknown
-        } else if gate.unknown(UNKNOWN_ALONE) > SAID {
-            Outcome::Undecided
-        } else {
-            Outcome::Clean
+    /// Of so many causes, with these probabilities that what is left matters and that no cause explains it; `recalibrated` is whether a new
+    /// calibration shrinks the held-out gap by more than what matters.
+    pub fn of(causes: usize, matters: f64, none_of_these: f64, recalibrated: bool) -> Self {
+        match (causes > 0, matters > SAID) {
+            (true, false) => Outcome::Named,
+            (true, true) => Outcome::PartlyNamed,
+            (false, true) if is_unexplained(none_of_these) => Outcome::Unknown,
+            (false, true) => Outcome::Undecided,
+            (false, false) if recalibrated => Outcome::Recalibrate,
+            (false, false) => Outcome::Clean,
+        }
+    }
+
+    /// As verdict.json has it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Outcome::Clean => "clean",
+            Outcome::Recalibrate => "recalibrate",
+            Outcome::Named => "named",
+            Outcome::PartlyNamed => "partly-named",
+            Outcome::Undecided => "undecided",
+            Outcome::Unknown => "unknown",
         }
     }
 }
@@ -46,23 +58,13 @@ pub fn is_unexplained(none_of_these: f64) -> bool {
 mod tests {
     use super::*;
 
-    fn gate(log_tail: f64) -> Leftover {
-        Leftover {
-            p: 0.005,
-            log_tail,
-            aspects: Vec::new(),
-            again: None,
-            scale: [1.0, 1.0],
-        }
-    }
-
     #[test]
-    fn a_name_comes_first_then_the_unknown_then_the_gap() {
-        let (large, small) = (gate(-50.0), gate(0.0));
-        assert_eq!(Outcome::of(1, 0.99, &large), Outcome::Named);
-        assert_eq!(Outcome::of(0, 0.51, &large), Outcome::Unknown);
-        assert_eq!(Outcome::of(0, 0.5, &large), Outcome::Undecided);
-        let plain = Leftover { p: 0.9, ..small };
-        assert_eq!(Outcome::of(0, 0.15, &plain), Outcome::Clean);
+    fn a_name_comes_first_then_what_matters_then_the_calibration() {
+        assert_eq!(Outcome::of(1, 0.1, 0.1, true), Outcome::Named);
+        assert_eq!(Outcome::of(1, 0.9, 0.9, false), Outcome::PartlyNamed);
+        assert_eq!(Outcome::of(0, 0.9, 0.51, true), Outcome::Unknown);
+        assert_eq!(Outcome::of(0, 0.9, 0.3, true), Outcome::Undecided);
+        assert_eq!(Outcome::of(0, 0.1, 0.1, true), Outcome::Recalibrate);
+        assert_eq!(Outcome::of(0, 0.1, 0.1, false), Outcome::Clean);
     }
 }

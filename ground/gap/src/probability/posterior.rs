@@ -28,8 +28,6 @@ pub struct Believed {
     pub keys: Vec<(&'static str, Key)>,
     /// How strong they are on the held-out windows.
     pub promises: Vec<Promised>,
-    /// Probability that something outside the library is needed.
-    pub unknown: f64,
     /// Probability that a name that was not said is not a stand-in for it.
     trust: f64,
 }
@@ -64,7 +62,6 @@ impl Believed {
             unnamed,
             keys,
             promises,
-            unknown: belief.unknown,
             trust: match explanation.found.chosen.is_empty() {
                 true => 1.0 - belief.unknown,
                 false => belief.trust,

@@ -21,8 +21,30 @@ pub struct Verdict {
     alternatives: Vec<Alternative>,
     indistinguishable: Vec<Vec<&'static str>>,
     none_of_these: f64,
+    outcome: &'static str,
+    remainder: Remainder,
     next_experiment: String,
     shrink: Shrink,
+}
+
+/// What is left beneath what is named.
+#[derive(Debug, Serialize)]
+struct Remainder {
+    present: f64,
+    log_bayes_factor: f64,
+    what: String,
+    channels: Vec<String>,
+    size: Sized,
+    sigma: Sized,
+    attitude_deg: Option<Sized>,
+    matters: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Sized {
+    value: f64,
+    interval_90: [f64; 2],
+    unit: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -92,7 +114,7 @@ impl Verdict {
         }
         Verdict {
             case: subject.opened.text.name.clone(),
-            format: "gap-verdict/1",
+            format: "gap-verdict/2",
             gap: Gap {
                 before: rounded(diagnosis.gap, 4),
                 floor: rounded(diagnosis.shrink.floor, 4),
@@ -112,6 +134,8 @@ impl Verdict {
                 .collect(),
             indistinguishable: diagnosis.indistinguishable.clone(),
             none_of_these: rounded(diagnosis.none_of_these, 4),
+            outcome: diagnosis.outcome.word(),
+            remainder: remainder(subject, &diagnosis.remainder),
             next_experiment,
             shrink: Shrink {
                 hold_before: rounded(diagnosis.shrink.before, 4),
@@ -121,6 +145,24 @@ impl Verdict {
                 interval_percent: diagnosis.shrink.interval_percent.map(|value| rounded(value, 2)),
             },
         }
+    }
+}
+
+fn remainder(subject: &Subject, found: &crate::unknown::remainder::Remainder) -> Remainder {
+    let sized = |[low, value, high]: [f64; 3], unit| Sized {
+        value,
+        interval_90: [low, high],
+        unit,
+    };
+    Remainder {
+        present: rounded(found.present, 4),
+        log_bayes_factor: rounded(found.log_bayes_factor, 2),
+        what: found.what.clone(),
+        channels: subject.names(found.channels.iter().copied()),
+        size: sized(found.size, found.unit),
+        sigma: sized(found.sigma.map(|value| rounded(value, 4)), "sigma"),
+        attitude_deg: (found.attitude_deg).map(|degrees| sized(degrees.map(|value| rounded(value, 4)), "deg")),
+        matters: rounded(found.matters, 4),
     }
 }
 

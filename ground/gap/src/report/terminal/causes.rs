@@ -7,21 +7,35 @@ use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Out
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
 
+/// Parameters of the calibration that are printed where it is to be fitted anew, and the prior sigmas from which they are.
+const STRAINS: (usize, f64) = (4, 1.0);
+
 /// Whether nothing is said to be there: no cause, nothing unknown, nothing undecided.
 pub fn is_clean(diagnosis: &Diagnosis) -> bool {
-    matches!(diagnosis.outcome, Outcome::Clean)
+    matches!(diagnosis.outcome, Outcome::Clean | Outcome::Recalibrate)
 }
 
 /// Writes what is said of causes.
 pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
     let said = match diagnosis.outcome {
-        Outcome::Named => None,
+        Outcome::Named | Outcome::PartlyNamed => None,
         Outcome::Unknown => Some("NONE OF THESE: nothing in the library explains what is there"),
         Outcome::Undecided => Some("UNDECIDED: there is a gap, but no cause of it is likelier than not"),
+        Outcome::Recalibrate => Some("NO EFFECT beyond calibration and noise once the calibration is fitted anew"),
         Outcome::Clean => Some("NO EFFECT beyond calibration and noise"),
     };
     if let Some(said) = said {
         writeln!(text, "CAUSE   {said}")?;
+    }
+    if diagnosis.outcome == Outcome::Recalibrate {
+        let strains = diagnosis.strains.iter().take(STRAINS.0);
+        let off: Vec<String> = strains
+            .filter(|(_, off)| off.abs() > STRAINS.1)
+            .map(|(name, off)| format!("{name} {off:+.1}"))
+            .collect();
+        if !off.is_empty() {
+            writeln!(text, "        off by so many of its sigmas: {}", off.join(", "))?;
+        }
     }
     for cause in &diagnosis.causes {
         writeln!(
@@ -90,9 +104,10 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
     for set in &diagnosis.indistinguishable {
         writeln!(text, "        this motion cannot tell apart: {}", set.join(", "))?;
     }
+    remainder(text, subject, diagnosis)?;
     writeln!(
         text,
-        "NONE    something outside the library is needed with probability {:.3}",
+        "NONE    something that matters is left and no cause explains it, with probability {:.3}",
         diagnosis.none_of_these
     )?;
     for aspect in diagnosis
@@ -111,4 +126,42 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
         )?;
     }
     Ok(())
+}
+
+/// What is left, how large, and whether that matters.
+fn remainder(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fmt::Result {
+    let left = &diagnosis.remainder;
+    if left.present <= SAID {
+        return writeln!(
+            text,
+            "REST    nothing is left that stands out (the nearest is there with probability {:.2})",
+            left.present
+        );
+    }
+    writeln!(
+        text,
+        "REST    {}, {} [{}, {}] {} ({:.2} sigma{}); there with probability {:.3} (ln Bayes factor {:.0})",
+        left.what,
+        short(left.size[1]),
+        short(left.size[0]),
+        short(left.size[2]),
+        left.unit,
+        left.sigma[1],
+        left.attitude_deg.map_or(String::new(), |[low, middle, high]| {
+            format!(", {middle:.2} [{low:.2}, {high:.2}] deg of attitude")
+        }),
+        left.present,
+        left.log_bayes_factor
+    )?;
+    writeln!(
+        text,
+        "        matters with probability {:.3}: more than {} deg, or {} sigma of the gap, and than the reference may be off by",
+        left.matters, subject.bars.attitude_deg, subject.bars.gap_sigma
+    )
+}
+
+/// Three digits.
+fn short(value: f64) -> String {
+    let digits = 2 - value.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
+    format!("{value:.*}", digits.clamp(0, 9) as usize)
 }
