@@ -5,6 +5,7 @@ pub mod console;
 pub mod decode;
 pub mod demo;
 pub mod digest;
+pub mod drill;
 pub mod effects;
 pub mod envelope;
 pub mod exit;

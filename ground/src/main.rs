@@ -26,6 +26,7 @@ enum Command {
     Demo(ground::demo::Arguments),
     Effects(ground::effects::Arguments),
     Decode(ground::decode::Arguments),
+    Drill(drill::Arguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
     Gap(Gap),
@@ -96,6 +97,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Demo(arguments) => ground::demo::demo(&arguments)?,
         Command::Effects(arguments) => print!("{}", ground::effects::effects(&arguments)?),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
+        Command::Drill(arguments) => drill::run(&arguments, ground::drill::on_image)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Gap(arguments) => gap(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,

@@ -11,6 +11,7 @@ use emems::{
     sample::{Errors, Kind, Reading},
 };
 use nalgebra::Vector3;
+pub use twin::fault::ill::Ill;
 use twin::{geometry, part::signal::Noise, truth::TruthSource};
 
 /// [s] from cycle to cycle.
@@ -25,25 +26,6 @@ pub const PER_COUNT: [f64; 3] = [3e-3 * 9.80665, 100.0 / 1090.0, 0.07326 * std::
 const CONVERSION_S: [f64; 3] = [0.02, 1.0 / 75.0, 1.0 / 256.0];
 /// [counts] ends of the range.
 const ENDS: [(f64, f64); 3] = [(-2048.0, 2047.0), (-2048.0, 2047.0), (-4368.0, 4368.0)];
-
-/// What may befall an axis or a sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ill {
-    /// Added to an axis [SI].
-    Bias(Channel, f64),
-    /// Added to an axis, growing by so much a second [SI/s].
-    Ramp(Channel, f64),
-    /// The axis' value is so many times what it should be; -1 is a reversed sign.
-    Scale(Channel, f64),
-    /// The axis' noise is so many times what it was.
-    Noise(Channel, f64),
-    /// Two axes have changed places.
-    Exchanged(Channel, Channel),
-    /// The sensor of this channel repeats its counts.
-    Frozen(Channel),
-    /// The sensor of this channel sends random words.
-    Garbage(Channel),
-}
 
 /// A unit in a world.
 #[derive(Clone)]

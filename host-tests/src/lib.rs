@@ -63,10 +63,7 @@ impl Flight {
 
     /// Flies for a while.
     pub fn fly(self, duration: Nanos) -> Flown {
-        let mut flown = Flown {
-            said: self.said,
-            ..Flown::default()
-        };
+        let mut flown = Flown::listening(self.said);
         let plant = Rc::new(RefCell::new(self.plant));
         flown.report = host::fly_around(&plant, self.settings, &self.faults, duration, &mut flown);
         flown.nand = Some(plant.borrow().nand.cells.clone());
@@ -95,6 +92,14 @@ pub struct Flown {
 }
 
 impl Flown {
+    /// A bench that says this on the umbilical and has heard nothing yet.
+    pub fn listening(said: Vec<(Nanos, Vec<u8>)>) -> Self {
+        Flown {
+            said,
+            ..Flown::default()
+        }
+    }
+
     /// The console's reply lines.
     pub fn replies(&self) -> Vec<String> {
         let text = String::from_utf8_lossy(&self.umbilical).into_owned();

@@ -239,6 +239,26 @@ pub fn read_all(chip: &mut Cells, wrong: &mut u64) -> BTreeMap<Key, u32> {
     found
 }
 
+/// Blocks that a flight of a test fills at most.
+const LOGGED_BLOCKS: u16 = 150;
+
+/// Packets of a flight on its chip, by key, as far as [`LOGGED_BLOCKS`].
+pub fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
+    let mut found = BTreeMap::new();
+    for block in LOG_START..LOG_START + LOGGED_BLOCKS {
+        for page in 0..PAGES_PER_BLOCK {
+            let mut bytes = chip.read(PageAddress { block, page });
+            let whole = page::correct(&mut bytes);
+            for half in (0..2).filter(|half| whole[*half].is_ok()) {
+                if let Ok((key, Content::Packet(entry))) = record::decode(page::record(&bytes, half)) {
+                    found.insert(key, entry.packet);
+                }
+            }
+        }
+    }
+    found.into_iter().collect()
+}
+
 /// Runs `flights` on all cores, each with its number, and adds up.
 pub fn campaign(flights: u64, fly: impl Fn(u64) -> Tally + Sync) -> Tally {
     let workers = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);

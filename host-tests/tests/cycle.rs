@@ -101,7 +101,7 @@ fn a_stuck_bus_costs_no_packet_and_no_gyro_and_comes_back() {
 
 #[test]
 fn a_part_that_holds_sda_is_freed_by_clock_pulses() {
-    let flown = still().fault(3 * S, Fault::SdaHeld).say(1, b"G_DL").fly(6 * S);
+    let flown = still().fault(3 * S, Fault::SdaHeld(9)).say(1, b"G_DL").fly(6 * S);
     assert!(
         flown
             .derived

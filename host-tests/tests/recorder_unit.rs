@@ -9,14 +9,11 @@ use emems::{
         page,
         record::{self, Content, Key},
     },
-    nand::{K9F1208_BLOCKS, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress},
+    nand::{K9F1208_BLOCKS, PAGE_BYTES, PageAddress},
     packet::{self, PACKET_BYTES},
 };
-use host_tests::{Flight, Flown, MS, S, world};
-use twin::{
-    part::{Nanos, nand::Cells},
-    run::Fault,
-};
+use host_tests::{Flight, Flown, MS, S, recorder::logged, world};
+use twin::{part::Nanos, run::Fault};
 
 /// [ns] lift-off of the rocket motion.
 const LIFT_OFF: Nanos = 30 * S;
@@ -35,23 +32,6 @@ fn still() -> Flight {
 /// In FLIGHT and recording from 2 s on, without lift-off.
 fn recording() -> Flight {
     still().say(S, b"G_MVG_MV").say(2 * S, b"G_MG")
-}
-
-/// Packets on the chip, by key.
-fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
-    let mut found = std::collections::BTreeMap::new();
-    for block in LOG_START..LOG_START + 40 {
-        for page in 0..PAGES_PER_BLOCK {
-            let mut bytes = chip.read(PageAddress { block, page });
-            let whole = page::correct(&mut bytes);
-            for half in (0..2).filter(|half| whole[*half].is_ok()) {
-                if let Ok((key, Content::Packet(entry))) = record::decode(page::record(&bytes, half)) {
-                    found.insert(key, entry.packet);
-                }
-            }
-        }
-    }
-    found.into_iter().collect()
 }
 
 fn counters(logged: &[(Key, [u8; PACKET_BYTES])]) -> Vec<u16> {

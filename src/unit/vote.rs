@@ -57,6 +57,15 @@ impl Votes {
     fn answer(&self, voter: Voter) {
         self.answered.set(self.answered.get() | 1 << voter as u8);
     }
+
+    /// Whether all have answered; if so, they are asked again.
+    fn all_have_answered(&self) -> bool {
+        let all = self.answered.get() == ALL;
+        if all {
+            self.answered.set(0);
+        }
+        all
+    }
 }
 
 pin_project! {
@@ -89,8 +98,7 @@ pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchd
     loop {
         clock.until(ask).await;
         ask += interval;
-        if votes.answered.get() == ALL {
-            votes.answered.set(0);
+        if votes.all_have_answered() {
             watchdog.feed();
             fed_us.set(now().as_micros());
         }
@@ -125,5 +133,20 @@ mod tests {
         assert_ne!(votes.answered.get(), ALL);
         block_on(votes.waiting(VOTERS[0], ready(())));
         assert_eq!(votes.answered.get(), ALL);
+    }
+
+    /// U1: the part that hangs may be any of them.
+    #[test]
+    fn any_one_of_the_eight_alone_keeps_the_watchdog_from_being_fed() {
+        for hung in 0..VOTERS.len() {
+            let votes = Votes::default();
+            for (_, voter) in VOTERS.iter().enumerate().filter(|(voter, _)| *voter != hung) {
+                block_on(votes.waiting(*voter, ready(())));
+            }
+            assert!(!votes.all_have_answered(), "voter {hung}");
+            block_on(votes.waiting(VOTERS[hung], ready(())));
+            assert!(votes.all_have_answered());
+            assert!(!votes.all_have_answered(), "they are asked again");
+        }
     }
 }

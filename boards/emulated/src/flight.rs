@@ -24,6 +24,7 @@ use rigless::{
     time::VirtualNanos,
 };
 use twin::{
+    fault::Struck,
     part::Nanos,
     plant::Plant,
     run::{Bench, Flow, Scheduled},
@@ -72,6 +73,8 @@ pub struct Report {
     pub unmodelled: BTreeSet<String>,
     /// The statics asked for, in the order of [`Options::statics`].
     pub statics: Vec<Vec<u8>>,
+    /// How often each fault did something, by its name.
+    pub struck: Struck,
 }
 
 /// Why a run could not be made.
@@ -176,6 +179,7 @@ pub fn fly_keeping(
         said,
         next_meeting: 0,
         instructions: 0,
+        struck: Struck::new(),
         static_bytes: Vec::new(),
     };
     let images = [image.placed.clone()];
@@ -191,7 +195,10 @@ pub fn fly_keeping(
         drop(to_core);
         core.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
-    .map(|report| (report, kept))
+    .map(|mut report| {
+        report.struck.extend(kept.lock().struck());
+        (report, kept)
+    })
 }
 
 /// The next meeting, on the grid of whole steps from power-on, whatever other stops there are.
@@ -267,6 +274,7 @@ fn report(finished: Finished<Stand, Pilot>) -> Report {
             .map(|access| format!("{}.{}", access.instance, access.register))
             .collect(),
         statics: driver.static_bytes,
+        struck: driver.struck,
     }
 }
 

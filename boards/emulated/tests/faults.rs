@@ -52,7 +52,7 @@ fn a_part_that_holds_sda_is_clocked_free() {
             script: vec![(MS, b"G_DL".to_vec())],
             ..Tape::default()
         };
-        let held = at_us(cycle_us() + into_cycle_us, Fault::SdaHeld);
+        let held = at_us(cycle_us() + into_cycle_us, Fault::SdaHeld(9));
         flown(&Options::default(), &[held], 2_500, &mut tape);
         let errors = errors(&tape);
         let mut frames = tape.derived().into_iter();

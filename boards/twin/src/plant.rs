@@ -23,6 +23,7 @@ use nalgebra::Vector3;
 
 pub use self::{gyro::Gyro, sensor_bus::SensorBus};
 use crate::{
+    fault::Struck,
     geometry::{self, PLATES},
     part::{
         I2cPart, Input, Nanos, SpiPart,
@@ -34,7 +35,7 @@ use crate::{
         tca9548a::Tca9548a,
         tmp102::{self, Tmp102},
     },
-    run::Fault,
+    run::{Fault, Level},
     truth::{Truth, TruthSource},
 };
 
@@ -117,7 +118,12 @@ pub struct Plant {
     /// The recorder's memory.
     pub nand: K9f1208,
     /// The supply is above what the NAND needs.
-    pub supply_good: bool,
+    supply_good: bool,
+    /// What drives the vehicle's two lines.
+    lift_off: Level,
+    micro_g: Level,
+    /// How often a failing supply was noticed, and polls of each line that found another level than the world's.
+    struck: [u64; 3],
     source: Arc<dyn TruthSource>,
 }
 
@@ -146,19 +152,65 @@ impl Plant {
             gyro: core::array::from_fn(|plate| views.gyro(plate, seeds.stream((PLATES + plate) as u64), quality)),
             nand: K9f1208::new(Cells::formatted(K9F1208_BLOCKS, seed)),
             supply_good: true,
+            lift_off: Level::World,
+            micro_g: Level::World,
+            struck: [0; 3],
             source,
         }
     }
 
     /// The vehicle's lines at `now`, `true` = asserted: lift-off, micro-gravity.
-    pub fn discretes(&self, now: Nanos) -> (bool, bool) {
+    pub fn discretes(&mut self, now: Nanos) -> (bool, bool) {
         let truth = self.source.at(now as f64 * 1e-9);
-        (truth.lift_off, truth.micro_g)
+        let lines = (
+            self.lift_off.at(now, truth.lift_off),
+            self.micro_g.at(now, truth.micro_g),
+        );
+        self.struck[1] += u64::from(lines.0 != truth.lift_off);
+        self.struck[2] += u64::from(lines.1 != truth.micro_g);
+        lines
     }
 
-    /// Whether SDA is low with nobody sending: ask before a START.
+    /// Whether the supply is above what the NAND needs.
+    pub fn power_good(&mut self) -> bool {
+        self.struck[0] += u64::from(!self.supply_good);
+        self.supply_good
+    }
+
+    /// How often each fault did something since power-on, by its name.
+    pub fn struck(&self) -> Struck {
+        let mut struck = Struck::new();
+        let [held, stuck, gone] = self.i2c.struck;
+        let [supply, lift_off, micro_g] = self.struck;
+        let own = [
+            ("sda-held", held),
+            ("bus-stuck", stuck),
+            ("mux-silent", gone),
+            ("supply", supply),
+            ("lift-off", lift_off),
+            ("micro-g", micro_g),
+            ("nand-torn", self.nand.cells.torn),
+            ("nand-flips", self.nand.cells.flipped),
+            ("nand-dead", self.nand.dead),
+            ("nand-absent", self.nand.absent),
+        ];
+        let gyros = self.gyro.iter().flat_map(Gyro::struck);
+        for (name, times) in own.into_iter().chain(gyros).chain(self.i2c.switch.struck()) {
+            if times > 0 {
+                *struck.entry(name).or_default() += times;
+            }
+        }
+        struck
+    }
+
+    /// Whether SDA is low with nobody sending.
     pub fn sda_held(&self) -> bool {
         self.i2c.is_held()
+    }
+
+    /// The same, to be asked before a START.
+    pub fn sda_in_the_way(&mut self) -> bool {
+        self.i2c.is_in_the_way()
     }
 
     /// One pulse on SCL outside a transfer.
@@ -177,16 +229,29 @@ impl Plant {
         match fault {
             Fault::Silent(slot) => self.silence(slot, true, now),
             Fault::Restored(slot) => self.silence(slot, false, now),
-            Fault::MuxSilent(silent) => self.i2c.switch.silence(silent),
-            Fault::SdaHeld => self.i2c.hold_sda(),
+            Fault::MuxSilent(silent) => self.i2c.silence(silent),
+            Fault::SdaHeld(pulses) => self.i2c.hold_sda(pulses),
             Fault::BusStuck(stuck) => self.i2c.stick(stuck),
-            Fault::GyroGarbage(plate, babbling) => {
-                if let Some(gyro) = self.gyro.get_mut(plate) {
-                    gyro.babble(babbling);
-                }
-            }
+            Fault::Garbage(slot, babbling) => self.befall(
+                slot,
+                |gyro| gyro.babble(babbling),
+                |switch, channel, address| switch.babble_part(channel, address, babbling),
+            ),
+            Fault::Frozen(slot, frozen) => self.befall(
+                slot,
+                |gyro| gyro.freeze(frozen),
+                |switch, channel, address| switch.freeze_part(channel, address, frozen),
+            ),
+            Fault::Nack(slot, byte) => self.befall(
+                slot,
+                |_| {},
+                |switch, channel, address| switch.refuse_part(channel, address, byte),
+            ),
             Fault::NandDead(dead) => self.nand.cells.befalls.dead = dead,
             Fault::NandAbsent => self.nand.cells.befalls.absent = true,
+            Fault::NandFlips(per_thousand) => self.nand.cells.befalls.flips_per_thousand = per_thousand,
+            Fault::LiftOff(level) => self.lift_off = level,
+            Fault::MicroG(level) => self.micro_g = level,
             Fault::SupplyFailing(failing) => self.supply_good = !failing,
             Fault::PowerCut(tear) => {
                 self.nand.power_cut(now, tear);
@@ -194,8 +259,23 @@ impl Plant {
                 self.i2c.power_on(now);
                 self.gyro.iter_mut().for_each(|gyro| gyro.power_on(now));
             }
-            Fault::Stretching(slot, duration) => self.stretch(slot, duration),
-            Fault::DmaHung | Fault::Busy(_) | Fault::Panic | Fault::Reset => {}
+            Fault::Stretching(slot, duration) => self.befall(
+                slot,
+                |_| {},
+                |switch, channel, address| switch.stretch_part(channel, address, duration),
+            ),
+            Fault::DmaHung
+            | Fault::Busy(_)
+            | Fault::Hang(_)
+            | Fault::ClockSteps(_)
+            | Fault::TelemetryStuck(_)
+            | Fault::UmbilicalStuck(_)
+            | Fault::LinesSlow(_)
+            | Fault::KeptFlip(_)
+            | Fault::RamFlip(_)
+            | Fault::CrystalLost
+            | Fault::Panic
+            | Fault::Reset => {}
         }
     }
 
@@ -209,12 +289,19 @@ impl Plant {
         }
     }
 
-    fn stretch(&mut self, slot: usize, duration: Nanos) {
+    /// Lets something befall the sensor in this slot, whichever bus it is on.
+    fn befall(
+        &mut self,
+        slot: usize,
+        a_gyro: impl FnOnce(&mut Gyro),
+        an_i2c_part: impl FnOnce(&mut Tca9548a, usize, u8),
+    ) {
         let Some(sensor) = SENSORS.get(slot) else {
             return;
         };
-        if let Some(address) = i2c_address(sensor.kind) {
-            self.i2c.switch.stretch_part(sensor.plate, address, duration);
+        match i2c_address(sensor.kind) {
+            Some(address) => an_i2c_part(&mut self.i2c.switch, sensor.plate, address),
+            None => a_gyro(&mut self.gyro[sensor.plate]),
         }
     }
 }

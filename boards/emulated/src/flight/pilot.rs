@@ -10,6 +10,7 @@ use rigless::{
     time::VirtualNanos,
 };
 use twin::{
+    fault::Struck,
     part::Nanos,
     run::{Fault, Flow, Scheduled},
 };
@@ -24,6 +25,17 @@ use crate::{
 /// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
 const RETAINED: u64 = 0x2001_E000;
 const RETAINED_BYTES: u64 = 8192;
+/// What the unit's state and stack live in (memory.x).
+const RAM: u64 = 0x2000_0000;
+const RAM_BYTES: u64 = 0x1_E000;
+
+/// Flips a bit of some memory, counted round it.
+fn flip(host: &mut dyn Host, from: u64, bytes: u64, bit: u32) {
+    let at = from + u64::from(bit) / 8 % bytes;
+    if let Ok(byte) = host.read(at, Width::W8) {
+        let _ = host.write(at, Width::W8, byte ^ 1 << (bit % 8));
+    }
+}
 
 /// The interrupt of EXTI line 16, RM0090 table 62.
 const VOLTAGE_DETECTOR: InterruptLine = InterruptLine::new(1).expect("a line of the core");
@@ -41,6 +53,8 @@ pub(super) struct Pilot {
     /// When the next meeting is.
     pub(super) next_meeting: Nanos,
     pub(super) instructions: u64,
+    /// Strokes of the processor's own faults, by name.
+    pub(super) struck: Struck,
     pub(super) static_bytes: Vec<Vec<u8>>,
 }
 
@@ -48,8 +62,12 @@ impl Pilot {
     fn strike(&mut self, session: &mut Session<Stand>, stop: Stop, host: &mut dyn Host) {
         while let Some(scheduled) = self.faults.pop_if(|scheduled| scheduled.at <= stop.at.0) {
             match scheduled.fault {
-                Fault::Reset => session.reset_by_pin(stop.at, stop.instruction_count, host),
+                Fault::Reset => {
+                    *self.struck.entry("reset").or_default() += 1;
+                    session.reset_by_pin(stop.at, stop.instruction_count, host);
+                }
                 Fault::PowerCut(_) => {
+                    *self.struck.entry("power-cut").or_default() += 1;
                     self.plant.lock().apply(scheduled.fault, stop.at.0);
                     session.board_mut().mcu.cut_power();
                     // The emulator's memory survives; what a power cut loses is lost here (memory.x).
@@ -58,14 +76,31 @@ impl Pilot {
                     }
                     session.reset_by_pin(stop.at, stop.instruction_count, host);
                 }
-                Fault::DmaHung => session.board_mut().mcu.hang_dma(),
+                Fault::DmaHung => {
+                    *self.struck.entry("dma-hung").or_default() += 1;
+                    session.board_mut().mcu.hang_dma();
+                }
                 Fault::SupplyFailing(failing) => {
+                    *self.struck.entry("supply").or_default() += u64::from(failing);
                     if session.board_mut().mcu.sag(failing) {
                         // An edge: the line to the core falls again at once, and its interrupt stays pending.
                         for level in [Level::High, Level::Low] {
                             host.set_interrupt(VOLTAGE_DETECTOR, level);
                         }
                     }
+                }
+                Fault::CrystalLost => {
+                    *self.struck.entry("crystal-lost").or_default() += 1;
+                    session.board_mut().mcu.remove_crystal();
+                }
+                Fault::KeptFlip(bit) => {
+                    *self.struck.entry("kept-flip").or_default() += 1;
+                    flip(host, RETAINED, RETAINED_BYTES, bit);
+                    session.reset_by_pin(stop.at, stop.instruction_count, host);
+                }
+                Fault::RamFlip(bit) => {
+                    *self.struck.entry("ram-flip").or_default() += 1;
+                    flip(host, RAM, RAM_BYTES, bit);
                 }
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }

@@ -82,7 +82,7 @@ impl Pins {
 fn the_ninth_pulse_on_scl_frees_sda() {
     let mut pins = Pins::new("still");
     assert!(pins.sda());
-    pins.strike(Fault::SdaHeld);
+    pins.strike(Fault::SdaHeld(9));
     for _ in 0..8 {
         pins.pulse(6);
         assert!(!pins.sda());

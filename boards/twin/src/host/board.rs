@@ -1,9 +1,6 @@
 //! The host board's parts.
 
-use std::{
-    cell::{Cell, RefCell},
-    rc::Rc,
-};
+use std::{cell::RefCell, rc::Rc};
 
 use emems::board::{Board, BrownOut, Oscillator, Parts, ResetCause, StackUse};
 
@@ -11,8 +8,9 @@ use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
     nand::NandPins,
+    plight::Plight,
 };
-use crate::plant::Plant;
+use crate::{plant::Plant, run::End};
 
 /// The type that names the host board's parts.
 pub struct Host;
@@ -42,22 +40,22 @@ pub struct Ends {
     pub fed: Fed,
     /// Memory that survives a reset.
     pub kept: Kept,
-    /// The sensor bus' DMA stands still.
-    pub dma_hung: Rc<Cell<bool>>,
+    /// What befalls the processor and its ends.
+    pub plight: Rc<Plight>,
 }
 
 /// The parts of a unit that starts because of `reset`.
 pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Parts<Host> {
     Parts {
-        sensor_bus: SensorBus::new(plant.clone(), ends.dma_hung.clone()),
-        gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate)),
-        telemetry: Transmitter(ends.telemetry.clone()),
-        umbilical_tx: Transmitter(ends.umbilical.clone()),
-        umbilical_rx: Receiver(ends.spoken.clone()),
-        discretes: Inputs(plant.clone()),
+        sensor_bus: SensorBus::new(plant.clone(), ends.plight.clone()),
+        gyros: [0, 1, 2, 3].map(|plate| Gyro::new(plant.clone(), plate, ends.plight.clone())),
+        telemetry: Transmitter::new(ends.telemetry.clone(), End::Telemetry, ends.plight.clone()),
+        umbilical_tx: Transmitter::new(ends.umbilical.clone(), End::UmbilicalOut, ends.plight.clone()),
+        umbilical_rx: Receiver(ends.spoken.clone(), ends.plight.clone()),
+        discretes: Inputs(plant.clone(), ends.plight.clone()),
         watchdog: ends.fed.clone(),
         retained: ends.kept.clone(),
-        nand: NandPins(plant.clone()),
+        nand: NandPins(plant.clone(), ends.plight.clone()),
         reset,
         oscillator: Oscillator::Crystal,
         brown_out: BrownOut {

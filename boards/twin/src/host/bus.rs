@@ -3,11 +3,7 @@
 //! A transfer that is abandoned leaves the bus as the STM32F4 leaves it: every later one waits for ever, until
 //! [`RecoverBus::recover`].
 
-use std::{
-    cell::{Cell, RefCell},
-    future::pending,
-    rc::Rc,
-};
+use std::{cell::RefCell, future::pending, rc::Rc};
 
 use embassy_time::{Instant, Timer};
 use embedded_hal::{
@@ -18,11 +14,13 @@ use emems::board::RecoverBus;
 
 use super::{
     clock,
+    plight::Plight,
     timing::{I2C_BIT, I2C_OVERHEAD, I2C_READ, I2C_TURN, SPI_OVERHEAD, SPI_WORD},
 };
 use crate::{
     part::{Nanos, SpiPart},
     plant::Plant,
+    run::End,
 };
 
 /// [ns] nine clock pulses and a STOP by hand, the mux's reset, the peripheral set up again.
@@ -46,16 +44,16 @@ impl Drop for NeverStops {
 /// The sensor bus.
 pub struct SensorBus {
     plant: Rc<RefCell<Plant>>,
-    dma_hung: Rc<Cell<bool>>,
+    plight: Rc<Plight>,
     abandoned: bool,
 }
 
 impl SensorBus {
-    /// The bus of these parts, and whether the DMA that serves it stands still.
-    pub fn new(plant: Rc<RefCell<Plant>>, dma_hung: Rc<Cell<bool>>) -> Self {
+    /// The bus of these parts.
+    pub fn new(plant: Rc<RefCell<Plant>>, plight: Rc<Plight>) -> Self {
         SensorBus {
             plant,
-            dma_hung,
+            plight,
             abandoned: false,
         }
     }
@@ -130,11 +128,12 @@ impl i2c::ErrorType for SensorBus {
 impl embedded_hal_async::i2c::I2c for SensorBus {
     async fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Self::Error> {
         let now = clock::since_power_on();
-        if self.dma_hung.get() {
+        self.plight.serve(End::SensorBus);
+        if self.plight.dma_hangs() {
             let _waited_for_in_place = NeverStops;
             pending::<()>().await;
         }
-        if self.abandoned || self.plant.borrow().sda_held() {
+        if self.abandoned || self.plant.borrow_mut().sda_in_the_way() {
             self.abandoned = true;
             pending::<()>().await;
         }
@@ -166,12 +165,13 @@ impl RecoverBus for SensorBus {
 pub struct Gyro {
     plant: Rc<RefCell<Plant>>,
     plate: usize,
+    plight: Rc<Plight>,
 }
 
 impl Gyro {
     /// The gyro of a plate.
-    pub fn new(plant: Rc<RefCell<Plant>>, plate: usize) -> Self {
-        Gyro { plant, plate }
+    pub fn new(plant: Rc<RefCell<Plant>>, plate: usize, plight: Rc<Plight>) -> Self {
+        Gyro { plant, plate, plight }
     }
 }
 
@@ -181,6 +181,7 @@ impl spi::ErrorType for Gyro {
 
 impl embedded_hal_async::spi::SpiDevice<u16> for Gyro {
     async fn transaction(&mut self, operations: &mut [spi::Operation<'_, u16>]) -> Result<(), Self::Error> {
+        self.plight.serve(End::Gyros);
         let mut at = clock::since_power_on() + SPI_OVERHEAD;
         {
             let mut plant = self.plant.borrow_mut();

@@ -25,6 +25,8 @@ struct Clock {
     alarms_us: BTreeSet<u64>,
     /// [ns] when the unit's clock started, since power-on.
     started: Nanos,
+    /// [us] what the unit's clock says more than it should.
+    ahead_us: i64,
     /// The processor runs in a circle.
     hung: bool,
 }
@@ -37,13 +39,14 @@ struct ThreadClock;
 
 impl embassy_time_driver::Driver for ThreadClock {
     fn now(&self) -> u64 {
-        CLOCK.with_borrow(|clock| clock.now / 1000)
+        CLOCK.with_borrow(|clock| (clock.now / 1000).saturating_add_signed(clock.ahead_us))
     }
 
     fn schedule_wake(&self, at: u64, _waker: &Waker) {
         CLOCK.with_borrow_mut(|clock| {
             if at != u64::MAX {
-                clock.alarms_us.insert(at);
+                let at_us = at.saturating_add_signed(-clock.ahead_us);
+                clock.alarms_us.insert(at_us);
             }
         });
     }
@@ -67,6 +70,11 @@ pub fn since_power_on() -> Nanos {
 /// The processor is busy for `duration` and polls nothing meanwhile.
 pub fn spend(duration: Nanos) {
     CLOCK.with_borrow_mut(|clock| clock.now += duration);
+}
+
+/// The unit's clock steps by so much.
+pub fn step(by_us: i64) {
+    CLOCK.with_borrow_mut(|clock| clock.ahead_us += by_us);
 }
 
 /// The processor runs in a circle from here on: nothing is polled until the clock is started again.

@@ -4,7 +4,7 @@ use std::{
     cell::{Cell, RefCell},
     collections::VecDeque,
     convert::Infallible,
-    future::poll_fn,
+    future::{pending, poll_fn},
     rc::Rc,
     task::Poll,
 };
@@ -18,15 +18,27 @@ use emems::{
 
 use super::{
     clock,
+    plight::Plight,
     timing::{UART_BYTE, UART_START},
 };
-use crate::{part::Nanos, plant::Plant};
+use crate::{part::Nanos, plant::Plant, run::End};
 
 /// What a transmitter sent and nobody has heard yet.
 pub type Sent = Rc<RefCell<Vec<(Nanos, Vec<u8>)>>>;
 
 /// A transmitter: bytes are heard when the last of a write is complete.
-pub struct Transmitter(pub Sent);
+pub struct Transmitter {
+    sent: Sent,
+    end: End,
+    plight: Rc<Plight>,
+}
+
+impl Transmitter {
+    /// The transmitter at this end of the processor.
+    pub fn new(sent: Sent, end: End, plight: Rc<Plight>) -> Self {
+        Transmitter { sent, end, plight }
+    }
+}
 
 impl ErrorType for Transmitter {
     type Error = Infallible;
@@ -34,9 +46,13 @@ impl ErrorType for Transmitter {
 
 impl Write for Transmitter {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        let taken = UART_START + bytes.len() as Nanos * UART_BYTE;
+        self.plight.serve(self.end);
+        if self.plight.is_stuck(self.end) {
+            pending::<()>().await;
+        }
+        let taken = UART_START + bytes.len() as Nanos * UART_BYTE * self.plight.slowness();
         Timer::after(Duration::from_micros(taken / 1000)).await;
-        self.0.borrow_mut().push((clock::since_power_on(), bytes.to_vec()));
+        self.sent.borrow_mut().push((clock::since_power_on(), bytes.to_vec()));
         Ok(bytes.len())
     }
 
@@ -49,7 +65,7 @@ impl Write for Transmitter {
 pub type Spoken = Rc<RefCell<VecDeque<u8>>>;
 
 /// A receiver.
-pub struct Receiver(pub Spoken);
+pub struct Receiver(pub Spoken, pub Rc<Plight>);
 
 impl ErrorType for Receiver {
     type Error = Infallible;
@@ -63,6 +79,7 @@ impl Read for Receiver {
             if spoken.is_empty() {
                 return Poll::Pending;
             }
+            self.1.serve(End::UmbilicalIn);
             let count = bytes.len().min(spoken.len());
             bytes
                 .iter_mut()
@@ -75,15 +92,16 @@ impl Read for Receiver {
 }
 
 /// The discrete inputs.
-pub struct Inputs(pub Rc<RefCell<Plant>>);
+pub struct Inputs(pub Rc<RefCell<Plant>>, pub Rc<Plight>);
 
 impl Discretes for Inputs {
     fn lift_off(&mut self) -> bool {
-        self.0.borrow().discretes(clock::since_power_on()).0
+        self.1.serve(End::Discretes);
+        self.0.borrow_mut().discretes(clock::since_power_on()).0
     }
 
     fn micro_g(&mut self) -> bool {
-        self.0.borrow().discretes(clock::since_power_on()).1
+        self.0.borrow_mut().discretes(clock::since_power_on()).1
     }
 }
 
@@ -108,6 +126,12 @@ impl Default for Kept {
 }
 
 impl Kept {
+    /// A bit flips, counted round the bytes that are kept.
+    pub fn flip(&self, bit: u32) {
+        let bit = bit as usize % (8 * RETAINED_BYTES);
+        self.0.borrow_mut()[bit / 8] ^= 1 << (bit % 8);
+    }
+
     /// What a power cut leaves.
     pub fn lose(&self) {
         self.0.borrow_mut().fill(0);

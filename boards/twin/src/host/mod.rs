@@ -9,6 +9,7 @@ mod bus;
 mod clock;
 mod lines;
 mod nand;
+mod plight;
 mod run;
 pub mod timing;
 

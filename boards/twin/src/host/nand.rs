@@ -4,18 +4,20 @@ use std::{cell::RefCell, rc::Rc};
 
 use emems::nand::k9f1208::NandBus;
 
-use super::clock;
+use super::{clock, plight::Plight};
 use crate::{
     part::nand::{CYCLE, latch::K9f1208},
     plant::Plant,
+    run::End,
 };
 
 /// The chip's pins.
-pub struct NandPins(pub Rc<RefCell<Plant>>);
+pub struct NandPins(pub Rc<RefCell<Plant>>, pub Rc<Plight>);
 
 impl NandPins {
     /// One latch cycle; the processor does nothing else meanwhile.
     fn cycle<T>(&self, act: impl FnOnce(&mut K9f1208, u64) -> T) -> T {
+        self.1.serve(End::Nand);
         clock::spend(CYCLE);
         act(&mut self.0.borrow_mut().nand, clock::since_power_on())
     }
@@ -47,6 +49,6 @@ impl NandBus for NandPins {
     }
 
     fn power_good(&mut self) -> bool {
-        self.0.borrow().supply_good
+        self.0.borrow_mut().power_good()
     }
 }

@@ -15,6 +15,7 @@ use super::{
     timing::BOOT,
 };
 use crate::{
+    fault::Struck,
     part::Nanos,
     plant::Plant,
     run::{Bench, Fault, Flow, Scheduled},
@@ -33,6 +34,8 @@ pub struct HostReport {
     pub flown: Nanos,
     /// Resets and when they struck.
     pub resets: Vec<(Nanos, ResetCause)>,
+    /// How often each fault did something, by its name.
+    pub struck: Struck,
 }
 
 /// Flies the unit from power-on for `duration`, or until the bench says stop.
@@ -63,7 +66,7 @@ pub fn fly_around(
     while now < duration {
         clock::start(now + BOOT);
         ends.fed.0.set(now + BOOT);
-        ends.dma_hung.set(false);
+        ends.plight.reset();
         let mut unit = pin!(unit::run(parts(plant, &ends, cause), settings));
         let reset = loop {
             let fault = faults.last().map_or(duration, |scheduled| scheduled.at).max(now);
@@ -73,28 +76,35 @@ pub fn fly_around(
             hear(&ends, bench);
             ends.spoken.borrow_mut().extend(bench.commands(now));
             if bench.advanced(now) == Flow::Stop {
-                report.flown = now;
-                return report;
+                return told(report, now, &ends, plant);
             }
             let mut struck = None;
             while faults.last().is_some_and(|scheduled| scheduled.at <= now) {
                 match faults.pop().map(|scheduled| scheduled.fault) {
-                    Some(Fault::Reset) => struck = Some(ResetCause::Pin),
+                    Some(Fault::Reset) => {
+                        ends.plight.strike("reset");
+                        struck = Some(ResetCause::Pin);
+                    }
                     Some(Fault::Panic) => {
+                        ends.plight.strike("panic");
                         let uptime_us = Instant::now().as_micros();
                         let crash = CrashRecord::new(CrashCause::Panic, 123, 0, 0, uptime_us, "src/unit/twin.rs");
                         crash.keep(&mut ends.kept.clone());
                         struck = Some(ResetCause::Software);
                     }
-                    Some(Fault::DmaHung) => ends.dma_hung.set(true),
-                    Some(Fault::Busy(duration)) => clock::spend(duration),
+                    Some(Fault::KeptFlip(bit)) => {
+                        ends.plight.strike("kept-flip");
+                        ends.kept.flip(bit);
+                        struck = Some(ResetCause::Pin);
+                    }
                     Some(cut @ Fault::PowerCut(_)) => {
+                        ends.plight.strike("power-cut");
                         plant.borrow_mut().apply(cut, now);
                         ends.kept.lose();
                         struck = Some(ResetCause::PowerOn);
                     }
-                    Some(fault) => plant.borrow_mut().apply(fault, now),
-                    None => {}
+                    Some(fault) if !ends.plight.apply(fault) => plant.borrow_mut().apply(fault, now),
+                    _ => {}
                 }
             }
             if now.saturating_sub(ends.fed.0.get()) > WATCHDOG {
@@ -110,7 +120,13 @@ pub fn fly_around(
             cause = reset;
         }
     }
+    told(report, now, &ends, plant)
+}
+
+fn told(mut report: HostReport, now: Nanos, ends: &Ends, plant: &RefCell<Plant>) -> HostReport {
     report.flown = now;
+    report.struck = plant.borrow().struck();
+    report.struck.extend(ends.plight.struck());
     report
 }
 

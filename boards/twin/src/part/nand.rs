@@ -87,6 +87,8 @@ pub struct Cells {
     pub breaks: Vec<Break>,
     /// Operations that a cut left neither undone nor done: what a campaign of cuts must have seen.
     pub torn: u64,
+    /// Reads that found wrong bits.
+    pub flipped: u64,
     /// Programs that went astray.
     pub strayed: u64,
     /// Blocks whose wear has struck, in the order of its first strikes.
@@ -125,6 +127,7 @@ impl Cells {
             time: 0,
             breaks: Vec::new(),
             torn: 0,
+            flipped: 0,
             strayed: 0,
             worn: Vec::new(),
             off: false,
@@ -239,7 +242,7 @@ impl Cells {
             }
         }
         let reads = block.reads;
-        self.befalls.flip(&mut page, at, reads, &mut self.random);
+        self.flipped += u64::from(self.befalls.flip(&mut page, at, reads, &mut self.random));
         page
     }
 

@@ -5,7 +5,9 @@
 //! is switched at the STOP after the control register was written (datasheet, control register), and the reset line
 //! deselects all.
 
-use super::{I2cPart, Nanos};
+use std::collections::BTreeMap;
+
+use super::{I2cPart, Nanos, signal::Noise};
 
 /// 7-bit address with A2, A1, A0 low.
 pub const ADDRESS: u8 = 0x70;
@@ -17,10 +19,90 @@ const RELEASED: u8 = 0xFF;
 struct Socket {
     part: Box<dyn I2cPart>,
     silent: bool,
+    garbage: bool,
+    /// What was read first since it froze, by register and byte after it.
+    frozen: Option<BTreeMap<(u8, u32), u8>>,
+    /// The byte written to it that it does not acknowledge, 0 its address.
+    nack: Option<u8>,
     addressed: bool,
+    /// Bytes written since START, the first of them, and bytes read.
+    written: u8,
+    register: u8,
+    read: u32,
     /// [ns] how long it holds SCL low when it is called.
     stretch: Nanos,
     scl_held_until: Nanos,
+    random: Noise,
+    struck: [u64; ILLS.len()],
+}
+
+/// What may befall a part here, and how often it did.
+const ILLS: [&str; 5] = ["silent", "garbage", "frozen", "nack", "stretch"];
+
+impl Socket {
+    fn new(part: Box<dyn I2cPart>, random: Noise) -> Self {
+        Socket {
+            part,
+            silent: false,
+            garbage: false,
+            frozen: None,
+            nack: None,
+            addressed: false,
+            written: 0,
+            register: 0,
+            read: 0,
+            stretch: 0,
+            scl_held_until: 0,
+            random,
+            struck: [0; ILLS.len()],
+        }
+    }
+
+    /// START with its address; whether it acknowledges.
+    fn start(&mut self, read: bool, now: Nanos) -> bool {
+        let refuses = self.nack == Some(0);
+        self.struck[0] += u64::from(self.silent);
+        self.struck[3] += u64::from(refuses && !self.silent);
+        if self.silent || refuses || !self.part.start(read, now) {
+            return false;
+        }
+        self.read = 0;
+        if !read {
+            self.written = 0;
+        }
+        if self.stretch > 0 {
+            self.scl_held_until = now + self.stretch;
+            self.struck[4] += 1;
+        }
+        true
+    }
+
+    fn write(&mut self, byte: u8, now: Nanos) -> bool {
+        self.written = self.written.saturating_add(1);
+        if self.written == 1 {
+            self.register = byte;
+        }
+        if self.nack == Some(self.written) {
+            self.struck[3] += 1;
+            return false;
+        }
+        self.part.write(byte, now)
+    }
+
+    fn read(&mut self, now: Nanos) -> u8 {
+        let byte = self.part.read(now);
+        let place = (self.register, self.read);
+        self.read += 1;
+        if self.garbage {
+            self.struck[1] += 1;
+            return self.random.word(self.struck[1]) as u8;
+        }
+        let Some(frozen) = &mut self.frozen else {
+            return byte;
+        };
+        self.struck[2] += 1;
+        *frozen.entry(place).or_insert(byte)
+    }
 }
 
 /// The switch and its eight channels.
@@ -37,13 +119,11 @@ pub struct Tca9548a {
 impl Tca9548a {
     /// A switch with `channels[n]` on channel n, powered at time 0: nothing is selected. Channels beyond 7 are left out.
     pub fn new(channels: impl IntoIterator<Item = Vec<Box<dyn I2cPart>>>) -> Self {
+        let mut number = 0;
         let mut sockets = channels.into_iter().map(|parts| {
-            let socket = |part| Socket {
-                part,
-                silent: false,
-                addressed: false,
-                stretch: 0,
-                scl_held_until: 0,
+            let socket = |part| {
+                number += 1;
+                Socket::new(part, Noise::new(number))
             };
             parts.into_iter().map(socket).collect()
         });
@@ -74,11 +154,7 @@ impl Tca9548a {
         self.addressed = address == ADDRESS && !self.silent;
         let mut acknowledged = self.addressed;
         for socket in self.selected() {
-            let called = !socket.silent && socket.part.address() == address;
-            socket.addressed = called && socket.part.start(read, now);
-            if socket.addressed && socket.stretch > 0 {
-                socket.scl_held_until = now + socket.stretch;
-            }
+            socket.addressed = socket.part.address() == address && socket.start(read, now);
             acknowledged |= socket.addressed;
         }
         acknowledged
@@ -89,15 +165,15 @@ impl Tca9548a {
         if self.addressed {
             self.control = byte;
         }
-        self.addressed().fold(false, |acknowledged, socket| {
-            socket.part.write(byte, now) | acknowledged
-        }) | self.addressed
+        self.addressed()
+            .fold(false, |acknowledged, socket| socket.write(byte, now) | acknowledged)
+            | self.addressed
     }
 
     /// A byte for the controller.
     pub fn read(&mut self, now: Nanos) -> u8 {
         let own = if self.addressed { self.control } else { RELEASED };
-        self.addressed().fold(own, |line, socket| line & socket.part.read(now))
+        self.addressed().fold(own, |line, socket| line & socket.read(now))
     }
 
     /// STOP.
@@ -133,10 +209,36 @@ impl Tca9548a {
 
     /// The part at `address` on `channel` holds SCL low for `duration` after each time it acknowledges its address.
     pub fn stretch_part(&mut self, channel: usize, address: u8, duration: Nanos) {
+        self.sockets(channel, address)
+            .for_each(|socket| socket.stretch = duration);
+    }
+
+    /// The part at `address` on `channel` answers random bytes, or is itself again.
+    pub fn babble_part(&mut self, channel: usize, address: u8, babbling: bool) {
+        self.sockets(channel, address)
+            .for_each(|socket| socket.garbage = babbling);
+    }
+
+    /// The part at `address` on `channel` answers each register as it did first from now on, or is itself again.
+    pub fn freeze_part(&mut self, channel: usize, address: u8, frozen: bool) {
+        self.sockets(channel, address)
+            .for_each(|socket| socket.frozen = frozen.then(BTreeMap::new));
+    }
+
+    /// The part at `address` on `channel` does not acknowledge this byte written to it, 0 its address.
+    pub fn refuse_part(&mut self, channel: usize, address: u8, byte: Option<u8>) {
+        self.sockets(channel, address).for_each(|socket| socket.nack = byte);
+    }
+
+    /// How often faults of its parts did something, by name.
+    pub fn struck(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        let sockets = self.channels.iter().flatten();
+        sockets.flat_map(|socket| ILLS.into_iter().zip(socket.struck))
+    }
+
+    fn sockets(&mut self, channel: usize, address: u8) -> impl Iterator<Item = &mut Socket> {
         let sockets = self.channels.get_mut(channel).into_iter().flatten();
-        for socket in sockets.filter(|socket| socket.part.address() == address) {
-            socket.stretch = duration;
-        }
+        sockets.filter(move |socket| socket.part.address() == address)
     }
 
     /// The switch is gone (`true`), and all behind it out of reach, or is back, deselected.
@@ -148,8 +250,7 @@ impl Tca9548a {
     /// The part at `address` on `channel` is dead (`true`), or is back with its power-on registers. A place without a
     /// part is left alone.
     pub fn silence_part(&mut self, channel: usize, address: u8, silent: bool, now: Nanos) {
-        let sockets = self.channels.get_mut(channel).into_iter().flatten();
-        for socket in sockets.filter(|socket| socket.part.address() == address) {
+        for socket in self.sockets(channel, address) {
             socket.silent = silent;
             socket.addressed = false;
             if !silent {

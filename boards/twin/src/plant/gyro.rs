@@ -1,7 +1,9 @@
-//! A gyro in its place: itself, dead, or babbling.
+//! A gyro in its place: itself, dead, babbling or frozen.
 //!
 //! Frames in, frames out, as of the [`Adis16265`] behind it unless a fault speaks for it: the lines of a dead one
-//! float and read 0x0000, a babbling one answers noise.
+//! float and read 0x0000, a babbling one answers noise, a frozen one what it answered first to the same frame.
+
+use std::collections::BTreeMap;
 
 use crate::part::{Nanos, SpiPart, adis16265::Adis16265, signal::Noise};
 
@@ -10,18 +12,24 @@ pub struct Gyro {
     part: Adis16265,
     silent: bool,
     babbling: bool,
-    babble: Noise,
-    babbled: u64,
+    /// Answers since it froze, by the frame they answer.
+    frozen: Option<BTreeMap<u16, u16>>,
+    asked: u16,
+    noise: Noise,
+    /// Words it did not give, gave at random, and gave again.
+    struck: [u64; 3],
 }
 
 impl Gyro {
-    pub(super) fn new(part: Adis16265, babble: Noise) -> Self {
+    pub(super) fn new(part: Adis16265, noise: Noise) -> Self {
         Gyro {
             part,
             silent: false,
             babbling: false,
-            babble,
-            babbled: 0,
+            frozen: None,
+            asked: 0,
+            noise,
+            struck: [0; 3],
         }
     }
 
@@ -42,6 +50,17 @@ impl Gyro {
     pub(super) fn babble(&mut self, babbling: bool) {
         self.babbling = babbling;
     }
+
+    /// Answers each frame as it did first from now on (`true`), or is itself again.
+    pub(super) fn freeze(&mut self, frozen: bool) {
+        self.frozen = frozen.then(BTreeMap::new);
+    }
+
+    /// How often each fault did something, by name.
+    pub(super) fn struck(&self) -> [(&'static str, u64); 3] {
+        let [silent, garbage, frozen] = self.struck;
+        [("silent", silent), ("garbage", garbage), ("frozen", frozen)]
+    }
 }
 
 impl SpiPart for Gyro {
@@ -53,14 +72,20 @@ impl SpiPart for Gyro {
 
     fn transfer(&mut self, mosi: u16, now: Nanos) -> u16 {
         if self.silent {
+            self.struck[0] += 1;
             return 0x0000;
         }
         let answer = self.part.transfer(mosi, now);
-        if !self.babbling {
-            return answer;
+        let asked = std::mem::replace(&mut self.asked, mosi);
+        if self.babbling {
+            self.struck[1] += 1;
+            return self.noise.word(self.struck[1]);
         }
-        self.babbled += 1;
-        self.babble.word(self.babbled)
+        let Some(frozen) = &mut self.frozen else {
+            return answer;
+        };
+        self.struck[2] += 1;
+        *frozen.entry(asked).or_insert(answer)
     }
 
     fn deselect(&mut self, now: Nanos) {

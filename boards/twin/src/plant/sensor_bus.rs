@@ -22,6 +22,9 @@ enum Hold {
 pub struct SensorBus {
     pub(super) switch: Tca9548a,
     hold: Hold,
+    silenced: bool,
+    /// STARTs on a held bus (by a part, for good), and calls of a multiplexer that is gone.
+    pub(super) struck: [u64; 3],
 }
 
 impl SensorBus {
@@ -29,12 +32,15 @@ impl SensorBus {
         SensorBus {
             switch,
             hold: Hold::Nobody,
+            silenced: false,
+            struck: [0; 3],
         }
     }
 
     /// START (or repeated START) and an address; `read` is the direction bit. Returns whether anyone acknowledges.
     pub fn start(&mut self, address: u8, read: bool, now: Nanos) -> bool {
-        !self.is_held() && self.switch.start(address, read, now)
+        self.struck[2] += u64::from(self.silenced);
+        !self.is_in_the_way() && self.switch.start(address, read, now)
     }
 
     /// A byte from the controller; returns whether anyone acknowledges.
@@ -67,9 +73,26 @@ impl SensorBus {
         self.hold != Hold::Nobody
     }
 
+    /// As [`SensorBus::is_held`], asked by a controller that is about to send a START.
+    pub(super) fn is_in_the_way(&mut self) -> bool {
+        match self.hold {
+            Hold::Nobody => {}
+            Hold::Part(_) => self.struck[0] += 1,
+            Hold::Stuck => self.struck[1] += 1,
+        }
+        self.is_held()
+    }
+
+    /// The multiplexer is gone, or back.
+    pub(super) fn silence(&mut self, silent: bool) {
+        self.silenced = silent;
+        self.switch.silence(silent);
+    }
+
     /// One pulse on SCL outside a transfer.
     pub(super) fn clock_pulse(&mut self) {
         if let Hold::Part(pulses) = self.hold {
+            self.struck[0] += 1;
             self.hold = if pulses > 1 {
                 Hold::Part(pulses - 1)
             } else {
@@ -78,10 +101,10 @@ impl SensorBus {
         }
     }
 
-    /// A part was cut off in mid-byte and holds SDA.
-    pub(super) fn hold_sda(&mut self) {
-        if self.hold == Hold::Nobody {
-            self.hold = Hold::Part(PULSES_TO_FREE);
+    /// A part was cut off in mid-byte and holds SDA for so many clock pulses.
+    pub(super) fn hold_sda(&mut self, pulses: u8) {
+        if self.hold == Hold::Nobody && pulses > 0 {
+            self.hold = Hold::Part(pulses.min(PULSES_TO_FREE));
         }
     }
 

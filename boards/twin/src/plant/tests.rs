@@ -223,7 +223,7 @@ fn the_reading_pattern_changes_no_value_and_the_seed_changes_all() {
 
 #[test]
 fn the_lines_follow_the_truth() {
-    let plant = Plant::ideal(Arc::new(Swing));
+    let mut plant = Plant::ideal(Arc::new(Swing));
     let lines = [1_999, 2_000, 3_000].map(|ms| plant.discretes(ms * MS));
     assert_eq!(lines, [(false, false), (true, false), (true, true)]);
 }
@@ -279,7 +279,7 @@ fn without_the_switch_no_plate_answers_but_the_gyros_do() {
 #[test]
 fn a_held_sda_is_freed_by_nine_pulses_and_a_stuck_one_by_nothing() {
     let mut plant = ideal(LEVEL);
-    plant.apply(Fault::SdaHeld, SETTLED);
+    plant.apply(Fault::SdaHeld(9), SETTLED);
     for _ in 0..9 {
         assert!(plant.sda_held() && !plant.i2c.start(0x70, false, SETTLED));
         plant.clock_pulse();
@@ -298,11 +298,11 @@ fn a_held_sda_is_freed_by_nine_pulses_and_a_stuck_one_by_nothing() {
 fn a_babbling_gyro_answers_the_same_noise_in_every_run_and_keeps_its_settings() {
     let babble = || {
         let mut plant = ideal(LEVEL);
-        plant.apply(Fault::GyroGarbage(1, true), SETTLED);
+        plant.apply(Fault::Garbage(9, true), SETTLED);
         let words: Vec<u16> = (0..8)
             .map(|i| ask_gyro(&mut plant, 1, 0x5600, SETTLED + i * MS))
             .collect();
-        plant.apply(Fault::GyroGarbage(1, false), SETTLED);
+        plant.apply(Fault::Garbage(9, false), SETTLED);
         assert_eq!(ask_gyro(&mut plant, 1, 0x5600, SETTLED + 20 * MS), 0x3F89);
         words
     };
@@ -317,7 +317,7 @@ fn a_fault_of_a_part_that_is_not_there_does_nothing() {
     for fault in [
         Fault::Silent(16),
         Fault::Restored(99),
-        Fault::GyroGarbage(4, true),
+        Fault::Garbage(16, true),
         Fault::Reset,
     ] {
         plant.apply(fault, SETTLED);

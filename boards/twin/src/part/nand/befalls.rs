@@ -76,8 +76,16 @@ impl Befalls {
     }
 
     /// Wrong bits of one read: fresh ones, and those that reading itself has caused.
-    pub(super) fn flip(&self, page: &mut PageBytes, at: PageAddress, reads: u32, random: &mut Xoshiro256PlusPlus) {
-        if self.flips_per_thousand > 0 && random.next_u32() % 1000 < self.flips_per_thousand {
+    /// Whether there are any.
+    pub(super) fn flip(
+        &self,
+        page: &mut PageBytes,
+        at: PageAddress,
+        reads: u32,
+        random: &mut Xoshiro256PlusPlus,
+    ) -> bool {
+        let fresh = self.flips_per_thousand > 0 && random.next_u32() % 1000 < self.flips_per_thousand;
+        if fresh {
             for (half, code) in CODES.into_iter().enumerate() {
                 // Anywhere in the half or its code.
                 let place = random.next_u32() as usize % (256 + code.len());
@@ -89,12 +97,14 @@ impl Befalls {
             }
             page[MAIN_BYTES + REST[random.next_u32() as usize % REST.len()]] ^= 1 << (random.next_u32() % 8);
         }
-        if self.disturbed_after.is_some_and(|limit| reads > limit) && at.row().is_multiple_of(2) {
+        let disturbed = self.disturbed_after.is_some_and(|limit| reads > limit) && at.row().is_multiple_of(2);
+        if disturbed {
             // The same cell at each read: which one follows from the row.
             let cell = at.row().wrapping_mul(2_654_435_761);
             for half in 0..2 {
                 page[256 * half + (cell >> 24) as usize] ^= 1 << (cell >> 8 & 7);
             }
         }
+        fresh || disturbed
     }
 }

@@ -64,6 +64,10 @@ pub struct K9f1208 {
     protected: bool,
     /// When WP# went high.
     writable_since: Nanos,
+    /// Bytes asked of it while it was dead.
+    pub dead: u64,
+    /// Bytes asked of it while it was not there.
+    pub absent: u64,
 }
 
 impl K9f1208 {
@@ -82,6 +86,8 @@ impl K9f1208 {
             failed: false,
             protected: true,
             writable_since: 0,
+            dead: 0,
+            absent: 0,
         }
     }
 
@@ -184,7 +190,9 @@ impl K9f1208 {
     /// A data byte from the part.
     pub fn read(&mut self, now: Nanos) -> u8 {
         self.settle(now);
+        self.dead += u64::from(self.cells.befalls.dead);
         if self.cells.befalls.absent {
+            self.absent += 1;
             return 0xFF;
         }
         match self.output {
@@ -209,7 +217,9 @@ impl K9f1208 {
     pub fn power_cut(&mut self, now: Nanos, draw: usize) {
         self.settle(now);
         self.tear(now, TEARS[draw % TEARS.len()]);
+        let counted = (self.dead, self.absent);
         *self = K9f1208::new(self.cells.clone());
+        (self.dead, self.absent) = counted;
     }
 
     fn busy(&self, now: Nanos) -> bool {

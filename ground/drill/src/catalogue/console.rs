@@ -1,0 +1,159 @@
+//! Links, console, security.
+
+use super::{Drill::*, Fly, Row, row};
+use crate::{campaign, judge};
+
+pub(super) const ROWS: [Row; 15] = [
+    row(
+        "C1",
+        "one wrong bit in any word",
+        None,
+        &["src/mode/tests.rs: no_one_bit_error_erases_or_changes_to_a_mode_that_was_not_sent"],
+        "G_DL and G_DD, and G_MT and G_Mt, differ by one bit: what they switch is seen at once and harms no record",
+    ),
+    row(
+        "C2",
+        "two wrong bits; a byte lost, doubled, swapped",
+        None,
+        &[
+            "src/mode/tests.rs: no_lost_doubled_or_swapped_byte_erases_or_changes_to_a_mode_that_was_not_sent",
+            "src/mode/tests.rs: no_two_bit_error_in_one_deed_erases",
+        ],
+        "",
+    ),
+    row(
+        "C3",
+        "random bytes into the parser",
+        Campaign(
+            "random bytes, one in four a letter of the words",
+            campaign::random_bytes,
+        ),
+        &[],
+        "",
+    ),
+    row(
+        "C4",
+        "framing and other errors of the line",
+        None,
+        &["boards/emulated/tests/image.rs: a_framing_error_on_every_byte_loses_the_command_and_nothing_else"],
+        "break, overrun and noise are not made on a board",
+    ),
+    row(
+        "C5",
+        "flood of words at the line's rate",
+        Campaign("57 words every 20 ms", campaign::flood),
+        &[],
+        "",
+    ),
+    row(
+        "C6",
+        "erase in FLIGHT, with lift-off, while erasing, twice",
+        None,
+        &[
+            "src/mode/tests.rs: an_erase_takes_a_second_different_word_and_no_lift_off",
+            "src/mode/tests.rs: a_task_of_the_other_mode_is_refused",
+            "host-tests/tests/recorder_unit.rs: lift_off_during_an_erase_is_recorded_all_the_same",
+        ],
+        "",
+    ),
+    row(
+        "C7",
+        "erase of data that were not read out",
+        None,
+        &[
+            "src/mode/tests.rs: an_erase_takes_a_second_different_word_and_no_lift_off",
+            "host-tests/tests/console.rs: a_flight_is_recorded_dumped_and_erased",
+        ],
+        "arming and confirming are not logged",
+    ),
+    row(
+        "C8",
+        "half a word, then a pause",
+        None,
+        &["src/command.rs: a_half_word_is_forgotten_after_two_seconds"],
+        "",
+    ),
+    row(
+        "C9",
+        "umbilical or telemetry that takes no byte",
+        Flights(&[
+            Fly {
+                plans: &["umbilical-stuck@3s..6s"],
+                motion: "still",
+                said: &[(2_500, "G_MT"), (4_000, "G_HE"), (8_000, "G_Mt"), (9_000, "G_VE")],
+                ms: 12_000,
+                judge: judge::console_answers_again,
+            },
+            Fly {
+                plans: &["telemetry-stuck@4s..7s"],
+                motion: "still",
+                said: &[(1_000, "G_MVG_MV"), (2_000, "G_MG")],
+                ms: 10_000,
+                judge: judge::recorder_has_what_the_line_lost,
+            },
+        ]),
+        &["ground/src/console/session.rs: the_console_goes_on_in_the_same_recording_after_a_replug"],
+        "",
+    ),
+    row(
+        "C10",
+        "lines slower than the packets",
+        Flights(&[Fly {
+            plans: &["lines-slow=12@3s"],
+            motion: "still",
+            said: &[],
+            ms: 12_000,
+            judge: judge::frames_are_whole,
+        }]),
+        &[],
+        "",
+    ),
+    row(
+        "C11",
+        "packet stream cut or garbled",
+        None,
+        &[
+            "ground/packets/src/stream/tests.rs: a_truncated_packet_costs_itself_only",
+            "ground/packets/src/stream/tests.rs: two_packets_spliced_into_one_are_one_stretch",
+        ],
+        "",
+    ),
+    row(
+        "C12",
+        "start letters inside a packet, lower case, wrong length",
+        None,
+        &[
+            "ground/packets/src/stream/tests.rs: lower_case_is_rejected_with_its_position",
+            "ground/packets/src/stream/tests.rs: an_over_long_packet_is_rejected_and_the_next_one_found",
+            "ground/packets/src/stream/tests.rs: starts_and_ends_within_a_packet_do_not_hide_the_next",
+        ],
+        "",
+    ),
+    row(
+        "C13",
+        "read-out beyond the log, overflow in its numbers",
+        None,
+        &[
+            "src/command.rs: a_range_takes_twelve_digits_and_names_a_wrong_one",
+            "host-tests/tests/recorder_unit.rs: f19_a_dump_goes_on_where_it_was_interrupted",
+        ],
+        "",
+    ),
+    row(
+        "C14",
+        "hostile images into the host's programs",
+        None,
+        &[
+            "ground/recorder/src/recover.rs: a_file_larger_than_a_chip_is_refused_unread",
+            "ground/recorder/src/recover.rs: a_chip_full_of_random_bytes_is_read_in_bounded_time",
+        ],
+        "a gzip bomb of 2 GiB takes more than 10 s",
+    ),
+    row(
+        "C15",
+        "memory outside the log read by the console",
+        None,
+        &[],
+        "by review: no word reads memory; read-out protection is not documented",
+    ),
+];

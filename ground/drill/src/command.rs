@@ -1,0 +1,218 @@
+//! The command: which rows, with which seeds, on which board; the table; whether all is accepted.
+
+use std::path::PathBuf;
+
+use twin::fault::{Struck, WORDS};
+
+use crate::{
+    catalogue::{CATALOGUE, Drill, Fly, Row},
+    flight::{Board, OnImage, fly, planned},
+    table::{Line, write},
+};
+
+/// Flies the catalogue of faults: what struck, what the unit did, and whether that is accepted
+///
+/// Without rows, all 86. Flights are of the unit's code in virtual time; --image flies the release image on the emulated board
+/// where it can make the fault. Rows without a drill name the tests that cover them (cargo host-test runs those).
+#[derive(Clone, Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ground drill                       the catalogue, in minutes
+  ground drill F8 --seed 123         one row again, as it failed
+  ground drill U1 S3 --image         on the release image
+  ground drill --long                more runs of each, with seeds
+  ground drill --faults              the names of faults
+  ground drill --write ground/drill/catalogue.csv")]
+pub struct Arguments {
+    /// Rows of the catalogue, such as F8 [default: all]
+    pub rows: Vec<String>,
+    /// What is drawn follows from this number
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Ten seeds of each flight and the campaigns at full length: hours
+    #[arg(long)]
+    pub long: bool,
+    /// Fly the release image on the emulated board, where it can make the fault
+    #[arg(long)]
+    pub image: bool,
+    /// Keep the table as CSV
+    #[arg(long, value_name = "FILE")]
+    pub write: Option<PathBuf>,
+    /// List the names of faults and end
+    #[arg(long)]
+    pub faults: bool,
+}
+
+/// Why a drill was not made, or found something.
+#[derive(Debug, thiserror::Error)]
+pub enum DrillError {
+    /// No such row.
+    #[error("the catalogue has no row {0}; its rows are F1 to F21, S1 to S23, N1 to N12, C1 to C15, U1 to U15")]
+    NoRow(String),
+    /// There is no image.
+    #[error("there is no image to drill: {0}")]
+    Image(String),
+    /// The table cannot be kept.
+    #[error("{path}: {why}")]
+    Table {
+        /// Where.
+        path: String,
+        /// As the system puts it.
+        why: std::io::Error,
+    },
+}
+
+/// Seeds of each flight with `--long`.
+const LONG_SEEDS: u64 = 10;
+
+/// Runs `ground drill`; `image` builds what flies the release image, if it is asked for.
+///
+/// # Errors
+/// See [`DrillError`]. What is not accepted is in the table and no error: some rows are open.
+pub fn run(
+    arguments: &Arguments,
+    image: impl FnOnce() -> Result<Box<OnImage<'static>>, String>,
+) -> Result<(), DrillError> {
+    if arguments.faults {
+        for word in &WORDS {
+            println!("{:16} {} {}", word.name, word.places, word.meaning);
+        }
+        return Ok(());
+    }
+    let rows = chosen(&arguments.rows)?;
+    let image = if arguments.image {
+        Some(image().map_err(DrillError::Image)?)
+    } else {
+        None
+    };
+    let board = image.as_deref().map_or(Board::Host, Board::Image);
+    let mut lines = Vec::new();
+    for row in rows {
+        let line = drilled(row, &board, arguments.seed, arguments.long);
+        line.print();
+        lines.push(line);
+    }
+    let count = |begin: &str| lines.iter().filter(|line| line.verdict.starts_with(begin)).count();
+    println!(
+        "{} rows: {} accepted, {} by test, {} not accepted",
+        lines.len(),
+        count("accepted"),
+        count("by test"),
+        count("not accepted")
+    );
+    if let Some(path) = &arguments.write {
+        write(path, &lines).map_err(|why| DrillError::Table {
+            path: path.display().to_string(),
+            why,
+        })?;
+    }
+    Ok(())
+}
+
+fn chosen(names: &[String]) -> Result<Vec<&'static Row>, DrillError> {
+    if names.is_empty() {
+        return Ok(CATALOGUE.iter().flat_map(|rows| rows.iter()).collect());
+    }
+    let row = |name: &String| {
+        let mut rows = CATALOGUE.iter().flat_map(|rows| rows.iter());
+        rows.find(|row| row.id.eq_ignore_ascii_case(name))
+            .ok_or_else(|| DrillError::NoRow(name.clone()))
+    };
+    names.iter().map(row).collect()
+}
+
+/// One row, drilled.
+pub fn drilled(row: &'static Row, board: &Board<'_>, seed: u64, long: bool) -> Line {
+    let mut line = Line {
+        row: row.id.into(),
+        fault: row.fault.into(),
+        injected: String::new(),
+        struck: String::new(),
+        did: row.tests.join(", "),
+        verdict: "by test".into(),
+    };
+    let (struck, did) = match row.drill {
+        Drill::None => {
+            line.injected = "by its tests".into();
+            (None, Ok(line.did.clone()))
+        }
+        Drill::Flights(flights) => {
+            let seeds = if long { LONG_SEEDS } else { 1 };
+            let flyable: Vec<&Fly> = flights.iter().filter(|drill| is_flyable(drill, board)).collect();
+            if flyable.is_empty() {
+                line.injected = "by its tests; this board cannot make it".into();
+                (None, Ok(line.did.clone()))
+            } else {
+                let plans = flyable.iter().flat_map(|drill| drill.plans);
+                line.injected = shortened(&plans.copied().collect::<Vec<_>>());
+                let (struck, did) = flown(row, &flyable, board, seed..seed + seeds);
+                (Some(struck), did)
+            }
+        }
+        Drill::Campaign(injected, run) => {
+            line.injected = injected.into();
+            let told = run(seed, long);
+            (Some(told.struck), told.did)
+        }
+    };
+    line.struck = struck.map_or(String::new(), |struck| struck.to_string());
+    let accepted = if struck.is_some() { "accepted" } else { "by test" };
+    (line.did, line.verdict) = match did {
+        Ok(did) if row.open.is_empty() => (did, accepted.into()),
+        Ok(did) => (did, format!("not accepted: {}", row.open)),
+        Err(why) => (why.clone(), format!("not accepted: {why}")),
+    };
+    line
+}
+
+/// Several plans in one cell: the first two say what they are like.
+fn shortened(plans: &[&str]) -> String {
+    match plans {
+        [first, second, _, ..] => format!("{first} | {second} | ... ({} plans)", plans.len()),
+        _ => plans.join(" | "),
+    }
+}
+
+fn is_flyable(drill: &Fly, board: &Board<'_>) -> bool {
+    let words = drill.plans.iter().flat_map(|plan| planned(plan));
+    words
+        .map(|planned| planned.word)
+        .all(|word| word.places.contains(board.letter()))
+}
+
+/// All flights of a row: how often its faults struck, and what the unit did in the last, or the first that is not accepted.
+fn flown(row: &Row, flights: &[&Fly], board: &Board<'_>, seeds: std::ops::Range<u64>) -> (u64, Result<String, String>) {
+    let (mut total, mut said) = (0, String::new());
+    for seed in seeds {
+        for drill in flights {
+            for plan in drill.plans {
+                let again = |why: String| format!("{why} ({plan}; ground drill {} --seed {seed})", row.id);
+                let flown = match fly(board, drill, plan, seed) {
+                    Ok(flown) => flown,
+                    Err(why) => return (total, Err(again(why))),
+                };
+                let struck = struck(plan, &flown.report.struck);
+                total += struck.iter().sum::<u64>();
+                if struck.contains(&0) {
+                    return (total, Err(again("a fault never struck".into())));
+                }
+                match (drill.judge)(&flown) {
+                    Ok(did) => said = did,
+                    Err(why) => return (total, Err(again(why))),
+                }
+            }
+        }
+    }
+    (total, Ok(said))
+}
+
+/// How often each fault of a plan did something. A restart is seen by what it does only, and counts as once.
+fn struck(plan: &str, struck: &Struck) -> Vec<u64> {
+    let words = planned(plan).into_iter().map(|planned| planned.word.name);
+    let times = |name: &str| match name {
+        "restart" => 1,
+        name => struck.get(name).copied().unwrap_or(0),
+    };
+    let mut names: Vec<_> = words.collect();
+    names.dedup();
+    names.into_iter().map(times).collect()
+}

@@ -1,0 +1,29 @@
+//! `ground drill`: the catalogue of faults, flown.
+//!
+//! In: rows of the catalogue (all, or those named), a seed. Out: a table with, for each row, the fault, how it was injected, how
+//! often it struck, what the unit did, and whether that is accepted. `--write` keeps the table as CSV; the one in
+//! `ground/drill/catalogue.csv` is that of `ground drill --write ground/drill/catalogue.csv`.
+//!
+//! A row is plain data ([`catalogue::Row`]) and at most one function that judges ([`judge`]). It is drilled in one of two ways:
+//!
+//! - **flights**: faults in the words of [`twin::fault`], a motion, what is said on the umbilical. They are flown by the unit's
+//!   code in virtual time, or by the release image with `--image`, with the same words and the same judge.
+//! - **campaigns**: many runs on a model of one part, such as the log on its chip.
+//!
+//! What neither can inject is covered by tests that the row names; a test of this package looks whether they are there, and
+//! `cargo host-test` runs them. Their verdict here is `by test`.
+//!
+//! A drill whose fault never struck is not accepted, whatever the unit did. A row may be open: its drills and tests pass, but the
+//! catalogue asks for more than the unit does. It is `not accepted`, with the reason.
+//!
+//! A failing run is replayed by its row and seed: `ground drill F8 --seed 123`.
+
+pub mod campaign;
+pub mod catalogue;
+pub mod command;
+mod flight;
+pub mod judge;
+mod table;
+
+pub use command::{Arguments, DrillError, run};
+pub use flight::OnImage;
