@@ -190,26 +190,34 @@ impl<SPI: SpiDevice<u16>, D: DelayNs> Adis16265<SPI, D> {
         Ok(())
     }
 
-    /// Takes the newest rate: two frames, three when the word could be that of a held line.
+    /// Takes the newest rate: two frames, a third when nothing else proves that a gyro answers ([`Self::confirm`]).
     pub async fn read_rate(&mut self) -> Result<Output, Error<SPI::Error>> {
+        let is_checked = self.checks_identity();
         let word = self.register(GYRO_OUT).await?;
-        self.confirm(word).await?;
+        self.confirm(is_checked, word).await?;
         Ok(Output::rate(word))
     }
 
-    /// Takes the newest rate and temperature: three frames, four when the rate could be that of a held line.
+    /// Takes the newest rate and temperature: three frames, a fourth when nothing else proves that a gyro answers.
     pub async fn read_rate_and_temperature(&mut self) -> Result<(Output, Output), Error<SPI::Error>> {
+        let is_checked = self.checks_identity();
         self.stalled(GYRO_OUT).await?;
         let rate = self.stalled(TEMP_OUT).await?;
         let temperature = self.stalled(PROD_ID).await?;
-        self.confirm(rate).await?;
+        self.confirm(is_checked, rate).await?;
         Ok((Output::rate(rate), Output::temperature(temperature)))
     }
 
+    /// Whether the next frame checks the identity.
+    fn checks_identity(&self) -> bool {
+        self.requested == Some(PROD_ID)
+    }
+
     /// A line held low or high answers all zeros or ones. So does a gyro: 0 counts read twice, or -1 with an alarm. Its
-    /// identity, already asked for, tells them apart.
-    async fn confirm(&mut self, word: u16) -> Result<(), Error<SPI::Error>> {
-        if matches!(word, 0 | u16::MAX) {
+    /// identity, already asked for, tells them apart. So it does where the reading did not begin with it (`is_checked`), as
+    /// after a wrong one: a line that answers at random is right twice in 2^32 readings.
+    async fn confirm(&mut self, is_checked: bool, word: u16) -> Result<(), Error<SPI::Error>> {
+        if !is_checked || matches!(word, 0 | u16::MAX) {
             self.stalled(PROD_ID).await?;
         }
         Ok(())

@@ -119,7 +119,8 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         }
         let mut counts = [NOT_READ; 4];
         for plate in (0..4).filter(is_answering) {
-            let answer = parts[plate].exchange(adis16265::GYRO_OUT).await;
+            // What is asked for here is taken by the next reading's first frame, which so checks who answers.
+            let answer = parts[plate].exchange(adis16265::PROD_ID).await;
             // A dead line's word; a live part sends it only when it has nothing new.
             let is_live = |word: &u16| !matches!(*word, 0 | u16::MAX);
             if let Some(word) = self.settle(plate, answer).ok().filter(is_live) {
@@ -162,10 +163,10 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::
     // A cycle starts on the grid of the period and asks the gyros 3 ms later. Three quarters of an interval off the grid
     // the two do not meet, and there is a conversion (3.9 ms) between them: a part that has nothing new may send what a
     // dead line sends.
-    let mut tick = next_on_grid(interval, interval * 3 / 4);
+    // Samples that were missed are not made up for: they would all be of now.
     loop {
+        let tick = next_on_grid(interval, interval * 3 / 4);
         votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;
-        tick += interval;
         let pulse = Pulse {
             at_us: now().as_micros(),
             fed_us: shared.fed_us.get(),

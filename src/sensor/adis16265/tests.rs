@@ -47,7 +47,7 @@ fn outputs_are_sign_extended_and_their_flags_told() {
 
 #[test]
 fn the_answer_comes_one_frame_after_its_request() {
-    let frames = [(0x0400, 0x1234), (0x0C00, 0x889B), (0x5600, 0x800C)];
+    let frames = [(0x0400, 0x1234), (0x0C00, 0x889B), (0x5600, 0x800C), (0x5600, ID)];
     let read = with(&frames, async |gyro| gyro.read_rate_and_temperature().await);
     assert_eq!(read, Ok((Output::rate(0x889B), Output::temperature(0x800C))));
 }
@@ -57,14 +57,20 @@ fn a_reading_checks_the_identity_that_the_one_before_asked_for() {
     let frames = [
         (0x0400, 0),
         (0x5600, 0x8001),
+        (0x5600, ID),
         (0x0400, ID),
         (0x5600, 0x8002),
         (0x0400, 0x5555),
+        // After a wrong identity the next reading proves itself.
+        (0x0400, 0x8003),
+        (0x5600, 0x8004),
+        (0x5600, 0x5556),
     ];
     with(&frames, async |gyro| {
         assert_eq!(gyro.read_rate().await.map(|r| r.counts), Ok(1));
         assert_eq!(gyro.read_rate().await.map(|r| r.counts), Ok(2));
         assert_eq!(gyro.read_rate().await, not_a_gyro(0x5555));
+        assert_eq!(gyro.read_rate().await, not_a_gyro(0x5556));
     });
 }
 
