@@ -1,8 +1,9 @@
 //! One read cycle of all sixteen sensors every period, in the order of [`SENSORS`]; the packet always closes.
 //!
-//! A sensor that answers is read within its share of the cycle ([`Budget`]). One that fails is marked in the error
-//! identifier and from then on probed cheaply, once a cycle, until it answers and is configured again. A read that ran
-//! out of time has left the bus in the middle of a transfer: the bus is freed at once, since it never frees itself.
+//! A sensor that answers is read within its share of the cycle ([`Budget`]); one that does not acknowledge, twice in it. One
+//! that fails is marked in the error identifier and from then on probed cheaply, once a cycle, until it answers and is configured
+//! again. A read that ran out of time has left the bus in the middle of a transfer: the bus is freed at once, since it never
+//! frees itself. Who held it is not known: the sensor that was being read is first read once more in the next cycle as it is.
 //!
 //! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
 //! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
@@ -39,6 +40,8 @@ const GYRO_START_MS: u64 = 250;
 enum Standing {
     /// It failed, or was never configured.
     Lost,
+    /// It ran out of time once: its next fresh sample is good.
+    Doubted,
     /// Configured; its next fresh sample is its first good one.
     Configured,
     /// It gives samples.
@@ -139,7 +142,8 @@ impl<B: Board> Acquisition<'_, '_, B> {
             let elapsed_us = now().saturating_duration_since(start).as_micros();
             let waiting = (SENSOR_COUNT - 1 - slot) as u64;
             let lost = self.standing[slot] == Standing::Lost;
-            let limit_us = self.budget.limit_us(elapsed_us, waiting, lost);
+            let failed = lost || self.standing[slot] == Standing::Doubted;
+            let limit_us = self.budget.limit_us(elapsed_us, waiting, failed);
             if self.shared.testing.get() == Some(slot) {
                 // Its output is not of this world; it is configured again when the test is over.
                 self.standing[slot] = Standing::Lost;
@@ -180,11 +184,24 @@ impl<B: Board> Acquisition<'_, '_, B> {
             reading.gyro_temperature[sensor.plate] = temperature;
             return true;
         }
-        let taken = self.shared.clock.within(limit, self.plates.read(sensor)).await;
+        let (until, mut tries) = (now() + limit, 0);
+        let taken = loop {
+            let left = until.saturating_duration_since(now());
+            let taken = self.shared.clock.within(left, self.plates.read(sensor)).await;
+            tries += 1;
+            // A byte that one disturbance has spoilt is sent again; a part that is gone does not acknowledge that either.
+            if tries == 2 || !matches!(taken, Ok(Err(_))) {
+                break taken;
+            }
+        };
+        let is_doubted = taken.is_err() && self.standing[slot] == Standing::Reading;
         let Some(taken): Option<Taken> = self.settle(slot, taken).await else {
+            if is_doubted {
+                self.standing[slot] = Standing::Doubted;
+            }
             return false;
         };
-        if self.standing[slot] == Standing::Configured && !taken.fresh {
+        if self.standing[slot] != Standing::Reading && !taken.fresh {
             return false;
         }
         self.standing[slot] = Standing::Reading;
