@@ -144,6 +144,8 @@ pub struct Shared {
     pub bus_wanted: Signal<NoopRawMutex, ()>,
     /// Error identifier of the newest cycle.
     pub errors: Cell<Errors>,
+    /// Lines for the console that found no room.
+    pub lines_lost: Cell<u32>,
     /// Bytes lost or passed over on the umbilical.
     pub umbilical_noise: Cell<u32>,
     /// The calibration set in use.
@@ -194,6 +196,7 @@ impl Shared {
             testing: Cell::default(),
             bus_wanted: Signal::new(),
             errors: Cell::default(),
+            lines_lost: Cell::default(),
             umbilical_noise: Cell::default(),
             calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
             set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
@@ -280,9 +283,12 @@ impl Shared {
         self.set_loaded.set(true);
     }
 
-    /// Puts a line on the console, unless eight already wait: telemetry and reading come before talking.
+    /// Puts a line on the console, unless eight already wait: telemetry and reading come before talking. Those that are lost
+    /// are counted.
     pub fn say(&self, text: core::fmt::Arguments<'_>) {
-        let _ = self.replies.try_send(line(text));
+        if self.replies.try_send(line(text)).is_err() {
+            self.lines_lost.set(self.lines_lost.get().saturating_add(1));
+        }
     }
 
     /// Puts a line on the console when there is room: for answers of many lines, of which none may be missing.

@@ -172,11 +172,12 @@ fn status(shared: &Shared) {
         u8::from(state.derived)
     ));
     shared.say(format_args!(
-        "G_ST lift-off {} micro-g {} errors {:04X} noise {}",
+        "G_ST lift-off {} micro-g {} errors {:04X} noise {} lost {}",
         u8::from(lift_off),
         u8::from(micro_g),
         shared.errors.get().0,
-        shared.umbilical_noise.get()
+        shared.umbilical_noise.get(),
+        shared.lines_lost.get()
     ));
     shared.say(format_args!(
         "G_ST recorder {} of {} pages, {} bad blocks, {} bits corrected, {} halves lost, {} min left",
