@@ -138,13 +138,13 @@ mod tests {
     /// U1: the part that hangs may be any of them.
     #[test]
     fn any_one_of_the_eight_alone_keeps_the_watchdog_from_being_fed() {
-        for hung in 0..VOTERS.len() {
+        for (number, hung) in VOTERS.into_iter().enumerate() {
             let votes = Votes::default();
-            for (_, voter) in VOTERS.iter().enumerate().filter(|(voter, _)| *voter != hung) {
-                block_on(votes.waiting(*voter, ready(())));
+            for (_, voter) in VOTERS.into_iter().enumerate().filter(|(other, _)| *other != number) {
+                block_on(votes.waiting(voter, ready(())));
             }
-            assert!(!votes.all_have_answered(), "voter {hung}");
-            block_on(votes.waiting(VOTERS[hung], ready(())));
+            assert!(!votes.all_have_answered(), "voter {number}");
+            block_on(votes.waiting(hung, ready(())));
             assert!(votes.all_have_answered());
             assert!(!votes.all_have_answered(), "they are asked again");
         }
