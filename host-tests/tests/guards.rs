@@ -151,3 +151,72 @@ fn s8_a_gyro_that_dies_between_two_cycles_adds_no_zeros_to_its_increments() {
         );
     }
 }
+
+/// S8: the identity that ends each fast sample, and `Adis16265::confirm` after a wrong one. Half of all random words look new.
+#[test]
+fn s8_a_gyro_that_answers_at_random_is_marked_from_the_second_packet_on() {
+    for plate in 0..4 {
+        let flight = still().fault(3 * S + 10 * MS, Fault::Garbage(8 + plate, true));
+        let flown = flight.fault(5 * S, Fault::Garbage(8 + plate, false)).fly(7 * S);
+        assert!(flown.report.struck["garbage"] > 0);
+        let marked = |second| flown.second(second).iter().all(|r| r.errors.0 == 1 << (8 + plate));
+        assert!(marked(4) && flown.second(3)[1..].iter().all(|r| r.errors.0 == 1 << (8 + plate)));
+        assert!(flown.second(6).iter().all(|reading| reading.errors.0 == 0));
+    }
+}
+
+/// S6: the second try of `Acquisition::read`.
+#[test]
+fn s6_a_byte_that_is_not_acknowledged_once_costs_no_reading() {
+    // Cycles begin 150 ms into the second and every 200 ms. In each the address of one accelerometer is refused for 20 us, each
+    // time a little later: some of these meet it.
+    let mut flight = still();
+    for cycle in 0..140 {
+        let at = 3 * S + 150 * MS + cycle * (200 * MS + 15_000);
+        flight = flight
+            .fault(at, Fault::Nack(1, Some(0)))
+            .fault(at + 20_000, Fault::Nack(1, None));
+    }
+    let flown = flight.fly(32 * S);
+    assert!(flown.report.struck["nack"] >= 1, "{:?}", flown.report.struck);
+    let marked = flown.packets.iter().skip(3).filter(|(_, r)| r.errors.0 != 0).count();
+    assert_eq!(marked, 0, "{:?}", flown.report.struck);
+}
+
+/// S3: `Standing::Doubted`. Whichever sensor is being read, it is back in the next packet but one.
+#[test]
+fn s3_a_part_that_holds_sda_costs_two_packets_at_most() {
+    let mut flight = still().say(1, b"G_DL");
+    for second in 3..16 {
+        let at = second * S + 150 * MS + (second - 3) * 500_000;
+        flight = flight.fault(at, Fault::SdaHeld(9));
+    }
+    let flown = flight.fly(17 * S);
+    let marked = |second: u64| flown.second(second).iter().filter(|r| r.errors.0 != 0).count();
+    let marked: Vec<usize> = (3..16).map(marked).collect();
+    assert!(marked.iter().all(|packets| *packets <= 2), "{marked:?}");
+    assert!(marked.iter().filter(|packets| **packets > 0).count() >= 6, "{marked:?}");
+    assert!(ever(&flown, Health::BUS_RECOVERED));
+}
+
+/// U7: 2^32 us after the clock's start, which is 71.6 min of a flight.
+#[test]
+fn u7_a_clock_beyond_32_bits_of_microseconds_changes_nothing() {
+    let flown = still().fault(0, Fault::ClockSteps(4_289_900_000)).fly(10 * S);
+    assert_eq!(flown.report.struck["clock-step"], 1);
+    let beyond = flown.derived.iter().any(|frame| frame.start_us > 1 << 32);
+    assert!(beyond && flown.second(9).iter().all(|reading| reading.errors.0 == 0));
+    assert!(flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= 2 * MS));
+}
+
+/// `next_on_grid` in the gyros' part: after a pause of the processor it samples what comes, not what is past.
+#[test]
+fn a_clock_that_leaps_does_not_make_the_gyros_run_after_it() {
+    let flown = still().fault(3 * S, Fault::ClockSteps(5_000_000)).fly(8 * S);
+    assert_eq!(flown.report.struck["clock-step"], 1);
+    let counts: Vec<_> = flown.derived.iter().map(|f| f.increments.gyro[0].count).collect();
+    assert!(
+        counts.len() > 20 && counts.iter().all(|count| *count <= 21),
+        "{counts:?}"
+    );
+}
