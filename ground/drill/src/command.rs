@@ -7,6 +7,7 @@ use twin::fault::{Struck, WORDS};
 use crate::{
     catalogue::{CATALOGUE, Drill, Fly, Row},
     flight::{Board, OnImage, fly, planned},
+    guards::{self, GuardError},
     table::{Line, write},
 };
 
@@ -21,6 +22,7 @@ use crate::{
   ground drill U1 S3 --image         on the release image
   ground drill --long                more runs of each, with seeds
   ground drill --faults              the names of faults
+  ground drill --guards              each guard's test, without the guard
   ground drill --write ground/drill/catalogue.csv")]
 pub struct Arguments {
     /// Rows of the catalogue, such as F8 [default: all]
@@ -40,6 +42,10 @@ pub struct Arguments {
     /// List the names of faults and end
     #[arg(long)]
     pub faults: bool,
+    /// Take each of the unit's guards away in a copy of the sources, and see its test fail: builds the copy, minutes. Rows are then
+    /// parts of guards' names [default: all]
+    #[arg(long)]
+    pub guards: bool,
 }
 
 /// Why a drill was not made, or found something.
@@ -48,6 +54,9 @@ pub enum DrillError {
     /// No such row.
     #[error("the catalogue has no row {0}; its rows are F1 to F21, S1 to S23, N1 to N12, C1 to C15, U1 to U15")]
     NoRow(String),
+    /// A guard is held by no test, or cannot be tried.
+    #[error(transparent)]
+    Guard(#[from] GuardError),
     /// There is no image.
     #[error("there is no image to drill: {0}")]
     Image(String),
@@ -77,6 +86,9 @@ pub fn run(
             println!("{:16} {} {}", word.name, word.places, word.meaning);
         }
         return Ok(());
+    }
+    if arguments.guards {
+        return Ok(guards::run(&guards::sources()?, &arguments.rows)?);
     }
     let rows = chosen(&arguments.rows)?;
     let image = if arguments.image {

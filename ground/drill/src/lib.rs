@@ -16,12 +16,15 @@
 //! A drill whose fault never struck is not accepted, whatever the unit did. A row may be open: its drills and tests pass, but the
 //! catalogue asks for more than the unit does. It is `not accepted`, with the reason.
 //!
+//! `--guards` asks the opposite of the tests: does each fail without its guard ([`guards`])?
+//!
 //! A failing run is replayed by its row and seed: `ground drill F8 --seed 123`.
 
 pub mod campaign;
 pub mod catalogue;
 pub mod command;
 mod flight;
+pub mod guards;
 pub mod judge;
 mod table;
 
