@@ -41,8 +41,11 @@ fn told(tally: Tally) -> Told {
     }
 }
 
+/// Blocks of a small chip: the superblock's, the kept set's and spare ones beside those of the records.
+const BLOCKS: u16 = 18;
+
 fn used(seed: u64) -> Flown {
-    let mut flown = Flown::on(Cells::new(14, &[1, 6], seed));
+    let mut flown = Flown::on(Cells::new(BLOCKS, &[1, 6], seed));
     flown.boot(5 + (seed % 40) as u32, None);
     flown
 }
@@ -76,7 +79,7 @@ pub fn unstable_bits(seed: u64, long: bool) -> Told {
 pub fn two_cuts(seed: u64, long: bool) -> Told {
     told(campaign(runs(long, 2_700, 46_000), |run| {
         let mut draw = draws(seed, run);
-        let mut flown = Flown::on(Cells::new(14, &[5], draw(1 << 32)));
+        let mut flown = Flown::on(Cells::new(BLOCKS, &[5], draw(1 << 32)));
         flown.boot(70, Some((1 + draw(70), TEARS[(run % 9) as usize])));
         flown.boot(70, Some((1 + draw(12), TEARS[draw(9) as usize])));
         flown.boot(8, None);

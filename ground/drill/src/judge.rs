@@ -314,6 +314,19 @@ pub fn console_answers_again(flown: &Flown) -> Verdict {
     Ok(format!("{said}; the console answers again"))
 }
 
+/// U14: the same, and the status tells how many lines were lost.
+pub fn what_was_lost_is_counted(flown: &Flown) -> Verdict {
+    let said = console_answers_again(flown)?;
+    let lines = flown.replies();
+    let lost = lines
+        .iter()
+        .rev()
+        .find_map(|line| line.rsplit_once(" lost ")?.1.parse::<u32>().ok());
+    let lost = lost.ok_or("the status does not say how many lines were lost")?;
+    unless(lost == 0, || "no line was lost".into())?;
+    Ok(format!("{said}; {lost} lines lost and counted"))
+}
+
 /// C9: telemetry that is stuck loses its packets, and the recorder has them.
 pub fn recorder_has_what_the_line_lost(flown: &Flown) -> Verdict {
     unless(!flown.report.resets.is_empty(), || "it was reset".into())?;

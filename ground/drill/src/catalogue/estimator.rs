@@ -97,8 +97,12 @@ pub(super) const ROWS: [Row; 12] = [
         "N11",
         "reset in flight, attitude restored",
         None,
-        &[],
-        "the unit does not restore an attitude",
+        &[
+            "host-tests/tests/resets.rs: n11_a_reset_without_weight_costs_two_packets_and_an_error_that_is_said",
+            "host-tests/tests/resets.rs: a_power_cut_without_weight_goes_on_from_the_newest_record",
+            "boards/emulated/tests/estimate.rs: after_a_reset_in_flight_the_first_frame_has_the_attitude_and_says_why_the_unit_started",
+        ],
+        "",
     ),
     row(
         "N12",

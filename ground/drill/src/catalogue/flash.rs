@@ -109,7 +109,10 @@ pub(super) const ROWS: [Row; 21] = [
         "F11",
         "grown bad blocks",
         None,
-        &["host-tests/tests/recorder_faults.rs: f11_a_block_that_wears_out_costs_no_record"],
+        &[
+            "host-tests/tests/recorder_faults.rs: f11_a_block_that_wears_out_costs_no_record",
+            "host-tests/tests/recorder_starts.rs: bad_blocks_beyond_those_that_are_remembered_do_not_stop_the_recorder",
+        ],
         "",
     ),
     row(
@@ -151,6 +154,7 @@ pub(super) const ROWS: [Row; 21] = [
         Flights(&[recorder(&["nand-dead@4s..5s", "nand-dead@3.9s..4.1s"])]),
         &[
             "host-tests/tests/recorder_faults.rs: f15_a_dead_or_absent_chip_is_an_error_with_a_name",
+            "host-tests/tests/recorder_unit.rs: a_chip_that_comes_back_is_used_again",
             "host-tests/tests/recorder_unit.rs: f15_a_dead_or_absent_chip_costs_neither_packets_nor_the_console",
         ],
         "",
@@ -181,6 +185,7 @@ pub(super) const ROWS: [Row; 21] = [
         "arbitrary image on the NAND",
         None,
         &[
+            "ground/hostile/tests/replay.rs: flight_log",
             "host-tests/tests/recorder_superblock.rs: f18_arbitrary_images_are_mounted_read_and_appended_to_in_bounded_time",
         ],
         "",
@@ -213,6 +218,7 @@ pub(super) const ROWS: [Row; 21] = [
         "the supply fails and comes back",
         Flights(&[recorder(&["supply@4s..5s", "supply@4s..4.5s"])]),
         &[
+            "host-tests/tests/resets.rs: a_dip_of_the_supply_costs_no_more_than_the_records_of_its_own_duration",
             "host-tests/tests/recorder_unit.rs: f20_a_failing_supply_begins_no_operation",
             "boards/emulated/tests/recorder.rs: a_failing_supply_begins_no_operation",
         ],

@@ -26,6 +26,18 @@ fn every_row_has_a_drill_or_a_test_and_every_test_is_in_the_source() {
             let (file, name) = test.split_once(": ").unwrap_or_else(|| panic!("{}: {test}", row.id));
             let text =
                 fs::read_to_string(root.join(file)).unwrap_or_else(|error| panic!("{}: {file}: {error}", row.id));
+            // A check that .ci/run makes, by its line.
+            if file.starts_with(".ci/") {
+                let run = fs::read_to_string(root.join(".ci/run")).expect(".ci/run");
+                assert!(text.contains(name) && run.contains(file), "{}: {test}", row.id);
+                continue;
+            }
+            // A test that a macro makes for each name in its list.
+            if let Some((_, names)) = text.split_once("replayed!(\n") {
+                let names = names.split(')').next().unwrap_or("");
+                assert!(names.split(',').any(|known| known.trim() == name), "{}: {test}", row.id);
+                continue;
+            }
             let at = text.find(&format!("fn {name}("));
             let at = at.unwrap_or_else(|| panic!("{}: {file} has no function {name}", row.id));
             // A test of its own, or a property or fuzz target, which has no attribute just before it.
