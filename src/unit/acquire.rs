@@ -186,8 +186,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
         }
         let (until, mut tries) = (now() + limit, 0);
         let taken = loop {
-            let left = until.saturating_duration_since(now());
-            let taken = self.shared.clock.within(left, self.plates.read(sensor)).await;
+            let taken = self.shared.clock.by(until, self.plates.read(sensor)).await;
             tries += 1;
             // A byte that one disturbance has spoilt is sent again; a part that is gone does not acknowledge that either.
             if tries == 2 || !matches!(taken, Ok(Err(_))) {

@@ -86,10 +86,15 @@ impl Clock {
     /// What `future` gives, if it does within `limit` from now on.
     pub fn within<F: Future>(&self, limit: Duration, future: F) -> Within<'_, F> {
         // Not the reading of this poll: the parts polled before may have taken their time.
+        self.by(now() + limit, future)
+    }
+
+    /// What `future` gives, if it does before `until`.
+    pub fn by<F: Future>(&self, until: Instant, future: F) -> Within<'_, F> {
         Within {
             future,
             clock: self,
-            until: now() + limit,
+            until,
         }
     }
 
