@@ -1,5 +1,6 @@
 //! Behaviours of the unit, under std and in virtual time: what the tests share.
 
+mod coasting;
 pub mod counts;
 pub mod recorder;
 pub mod reference;
@@ -7,8 +8,11 @@ pub mod watched;
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
+pub use coasting::Coasting;
+
 use emems::{
     derived::{self, DERIVED_BYTES, DERIVED_START, Derived},
+    estimate::Site,
     packet,
     sample::Reading,
     unit::Settings,
@@ -16,7 +20,7 @@ use emems::{
 use twin::{
     host::{self, HostReport},
     part::{Nanos, nand::Cells},
-    plant::Plant,
+    plant::{Plant, Quality},
     run::{Bench, Fault, Flow, Scheduled},
     truth::{Truth, TruthSource},
 };
@@ -47,6 +51,19 @@ impl Flight {
             faults: Vec::new(),
             said: Vec::new(),
         }
+    }
+
+    /// A unit whose parts have clocks of their own, at the launch site, with derived frames.
+    pub fn at_alcantara(world: Arc<dyn TruthSource>) -> Self {
+        Flight {
+            plant: Plant::with(world.clone(), 7, Quality::FREE_CLOCKS),
+            settings: Settings {
+                site: Site::ALCANTARA,
+                ..Settings::NOMINAL
+            },
+            ..Flight::ideal(world)
+        }
+        .say(MS, b"G_DL")
     }
 
     /// With a fault at an instant.

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use emems::{derived::Derived, estimate::Site, unit::Settings};
-use host_tests::{Flight, MS, S};
+use emems::derived::Derived;
+use host_tests::{Flight, S};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use twin::{
     environment::{Environment, World},
     host::timing::BOOT,
     motion::{Course, Motion, SoundingRocket},
-    plant::{Plant, Quality},
     run::Fault,
     truth::{Truth, TruthSource},
 };
@@ -26,16 +25,7 @@ fn rocket(course: Course) -> World<SoundingRocket> {
 }
 
 fn flight(world: impl TruthSource + 'static) -> Flight {
-    let world: Arc<dyn TruthSource> = Arc::new(world);
-    Flight {
-        plant: Plant::with(world.clone(), 7, Quality::FREE_CLOCKS),
-        settings: Settings {
-            site: Site::ALCANTARA,
-            ..Settings::NOMINAL
-        },
-        ..Flight::ideal(world)
-    }
-    .say(MS, b"G_DL")
+    Flight::at_alcantara(Arc::new(world))
 }
 
 /// Over a stretch of a flight.

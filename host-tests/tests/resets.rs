@@ -17,12 +17,12 @@ use emems::{
     packet,
     unit::Settings,
 };
-use host_tests::{Flight, Flown, MS, S, set_words, world};
-use nalgebra::{Matrix3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
+use host_tests::{Coasting, Flight, Flown, MS, S, set_words, world};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use twin::{
     environment::{Environment, World},
     host::timing::BOOT,
-    motion::{Attitude, Motion, Pose, Profile},
+    motion::Motion,
     part::Nanos,
     plant::Plant,
     run::Fault,
@@ -330,37 +330,10 @@ fn a_crash_that_the_log_does_not_have_is_told_again() {
     assert!(flown.replied("G_ST crash Panic at 123"), "{:?}", flown.replies());
 }
 
-/// At rest for 20 s, then turning about a slanting axis, and without weight from 30 s on.
-struct Coasting {
-    angle: Profile,
-    gravity_n: Vector3<f64>,
-}
-
 const WEIGHTLESS_S: f64 = 30.0;
 
 fn coasting(rate_deg_s: f64) -> Coasting {
-    Coasting {
-        angle: Profile::from_rest(0.0)
-            .coast(20.0)
-            .ramp_to_rate(rate_deg_s.to_radians(), 5.0)
-            .coast(1000.0),
-        gravity_n: Environment::laboratory().gravity_n(),
-    }
-}
-
-impl Motion for Coasting {
-    fn at(&self, t_s: f64) -> Pose {
-        let axis = Unit::new_normalize(Vector3::new(1.0, 0.4, -0.3));
-        let mut pose = Pose::turning(Attitude::level().turned(axis, self.angle.at(t_s)));
-        if t_s > WEIGHTLESS_S {
-            pose.acc_n = self.gravity_n;
-        }
-        pose
-    }
-
-    fn duration_s(&self) -> Option<f64> {
-        None
-    }
+    Coasting::turning(rate_deg_s, 20.0, 5.0, WEIGHTLESS_S, &Environment::laboratory())
 }
 
 /// A unit with noise and biases, in FLIGHT and recording, that coasts.

@@ -2,63 +2,18 @@
 
 use std::sync::Arc;
 
-use emems::{estimate::Site, unit::Settings};
-use host_tests::{Flight, Flown, MS, S};
-use nalgebra::{Unit, Vector3};
-use twin::{
-    environment::{Environment, World},
-    motion::{Attitude, Motion, Pose, Profile},
-    plant::{Plant, Quality},
-    truth::TruthSource,
-};
+use host_tests::{Coasting, Flight, Flown, S};
+use nalgebra::Vector3;
+use twin::environment::{Environment, World};
 
 /// [s] from when on there is no weight, and for how long it flies.
 const WEIGHTLESS_S: f64 = 40.0;
 const FLOWN_S: u64 = 120;
 
-/// At rest, then turning about a slanting axis, and without weight from [`WEIGHTLESS_S`] on.
-struct Coasting {
-    angle: Profile,
-    gravity_n: Vector3<f64>,
-}
-
-impl Motion for Coasting {
-    fn at(&self, t_s: f64) -> Pose {
-        let axis = Unit::new_normalize(Vector3::new(1.0, 0.4, -0.3));
-        let mut pose = Pose::turning(Attitude::level().turned(axis, self.angle.at(t_s)));
-        if t_s > WEIGHTLESS_S {
-            pose.acc_n = self.gravity_n;
-        }
-        pose
-    }
-
-    fn duration_s(&self) -> Option<f64> {
-        None
-    }
-}
-
 fn turning(rate_deg_s: f64, from_s: f64) -> Flown {
     let environment = Environment::alcantara();
-    let angle = Profile::from_rest(0.0)
-        .coast(from_s)
-        .ramp_to_rate(rate_deg_s.to_radians(), 1.0);
-    let world: Arc<dyn TruthSource> = Arc::new(World {
-        motion: Coasting {
-            angle: angle.coast(1000.0),
-            gravity_n: environment.gravity_n(),
-        },
-        environment,
-    });
-    Flight {
-        plant: Plant::with(world.clone(), 7, Quality::FREE_CLOCKS),
-        settings: Settings {
-            site: Site::ALCANTARA,
-            ..Settings::NOMINAL
-        },
-        ..Flight::ideal(world)
-    }
-    .say(MS, b"G_DL")
-    .fly(FLOWN_S * S)
+    let motion = Coasting::turning(rate_deg_s, from_s, 1.0, WEIGHTLESS_S, &environment);
+    Flight::at_alcantara(Arc::new(World { motion, environment })).fly(FLOWN_S * S)
 }
 
 #[test]
