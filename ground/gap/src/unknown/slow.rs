@@ -4,33 +4,30 @@
 //! [`Posterior`]. Calibration, field, its gradient and the effects' parameters are open beside it with their prior sigmas; attitude error
 //! of the reference, field error and wandering zeros are taken out by [`crate::null::whitening`].
 //!
-//! Channels that share no state are whitened by themselves, and their normal equations added.
+//! Channels that share no state are whitened by themselves, and their normal equations added ([`normal`]).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
+mod normal;
+mod open;
+
+use nalgebra::{Cholesky, Vector3};
 use twin::predict::{Feel, Kind};
 
-use super::remainder::Setting;
+use self::{
+    normal::{Pass, Sums, sets},
+    open::{Open, open_columns},
+};
 use super::{
     binned::{BINS, Binned},
     discrepancy::{Posterior, courses},
+    remainder::Setting,
 };
-use crate::{
-    input::case::SlowErrors,
-    null::{
-        model::Model,
-        problem::Problem,
-        whitening::{Process, Sample, Whitening, places},
-    },
-};
+use crate::null::{model::Model, problem::Problem};
 
 /// Courses in time: the last has a period of a sixteenth of the log.
 const COURSES: usize = 32;
 
 /// Stretches that a course needs.
 const BINS_A_COURSE: usize = 4;
-
-/// [unit/sqrt(s)] by which zeros walk where their description says less: accelerometers, gyros, magnetometers (nine recordings of BROAD).
-const WALKS: [f64; 3] = [3e-4, 1e-6, 2e-3];
 
 /// Where a discrepancy may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,14 +88,6 @@ struct Seen {
     reading: Vec<f64>,
 }
 
-/// The normal equations of the discrepancies beside what is open.
-struct Sums {
-    open: DMatrix<f64>,
-    pull: DVector<f64>,
-    /// Of each discrepancy: with itself, with what is open, with the residual.
-    own: Vec<(DMatrix<f64>, DMatrix<f64>, DVector<f64>)>,
-}
-
 /// All of a model; `about` is the size, in physical units, about which the grid of sizes is.
 pub fn discrepancies(problem: &Problem, model: &Model, setting: &Setting, about: &dyn Fn(&Slow) -> f64) -> Vec<Slow> {
     let errors = setting.slow;
@@ -128,32 +117,19 @@ pub fn discrepancies(problem: &Problem, model: &Model, setting: &Setting, about:
     let open = open_columns(problem, model, errors, &seen);
     let mut found: Vec<Slow> = hypotheses(problem).map(|place| slow(problem, &seen, place)).collect();
     found.retain(|slow| slow.channels.iter().any(|channel| !seen[*channel].residual.is_empty()));
-    let mut sums = Sums {
-        open: DMatrix::identity(open.len(), open.len()),
-        pull: DVector::zeros(open.len()),
-        own: (found.iter())
-            .map(|slow| {
-                let width = count * slow.place.components();
-                (
-                    DMatrix::zeros(width, width),
-                    DMatrix::zeros(open.len(), width),
-                    DVector::zeros(width),
-                )
-            })
-            .collect(),
+    let mut sums = Sums::none(open.len(), &found, count);
+    let pass = Pass {
+        problem,
+        errors,
+        seen: &seen,
+        open: &open,
+        found: &found,
+        phases: &phases,
+        count,
+        step_s: (span_s[1] - span_s[0]) / BINS as f64,
     };
-    let step_s = (span_s[1] - span_s[0]) / BINS as f64;
     for set in sets(problem, errors) {
-        add(
-            problem,
-            errors,
-            &seen,
-            &set,
-            &open,
-            &found,
-            (&phases, count, step_s),
-            &mut sums,
-        );
+        pass.add(&set, &mut sums);
     }
     let Some(factor) = Cholesky::new(sums.open) else {
         return Vec::new();
@@ -273,279 +249,4 @@ fn slow(problem: &Problem, seen: &[Seen], place: Where) -> Slow {
             sizes: Vec::new(),
         },
     }
-}
-
-/// For each open parameter, per channel that it touches the means of its column, for one prior sigma.
-type Open = Vec<Vec<(usize, Vec<f64>)>>;
-
-fn open_columns(problem: &Problem, model: &Model, errors: &SlowErrors, seen: &[Seen]) -> Open {
-    let mut open = Open::new();
-    for (channel, seen) in seen.iter().enumerate() {
-        let rows = &problem.frames[channel].series.rows;
-        open.extend((problem.open(channel).iter()).map(|column| {
-            let values = &column.entries[0].1;
-            vec![(
-                channel,
-                seen.binned.means(|sample| values[rows[sample] as usize] * column.sigma),
-            )]
-        }));
-    }
-    for column in &problem.reference {
-        let means = |(channel, values): &(usize, Vec<f64>)| {
-            let rows = &problem.frames[*channel].series.rows;
-            let binned = &seen[*channel].binned;
-            (
-                *channel,
-                binned.means(|sample| values[rows[sample] as usize] * column.sigma),
-            )
-        };
-        open.push(column.entries.iter().map(means).collect());
-    }
-    for (at, component) in model.components.iter().enumerate() {
-        let parameters = component.active.cause.parameters(problem.twin.unit());
-        for (column, parameter) in problem.slopes(&model.components, at).iter().zip(&parameters) {
-            let means = |(channel, values): &(usize, DVector<f64>)| {
-                let weights = &problem.frames[*channel].weights;
-                let of = |sample: usize| values[sample] * weights[sample] * parameter.prior_sigma;
-                (*channel, seen[*channel].binned.means(of))
-            };
-            open.push(column.iter().map(means).collect());
-        }
-    }
-    open.extend(gradient(problem, errors, seen));
-    open
-}
-
-/// The field's gradient, which is symmetric and has no trace.
-fn gradient(problem: &Problem, errors: &SlowErrors, seen: &[Seen]) -> Open {
-    let sigma = errors.field_gradient_sigma_ut_m;
-    let all = problem.twin.unit().channels.iter().enumerate();
-    let magnetometers: Vec<usize> = (all.filter(|(_, own)| own.sensor == Kind::Magnetometer))
-        .map(|(channel, _)| channel)
-        .collect();
-    let Some(middle) = magnetometers
-        .first()
-        .and_then(|channel| seen[*channel].feels.first())
-        .map(|feel| feel.position_n)
-    else {
-        return Open::new();
-    };
-    if sigma <= 0.0 {
-        return Open::new();
-    }
-    let parts = [
-        [(0, 0, 1.0), (2, 2, -1.0)],
-        [(1, 1, 1.0), (2, 2, -1.0)],
-        [(0, 1, 1.0), (1, 0, 1.0)],
-        [(0, 2, 1.0), (2, 0, 1.0)],
-        [(1, 2, 1.0), (2, 1, 1.0)],
-    ];
-    let column = |part: [(usize, usize, f64); 2]| {
-        let mut gradient = Matrix3::zeros();
-        part.iter()
-            .for_each(|(row, column, value)| gradient[(*row, *column)] = value * sigma);
-        let of_channel = |channel: &usize| {
-            let (seen, axis_b) = (&seen[*channel], problem.twin.unit().channels[*channel].axis_b);
-            let of = |sample: usize| {
-                let feel = &seen.feels[sample];
-                axis_b.dot(&feel.to_b(gradient * (feel.position_n - middle)))
-            };
-            (*channel, seen.binned.means(of))
-        };
-        magnetometers.iter().map(of_channel).collect()
-    };
-    parts.into_iter().map(column).collect()
-}
-
-/// Channels that share a state, together; the others by themselves.
-fn sets(problem: &Problem, errors: &SlowErrors) -> Vec<Vec<usize>> {
-    let (mut together, mut sets) = (Vec::new(), Vec::new());
-    for (channel, own) in problem.twin.unit().channels.iter().enumerate() {
-        let is_shared = match own.sensor {
-            Kind::Thermometer => false,
-            Kind::Magnetometer => errors.attitude_sigma_rad > 0.0 || errors.field_wander_sigma_ut > 0.0,
-            Kind::Accelerometer | Kind::Gyro => errors.attitude_sigma_rad > 0.0,
-        };
-        match is_shared {
-            true => together.push(channel),
-            false => sets.push(vec![channel]),
-        }
-    }
-    sets.push(together);
-    sets.retain(|set| !set.is_empty());
-    sets
-}
-
-/// Adds the normal equations of one set of channels.
-#[allow(clippy::too_many_arguments, reason = "one step of `discrepancies`, cut out of it")]
-fn add(
-    problem: &Problem,
-    errors: &SlowErrors,
-    seen: &[Seen],
-    set: &[usize],
-    open: &Open,
-    found: &[Slow],
-    (phases, count, step_s): (&[f64], usize, f64),
-    sums: &mut Sums,
-) {
-    let units = &problem.twin.unit().channels;
-    // Three axes of the attitude, three of the field, a zero each.
-    let mut processes = Vec::new();
-    let is_shared = set.len() > 1;
-    for _ in 0..3 {
-        processes.push(Process::Matern {
-            sigma: if is_shared { errors.attitude_sigma_rad } else { 0.0 },
-            alike_s: errors.attitude_correlation_s,
-        });
-    }
-    for _ in 0..3 {
-        processes.push(Process::Alike {
-            sigma: if is_shared { errors.field_wander_sigma_ut } else { 0.0 },
-            alike_s: errors.field_correlation_s,
-        });
-    }
-    let walk = |channel: &usize| {
-        let own = &units[*channel];
-        let least = match own.sensor {
-            Kind::Accelerometer => WALKS[0],
-            Kind::Gyro => WALKS[1],
-            Kind::Magnetometer => WALKS[2],
-            Kind::Thermometer => 0.0,
-        };
-        Process::Walk {
-            per_root_s: own.drift_sigma.max(least),
-        }
-    };
-    // States that are zero for ever cost time and say nothing.
-    let is_alone = !is_shared;
-    if is_alone {
-        processes.clear();
-    }
-    processes.extend(set.iter().map(walk));
-    let (at, _) = places(&processes);
-    let shared = if is_alone { 0 } else { 6 };
-    let mut order: Vec<(usize, usize, usize)> = Vec::new();
-    for (place, channel) in set.iter().enumerate() {
-        order.extend(
-            seen[*channel]
-                .binned
-                .bins
-                .iter()
-                .enumerate()
-                .map(|(own, bin)| (*bin, place, own)),
-        );
-    }
-    order.sort_unstable();
-    // What each sample sees of attitude and field, averaged as it is.
-    let rows: Vec<Vec<Vec<f64>>> = set
-        .iter()
-        .map(|channel| {
-            if is_alone {
-                Vec::new()
-            } else {
-                seen_states(problem, &seen[*channel], *channel)
-            }
-        })
-        .collect();
-    let samples: Vec<Sample> = (order.iter())
-        .map(|(bin, place, own)| {
-            let mut sees = vec![(at[shared + place], 1.0)];
-            for (of, part) in rows[*place].iter().enumerate() {
-                // Angle, rate and field: an angle's rate is its second state.
-                let state = match of {
-                    0..3 => at[of],
-                    3..6 => at[of - 3] + 1,
-                    _ => at[of - 3],
-                };
-                if part[*own] != 0.0 {
-                    sees.push((state, part[*own]));
-                }
-            }
-            Sample {
-                t_s: *bin as f64 * step_s,
-                sees,
-                variance: seen[set[*place]].binned.variances[*own],
-            }
-        })
-        .collect();
-    let whitening = Whitening::new(&processes, &samples);
-    let touching: Vec<usize> = (0..open.len())
-        .filter(|at| open[*at].iter().any(|(channel, _)| set.contains(channel)))
-        .collect();
-    let mut columns = DMatrix::zeros(order.len(), touching.len() + 1);
-    for (column, at) in touching.iter().enumerate() {
-        let of_place: Vec<Option<&Vec<f64>>> = (set.iter())
-            .map(|channel| open[*at].iter().find(|(own, _)| own == channel).map(|(_, means)| means))
-            .collect();
-        for (row, (_, place, own)) in order.iter().enumerate() {
-            columns[(row, column)] = of_place[*place].map_or(0.0, |means| means[*own]);
-        }
-    }
-    for (row, (_, place, own)) in order.iter().enumerate() {
-        columns[(row, touching.len())] = seen[set[*place]].residual[*own];
-    }
-    let white = whitening.whiten(&columns);
-    let (white_open, white_residual) = (white.columns(0, touching.len()), white.column(touching.len()));
-    let (own, pull) = (white_open.tr_mul(&white_open), white_open.tr_mul(&white_residual));
-    for (row, one) in touching.iter().enumerate() {
-        sums.pull[*one] += pull[row];
-        (touching.iter().enumerate()).for_each(|(column, other)| sums.open[(*one, *other)] += own[(row, column)]);
-    }
-    let (course, scales) = courses(count);
-    for (slow, (own, with_open, pull)) in found.iter().zip(&mut sums.own) {
-        if !set.iter().any(|channel| slow.channels.contains(channel)) {
-            continue;
-        }
-        let components = slow.place.components();
-        let share = (components as f64).sqrt().recip();
-        let mut columns = DMatrix::zeros(order.len(), count * components);
-        for (place, channel) in set
-            .iter()
-            .enumerate()
-            .filter(|(_, channel)| slow.channels.contains(channel))
-        {
-            let seen = &seen[*channel];
-            let means: Vec<Vec<f64>> = (0..components)
-                .map(|component| {
-                    seen.binned
-                        .means(|sample| design(problem, seen, *channel, slow.place, sample)[component])
-                })
-                .collect();
-            for (row, (bin, _, own)) in order.iter().enumerate().filter(|(_, (_, other, _))| *other == place) {
-                for (component, means) in means.iter().enumerate() {
-                    for k in 0..count {
-                        columns[(row, component * count + k)] =
-                            share * scales[k] * course(k, phases[*bin]) * means[*own];
-                    }
-                }
-            }
-        }
-        let white = whitening.whiten(&columns);
-        *own += white.tr_mul(&white);
-        *pull += white.tr_mul(&white_residual);
-        let cross = white_open.tr_mul(&white);
-        for (row, at) in touching.iter().enumerate() {
-            let mut sum = with_open.row_mut(*at);
-            sum += cross.row(row);
-        }
-    }
-}
-
-/// Of a channel what it sees of an attitude error about the axes of n, of its rate, and of a field error along them, averaged.
-fn seen_states(problem: &Problem, seen: &Seen, channel: usize) -> Vec<Vec<f64>> {
-    let own = &problem.twin.unit().channels[channel];
-    let state = |of: usize, sample: usize| {
-        let feel = &seen.feels[sample];
-        let axis_n = feel.q_nb * own.axis_b;
-        match (of, own.sensor) {
-            // n.C(v + v x phi) for a vector v that stands in n.
-            (0..3, Kind::Accelerometer | Kind::Magnetometer) => {
-                (feel.q_nb * own.axis_b.cross(&felt_b(own.sensor, feel)))[of]
-            }
-            (3..6, Kind::Gyro) => axis_n[of - 3],
-            (6..9, Kind::Magnetometer) => axis_n[of - 6],
-            _ => 0.0,
-        }
-    };
-    (0..9).map(|of| seen.binned.means(|sample| state(of, sample))).collect()
 }
