@@ -4,9 +4,9 @@
 //! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::hold::Held`]).
 //!
 //! Refuses, naming file and key: a missing file, a key that is absent or of the wrong type, windows that are empty,
-//! run backwards or overlap, a window without a sample, a sigma or a correlation time that cannot be, a motion that ends before the log does, a clock that never
-//! meets the motion's, channels the packets do not have. Lost, missing and clipped samples are not errors: they are
-//! left out and counted in [`crate::input::log::Masked`].
+//! run backwards or overlap, a window without a sample, a sigma or a correlation time that cannot be, a motion that ends
+//! before the log does, a clock that never meets the motion's, channels the packets do not have. Lost, missing and
+//! clipped samples are not errors: they are left out and counted in [`crate::input::log::Masked`].
 
 mod allowance;
 mod environment;
