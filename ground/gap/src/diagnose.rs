@@ -36,7 +36,7 @@ use crate::{
         posterior::Believed,
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
-    thresholds::{DOUBTFUL, SAID},
+    thresholds::SAID,
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
@@ -170,7 +170,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         Vec::new()
     };
     let again = |left: &Leftover, components: &[Component]| {
-        let found = left.aspects.first().filter(|_| left.p < DOUBTFUL)?;
+        let found = left.aspects.first().filter(|_| left.is_doubtful())?;
         progress("again", 0.0);
         (subject.held).recurrence(&subject.twin, &subject.reference, components, &found.what)
     };
@@ -196,6 +196,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &quiet,
         events.as_ref(),
         &left,
+        &floor,
     );
     let alternatives = believed.alternatives(&library, &explanation);
     let is_named = !believed.causes.is_empty();
@@ -204,8 +205,9 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         (left, shrink) = all_there_was();
     }
     progress("remainder", 0.0);
-    let remainder = remains(subject, is_named.then_some(&explanation), events.is_some());
-    let none_of_these = remainder.matters * if is_named { 1.0 } else { believed.none_is_there() };
+    let said = said(&explanation, &believed.causes);
+    let remainder = remains(subject, &explanation, &believed.causes, &said, events.is_some());
+    let none_of_these = remainder.matters * believed.none_is_there();
     let Believed {
         mut causes,
         keys,
@@ -221,7 +223,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         place.passage = Some(Passage::of(&problem, on.stretch));
     }
     let correction = (is_named && is_decided)
-        .then(|| Correction::of(&subject.twin, &model.components))
+        .then(|| Correction::of(&subject.twin, &said))
         .flatten();
     let finished = if is_named {
         Finished {
@@ -267,11 +269,9 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         alone: alone(&library, found),
         imitation: imitation(&library, found),
         limits: confusion::limits(&library),
-        known: model
-            .components
-            .iter()
+        known: (said.iter())
             // What comes and goes is no property of the unit.
-            .filter(|component| is_named && is_decided && component.span.is_none())
+            .filter(|component| is_decided && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
         rivals: confusion::pair(&library, found),
@@ -282,9 +282,28 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
 }
 
-/// What is left of the log beneath what is named; `is_random` where that happens at instants of its own.
-fn remains(subject: &Subject, named: Option<&Explanation>, is_random: bool) -> Remainder {
-    let scatter = named.and_then(|named| named.scatter.as_ref());
+/// The effects on readings that are named, without those that were found and are not likely enough.
+fn said(explanation: &Explanation, causes: &[Cause]) -> Vec<Component> {
+    let is_said = |component: &&Component| {
+        let cause = &component.active.cause;
+        let is_it =
+            |said: &Cause| said.effect == cause.effect.page().name && said.locality == cause.locality.to_string();
+        causes.iter().any(is_it)
+    };
+    explanation.model.components.iter().filter(is_said).cloned().collect()
+}
+
+/// What is left of the log beneath the causes that are named, of which these are on readings; `is_random` where they happen at instants of
+/// their own.
+fn remains(
+    subject: &Subject,
+    explanation: &Explanation,
+    causes: &[Cause],
+    said: &[Component],
+    is_random: bool,
+) -> Remainder {
+    let is_named = |scatter: &&Scatter| causes.iter().any(|cause| cause.effect == scatter.effect.page().name);
+    let scatter = explanation.scatter.as_ref().filter(is_named);
     let scattered = scatter.map_or(&[][..], |scatter| &scatter.channels);
     // Of a walk, and of what makes other readings of those beneath it, a mean over time is no remainder.
     let is_hidden = |scatter: &Scatter| scatter.effect.page().texture == Texture::Walk || !scatter.beneath.is_empty();
@@ -293,12 +312,11 @@ fn remains(subject: &Subject, named: Option<&Explanation>, is_random: bool) -> R
     let setting = Setting {
         slow: &subject.slow,
         bars: &subject.bars,
-        louder: named.map_or(&as_described, |named| &named.louder),
+        louder: scatter.map_or(&as_described, |_| &explanation.louder),
         scattered,
         wandering: if wanders { scattered } else { &[] },
     };
-    let components = named.map_or(&[][..], |named| &named.model.components);
-    remainder::of_log(subject, components, &setting, named.is_some() && is_random)
+    remainder::of_log(subject, said, &setting, !causes.is_empty() && is_random)
 }
 
 /// By how many prior sigmas a model moves the calibration, most first.

@@ -8,7 +8,7 @@
 use crate::{
     library::hypotheses::Library,
     search::{odds::by_effect, readings::Attribution},
-    thresholds::{SEEN_SNR, SET_APART, SET_POSSIBLE},
+    thresholds::{CHANCE, SEEN_SNR, SET_APART},
 };
 
 /// How small an effect this log would show.
@@ -48,9 +48,7 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
         let mut set = vec![own];
         for rival in chosen.rivals.iter().map(|rival| rival.hypothesis) {
             let name = library.hypotheses[rival].effect();
-            let is_likely = likely
-                .iter()
-                .any(|(known, share)| *known == name && *share > SET_POSSIBLE);
+            let is_likely = likely.iter().any(|(known, share)| *known == name && *share > CHANCE);
             let is_near = nats_apart(library, chosen, rival).is_some_and(|nats| nats < SET_APART);
             if !set.contains(&name) && (is_likely || is_near) {
                 set.push(name);

@@ -20,7 +20,7 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
-    thresholds::{CROSS_VALIDATED, EVENT},
+    thresholds::{EFFECT_MARGIN, MOST_OF},
 };
 
 /// Blocks, each left out in turn.
@@ -76,7 +76,7 @@ fn key_of(without: &[Vec<DVector<f64>>], with: &[Vec<DVector<f64>>]) -> Option<K
     let promised: f64 = blocks()
         .map(|block| sum(block, |without, with| (without - with).norm_squared()))
         .sum();
-    if promised < CROSS_VALIDATED {
+    if promised < EFFECT_MARGIN {
         return None;
     }
     let gains: Vec<f64> = blocks()
@@ -110,7 +110,7 @@ fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &
         }
     }
     let most = energies.iter().copied().fold(0.0, f64::max);
-    most > EVENT * energies.iter().sum::<f64>()
+    most > MOST_OF * energies.iter().sum::<f64>()
 }
 
 /// The errors on each block, left out of the fit, channel by channel.

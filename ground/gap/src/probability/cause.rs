@@ -15,7 +15,7 @@ use crate::{
         readings::{Attribution, Chosen},
         scatter::Scatter,
     },
-    thresholds::{NAMED_ENERGY, NAMED_SHARE, SUSPICIOUS, TEMPERATURE},
+    thresholds::{COUNTED_PART, STANDS_OUT, SUSPICIOUS, TEMPERATURE},
 };
 
 /// One parameter of a cause.
@@ -95,7 +95,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
             locality: hypothesis.cause.locality.to_string(),
             channels: by_channel
                 .iter()
-                .filter(|(_, energy)| *energy >= (NAMED_SHARE * total).min(NAMED_ENERGY))
+                .filter(|(_, energy)| *energy >= (COUNTED_PART * total).min(STANDS_OUT.powi(2)))
                 .map(|(channel, _)| *channel)
                 .collect(),
             probability: probability(library, chosen),

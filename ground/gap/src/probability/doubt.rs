@@ -2,8 +2,13 @@
 //!
 //! In: causes with the probability that their evidence gives them among their rivals, and what they leave. Out: the same
 //! causes, believed less where something the library does not have could be like them. Five things speak for that: what
-//! is left over, few nats, a size far below the strongest cause's, blocks that do not confirm it when they are left out, and
-//! another strength on the held-out windows than on the fitted ones.
+//! is left over in a cause's own channels, few nats, a size far below the strongest cause's, blocks that do not confirm it when they are
+//! left out, and another strength on the held-out windows than on the fitted ones.
+//!
+//! What is left over speaks against a name by its significance, not by whether it matters: a stand-in that explains a part `r^2` of the
+//! energy of what is really there leaves `1 - r^2` of it, however small that is. So the probability that there is something else is
+//! weighed with what is left over what the cause explained, in the channels of the cause: energy that stands out in some octave, or
+//! that of the surest aspect of what is left, whichever is more. Whether it matters decides the alarm ([`super::outcome`]) and nothing here.
 
 use crate::{
     holdout::{
@@ -22,39 +27,54 @@ use crate::{
 };
 
 /// What is left over, and how much that says against names.
-pub struct Belief {
-    /// Probability that something outside the library is needed.
-    pub unknown: f64,
-    /// Probability that a name is not a stand-in for it.
-    pub trust: f64,
+pub struct Belief<'a> {
+    left: &'a Leftover,
+    /// Per channel, energy that stands out in some octave, in squares of noise.
+    loud: &'a [f64],
+    /// Probability that every promise was kept.
+    kept: f64,
+    /// Energy of those that were not.
+    broken: f64,
 }
 
-impl Belief {
-    /// From what is left over, the energy that was explained in squares of noise, and promises: what an effect explained
-    /// and does not explain on the held-out windows is left over too.
-    pub fn of(left: &Leftover, explained: f64, promises: &[Promised]) -> Self {
-        let kept: f64 = promises.iter().map(|promised| 1.0 - promised.doubt()).product();
-        let broken: f64 = promises.iter().map(Promised::broken).sum();
-        let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * kept;
-        let energy = left.energy() + broken;
-        let unlike = energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE);
+impl<'a> Belief<'a> {
+    /// From what is left over, where it is loud, and promises: what an effect explained and does not explain on the held-out windows is
+    /// left over too.
+    pub fn of(left: &'a Leftover, loud: &'a [f64], promises: &[Promised]) -> Self {
         Self {
-            unknown,
-            trust: 1.0 - unknown * unlike,
+            left,
+            loud,
+            kept: promises.iter().map(|promised| 1.0 - promised.doubt()).product(),
+            broken: promises.iter().map(Promised::broken).sum(),
         }
     }
 
-    /// Weighs the probabilities of causes.
-    pub fn weigh(&self, causes: &mut [Cause]) {
+    /// Probability that something outside the library is needed.
+    pub fn unknown(&self) -> f64 {
+        1.0 - (1.0 - self.left.unknown(UNKNOWN_PRIOR)) * self.kept
+    }
+
+    /// Probability that an effect, which explains so much energy in these channels, is no stand-in for something else.
+    pub fn trust(&self, effect: &str, channels: &[usize], explained: f64) -> f64 {
+        let left = self.left.against(effect, channels);
+        let loud: f64 = channels.iter().map(|channel| self.loud[*channel]).sum();
+        let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * self.kept;
+        let energy = left.energy().max(loud) + self.broken;
+        1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+    }
+
+    /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise.
+    pub fn weigh(&self, causes: &mut [Cause], explained: impl Fn(&Cause) -> f64) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         for cause in causes {
+            let trust = self.trust(cause.effect, &cause.channels, explained(cause));
             let is_no_chance = 1.0 / (1.0 + ((DOUBTED - cause.gain) / DOUBT_STEP).exp());
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
             } else {
                 1.0
             };
-            cause.probability *= self.trust * is_no_chance * is_no_remainder;
+            cause.probability *= trust * is_no_chance * is_no_remainder;
         }
     }
 }
@@ -155,6 +175,7 @@ pub fn promises(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unknown::adequacy::Aspect;
 
     fn left(p: f64) -> Leftover {
         Leftover {
@@ -168,12 +189,58 @@ mod tests {
 
     #[test]
     fn a_small_misfit_of_a_large_effect_is_its_own_and_a_large_one_another_effect() {
-        let of_a_large_effect = Belief::of(&left(1e-9), 1e6, &[]);
-        let of_a_small_one = Belief::of(&left(1e-9), 3e2, &[]);
-        assert!(of_a_large_effect.unknown > 0.99 && of_a_small_one.unknown > 0.99);
-        assert!(of_a_large_effect.trust > 0.99, "{}", of_a_large_effect.trust);
-        assert!(of_a_small_one.trust < 0.4, "{}", of_a_small_one.trust);
-        assert!(Belief::of(&left(0.5), 1e3, &[]).trust > 0.94);
+        let surely = left(1e-9);
+        let belief = Belief::of(&surely, &[0.0; 2], &[]);
+        assert!(belief.unknown() > 0.99);
+        let of_a_large_effect = belief.trust("gyro-scale", &[0], 1e6);
+        let of_a_small_one = belief.trust("gyro-scale", &[0], 3e2);
+        assert!(of_a_large_effect > 0.99, "{of_a_large_effect}");
+        assert!(of_a_small_one < 0.4, "{of_a_small_one}");
+        let hardly = left(0.5);
+        assert!(Belief::of(&hardly, &[0.0; 2], &[]).trust("gyro-scale", &[0], 1e3) > 0.94);
+    }
+
+    fn aspect(channels: &[usize], effect: Option<&str>, size: f64) -> Aspect {
+        Aspect {
+            what: String::new(),
+            channels: channels.to_vec(),
+            effect: effect.map(str::to_owned),
+            size,
+        }
+    }
+
+    #[test]
+    fn what_is_left_speaks_against_an_effect_in_its_channels_and_of_its_law_only() {
+        let surely = |aspects: Vec<Aspect>| Leftover {
+            aspects,
+            scale: [3.0, 0.4],
+            ..left(1e-9)
+        };
+        let trust =
+            |left: &Leftover, channel: usize| Belief::of(left, &[0.0; 2], &[]).trust("gyro-scale", &[channel], 1e2);
+        let in_another = surely(vec![aspect(&[0], None, 12.0)]);
+        assert!(trust(&in_another, 0) < 0.2 && trust(&in_another, 1) > 0.94);
+        let of_another = surely(vec![aspect(&[0, 1], Some("lever-arm"), 12.0)]);
+        assert!(trust(&of_another, 0) > 0.94);
+        let of_its_law = surely(vec![aspect(&[0, 1], Some("gyro-scale"), 12.0)]);
+        assert!(trust(&of_its_law, 0) < 0.2);
+        let less = surely(vec![aspect(&[0], None, 12.0), aspect(&[1], None, 6.0)]);
+        assert!(trust(&less, 0) < trust(&less, 1) && trust(&less, 1) < 0.5);
+    }
+
+    #[test]
+    fn a_stand_in_that_leaves_a_tenth_of_what_it_explains_is_not_believed_however_little_that_is() {
+        let barely = Leftover {
+            aspects: vec![aspect(&[0], None, 5.0)],
+            ..left(1e-4)
+        };
+        let trust = |loud: f64| Belief::of(&barely, &[loud, 0.0], &[]).trust("current-field", &[0], 2e3);
+        assert!(
+            trust(0.0) > 0.8 && trust(200.0) < 0.4,
+            "{} {}",
+            trust(0.0),
+            trust(200.0)
+        );
     }
 
     #[test]
@@ -188,30 +255,20 @@ mod tests {
                 gain: 60.0,
             }
         };
-        let kept = Belief::of(&left(0.5), 300.0, &[promised(1.1)]);
-        assert!(
-            kept.unknown < 0.06 && kept.trust > 0.94,
-            "{} {}",
-            kept.unknown,
-            kept.trust
-        );
+        let hardly = left(0.5);
+        let judged = |promises: &[Promised]| {
+            let belief = Belief::of(&hardly, &[0.0; 2], promises);
+            (belief.unknown(), belief.trust("gyro-scale", &[0], 300.0))
+        };
+        let (unknown, trust) = judged(&[promised(1.1)]);
+        assert!(unknown < 0.06 && trust > 0.94, "{unknown} {trust}");
         let hardly_believed = Promised {
             believed: 0.1,
             ..promised(-0.2)
         };
-        let beside = Belief::of(&left(0.5), 300.0, &[promised(1.0), hardly_believed]);
-        assert!(
-            beside.unknown < 0.2 && beside.trust > 0.85,
-            "{} {}",
-            beside.unknown,
-            beside.trust
-        );
-        let broken = Belief::of(&left(0.5), 300.0, &[promised(1.0), promised(-0.2)]);
-        assert!(
-            broken.unknown > 0.99 && broken.trust < 0.15,
-            "{} {}",
-            broken.unknown,
-            broken.trust
-        );
+        let (unknown, trust) = judged(&[promised(1.0), hardly_believed]);
+        assert!(unknown < 0.2 && trust > 0.85, "{unknown} {trust}");
+        let (unknown, trust) = judged(&[promised(1.0), promised(-0.2)]);
+        assert!(unknown > 0.99 && trust < 0.15, "{unknown} {trust}");
     }
 }

@@ -3,7 +3,7 @@
 //! In: for each row what the unit does, and the energy of the gap there. Out: a sentence such as "|rate about y| above
 //! 62 deg/s: 81 % of the energy in 30 % of the time", or "throughout".
 
-use crate::thresholds::{REGIME_ENERGY, REGIME_TIME};
+use crate::thresholds::REGIME_TIME;
 use twin::predict::Feel;
 
 /// A quantity of the motion: name, unit, value.
@@ -30,7 +30,8 @@ pub fn when(feels: &[Feel], energy: &[f64]) -> String {
     if total <= 0.0 || wanted == 0 {
         return "throughout".to_owned();
     }
-    let mut best = (REGIME_ENERGY, "throughout".to_owned());
+    // Twice what evenly spread energy has there.
+    let mut best = (2.0 * REGIME_TIME, "throughout".to_owned());
     for (name, unit, value) in QUANTITIES {
         let values: Vec<f64> = feels.iter().map(value).collect();
         let mut order: Vec<usize> = (0..values.len()).collect();

@@ -15,7 +15,7 @@ use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     report::gained::gained,
-    thresholds::{HELPED, NO_GAP, REMAINS},
+    thresholds::{CHANCE, MOST_OF_EXCESS, REMAINS},
 };
 
 /// Detection limits that are printed.
@@ -119,7 +119,7 @@ fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fm
 fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
     let is_left = |channel: usize| {
         let own = &diagnosis.shrink.channels[channel];
-        own.after > REMAINS && own.after > HELPED * own.recalibrated
+        own.after > REMAINS && own.after > MOST_OF_EXCESS * own.recalibrated
     };
     let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
     repeats.map(|repeat| (repeat.channel, repeat.change)).collect()
@@ -132,7 +132,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         "GAP     {:.3} sigma where 1 is perfect; calibration and noise alone: p {:.3}{}",
         diagnosis.gap,
         diagnosis.gate.p,
-        if diagnosis.gate.p > NO_GAP && !diagnosis.causes.is_empty() {
+        if diagnosis.gate.p > CHANCE && !diagnosis.causes.is_empty() {
             ", on the whole; what is named below stands out on its own"
         } else {
             ""

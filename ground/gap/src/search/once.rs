@@ -13,7 +13,7 @@ use crate::{
     library::products::Entries,
     null::problem::Problem,
     search::interval_sums::{Piece, Touched},
-    thresholds::{LEAST_HALF, STRETCH_MARGIN},
+    thresholds::{LEAST_PART, STRETCH_MARGIN},
 };
 
 /// Instants at which an effect may begin or end.
@@ -93,7 +93,7 @@ pub fn stretch(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sig
     // One damaged sample is not something that was there for a while.
     let halves = sums(&[on_s, 0.5 * (on_s + off_s), off_s]);
     let whole = evidence(&halves[0], &halves[2]);
-    if evidence(&halves[0], &halves[1]).min(evidence(&halves[1], &halves[2])) < LEAST_HALF * whole {
+    if evidence(&halves[0], &halves[1]).min(evidence(&halves[1], &halves[2])) < LEAST_PART * whole {
         return None;
     }
     let span = Span {

@@ -16,7 +16,7 @@ use crate::{
         problem::Problem,
     },
     search::interval_sums::{Piece, Touched},
-    thresholds::{LEAST_THIRD, STRETCH_MARGIN},
+    thresholds::{LEAST_PART, STRETCH_MARGIN},
 };
 
 /// Phases into which a period is folded.
@@ -98,7 +98,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
         folded.within(on, Span { from, to })
     });
     let gains = folded.gains(parts.collect())?;
-    let is_there = gains.iter().all(|own| *own > LEAST_THIRD * gains.iter().sum::<f64>());
+    let is_there = gains.iter().all(|own| *own > LEAST_PART * gains.iter().sum::<f64>());
     (gain > STRETCH_MARGIN + price && is_there).then_some((on, gain - price))
 }
 

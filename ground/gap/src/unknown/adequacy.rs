@@ -13,7 +13,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
 use crate::{
     null::joint::{Fitted, Joint},
-    thresholds::ASPECT_SHOWN,
+    thresholds::STANDS_OUT,
 };
 
 mod aspects;
@@ -57,8 +57,10 @@ const DRAWS: usize = 20_000_000;
 pub struct Aspect {
     /// In words.
     pub what: String,
-    /// The channel it belongs to, where there is one.
-    pub channel: Option<usize>,
+    /// The channels that it is of.
+    pub channels: Vec<usize>,
+    /// The named effect whose law it is of, where it is of one.
+    pub effect: Option<String>,
     /// Standard deviations above what the model leaves, or on either side of what an effect on the scatter claims.
     pub size: f64,
 }
@@ -89,6 +91,40 @@ impl Leftover {
     /// Energy of what is left, in squares of noise: what a Gaussian of that energy is as rare as.
     pub fn energy(&self) -> f64 {
         -2.0 * self.log_p()
+    }
+
+    /// Whether it speaks for anything: with a probability above 1/e it does not ([`odds`]).
+    pub fn is_doubtful(&self) -> bool {
+        odds(self.p.ln()) < 1.0
+    }
+
+    /// What of it speaks against an effect in some channels: its largest aspect in any of these that is not of another effect's law.
+    pub fn against(&self, effect: &str, channels: &[usize]) -> Leftover {
+        let is_its = |aspect: &Aspect| match &aspect.effect {
+            Some(of) => of == effect,
+            None => aspect.channels.iter().any(|channel| channels.contains(channel)),
+        };
+        match self.aspects.iter().position(is_its) {
+            Some(0) => self.clone(),
+            None if self.aspects.is_empty() => self.clone(),
+            Some(at) => {
+                let log_tail = log_tail(self.aspects[at].size, self.scale);
+                Leftover {
+                    p: log_tail.exp(),
+                    log_tail,
+                    aspects: self.aspects[at..].to_vec(),
+                    again: None,
+                    scale: self.scale,
+                }
+            }
+            None => Leftover {
+                p: 1.0,
+                log_tail: 0.0,
+                aspects: Vec::new(),
+                again: None,
+                scale: self.scale,
+            },
+        }
     }
 
     fn log_p(&self) -> f64 {
@@ -143,10 +179,11 @@ pub fn judge(
     let mut aspects: Vec<Aspect> = (labels.iter().zip(observed))
         .map(|(label, size)| Aspect {
             what: label.what.clone(),
-            channel: label.channel,
+            channels: label.channels.clone(),
+            effect: label.effect.clone(),
             size,
         })
-        .filter(|aspect| aspect.size > ASPECT_SHOWN)
+        .filter(|aspect| aspect.size > STANDS_OUT)
         .collect();
     aspects.sort_by(|one, other| other.size.total_cmp(&one.size));
     Leftover {

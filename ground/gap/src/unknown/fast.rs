@@ -1,16 +1,15 @@
 //! What a model leaves of one channel whatever its course: energy above the floor.
 //!
 //! In: the problem, the model and the floor of each sample. Out: for each channel the mean square above the floor, in squares of sigma,
-//! with its standard deviation. White, nearly Gaussian energy is noise that is louder than described and no unknown effect; it is left out.
+//! with its standard deviation: of all frequencies together, or of the octaves that stand out of the floor, whichever is surer. Where the
+//! reference errs more than the sensor scatters, in a colour that nobody knows, only all together are looked at. White, nearly Gaussian
+//! energy is noise that is louder than described and no unknown effect; it is left out.
 
+use super::octaves;
 use crate::{
     null::{misfit::correlation_time, model::Model, problem::Problem},
-    thresholds::MISFIT_CALM,
+    thresholds::{MISFIT_CALM, NOISE_TAILS},
 };
-
-/// Excess kurtosis of a sensor's noise: a Student law of ten degrees of freedom has one, and half as far below a Gaussian's is no sum of
-/// many small things (evenly spread values have -1.2, two values -2).
-const TAILS: [f64; 2] = [-0.5, 1.0];
 
 /// What one channel holds above its floor.
 #[derive(Clone, Copy, Debug)]
@@ -51,19 +50,30 @@ fn excess(problem: &Problem, model: &Model, channel: usize, floor: &[f64], loude
     let squares = mean(&|row| problem.sigmas[channel][row].powi(2));
     let tails = rest.iter().map(|value| value.powi(4)).sum::<f64>() / count / (square * square) - 3.0;
     let alike = correlation_time(rest.as_slice(), rest.norm_squared());
-    let is_noise = tails > TAILS[0] && tails < TAILS[1] && alike < MISFIT_CALM;
+    // Half as far below a Gaussian's is no sum of many small things: evenly spread values have -1.2, two values -2.
+    let is_noise = tails > -0.5 * NOISE_TAILS && tails < NOISE_TAILS && alike < MISFIT_CALM;
     let excess = square - floor;
-    // Under nothing; and as it is.
-    let expected = floor * ((2.0 + TAILS[1]) / count).sqrt();
-    let error = square * ((2.0 + tails.max(0.0)) * alike / count).sqrt();
+    // Under nothing.
+    let expected = floor * ((2.0 + NOISE_TAILS) / count).sqrt();
     let z = (excess / expected).max(0.0);
-    Some(Fast {
+    let all = Fast {
         channel,
         excess,
         floor,
-        error,
+        // As it is.
+        error: square * ((2.0 + tails.max(0.0)) * alike / count).sqrt(),
         reference: mean(&|row| problem.instrument.fast_sigma(channel, row).powi(2)) / squares,
         log_bayes_factor: if is_noise { 0.0 } else { 0.5 * (z * z - count.ln()) },
         sigma: squares.sqrt(),
+    };
+    let by_octave = octaves::excess(rest.as_slice(), floor, NOISE_TAILS);
+    if is_noise || problem.is_limited(channel) || by_octave.log_bayes_factor < all.log_bayes_factor {
+        return Some(all);
+    }
+    Some(Fast {
+        excess: by_octave.energy / count,
+        error: by_octave.error / count,
+        log_bayes_factor: by_octave.log_bayes_factor,
+        ..all
     })
 }

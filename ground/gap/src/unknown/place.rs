@@ -45,7 +45,7 @@ pub struct Place {
     pub octaves: Vec<(String, f64)>,
     /// LMG share of what each quantity of the motion explains of the energy from row to row, most first, and the rest.
     pub regimes: Vec<(String, f64)>,
-    /// Cells that stand out at a false discovery rate of [`crate::thresholds::FALSE_CELLS`], strongest first.
+    /// Cells that stand out at a false discovery rate of [`crate::thresholds::CHANCE`], strongest first.
     pub cells: Vec<Cell>,
     /// When the gap is there, if it is not always.
     pub passage: Option<Passage>,

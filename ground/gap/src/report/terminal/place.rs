@@ -7,7 +7,7 @@ use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     report::place_shares,
-    thresholds::NO_GAP,
+    thresholds::CHANCE,
     unknown::place::{
         passage::{Instant, Passage},
         regimes::UNEXPLAINED,
@@ -33,7 +33,7 @@ pub fn places(subject: &Subject, diagnosis: &Diagnosis) -> String {
 
 /// One line of the screen; nothing where there is no gap to be anywhere.
 pub(super) fn line(text: &mut String, diagnosis: &Diagnosis) -> Result {
-    if diagnosis.gate.p > NO_GAP && diagnosis.causes.is_empty() {
+    if diagnosis.gate.p > CHANCE && diagnosis.causes.is_empty() {
         return Ok(());
     }
     let place = &diagnosis.place;
@@ -79,7 +79,7 @@ pub fn when(passage: &Passage) -> String {
 
 fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> Result {
     let place = &diagnosis.place;
-    if diagnosis.gate.p > NO_GAP && diagnosis.causes.is_empty() {
+    if diagnosis.gate.p > CHANCE && diagnosis.causes.is_empty() {
         writeln!(
             text,
             "no gap beyond calibration and noise (p {:.2}): shares are of little",

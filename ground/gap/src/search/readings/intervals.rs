@@ -20,7 +20,7 @@ use crate::{
         once,
         periodic::again,
     },
-    thresholds::PASSING_PART,
+    thresholds::LEAST_PART,
 };
 
 /// For each hypothesis that comes and goes the stretch of time in which it explains most of what a set leaves, if it is not
@@ -34,7 +34,7 @@ pub(super) fn stretches(
     gains: &mut [f64],
 ) -> Vec<Option<Interval>> {
     let model = model_of(library, set, &best.thetas);
-    let least = PASSING_PART * (best.log_evidence - nothing);
+    let least = LEAST_PART * (best.log_evidence - nothing);
     let rest = problem.residuals(&model);
     let starts_s = problem.twin.starts_s();
     let stretch = |(hypothesis, gain): (&Hypothesis, &mut f64)| {

@@ -4,7 +4,7 @@ use twin::{effect::View, predict::Kind};
 
 use crate::{
     null::calibration::instant_sigma_s,
-    thresholds::{COLOURED, ODD, ODD_TOGETHER},
+    thresholds::{COLOURED, ODD, STANDS_OUT},
 };
 
 /// [standard deviations] how far energy, tails and neighbours of a residual are from the nominal.
@@ -20,7 +20,7 @@ pub fn is_odd(channels: &[Oddness]) -> bool {
 pub fn are_odd(channels: &[Oddness]) -> bool {
     let root = (channels.len().max(1) as f64).sqrt();
     let together = |aspect: usize| channels.iter().map(|own| own[aspect]).sum::<f64>() / root;
-    (0..3).any(|aspect| together(aspect).abs() > ODD_TOGETHER)
+    (0..3).any(|aspect| together(aspect).abs() > STANDS_OUT)
 }
 
 /// How a channel's residual differs from the nominal.

@@ -127,82 +127,79 @@ impl<'a> Sights<'a> {
             of_channel.chain(levelled).collect()
         };
         for (index, view) in self.views.iter().enumerate() {
-            labels.extend(each(&view.name).into_iter().map(|what| Label {
-                what,
-                channel: Some(index),
-                is_claimed: false,
-                may_be_none: false,
-            }));
+            labels.extend(each(&view.name).into_iter().map(|what| Label::of(what, vec![index])));
         }
-        let mut of_all = Vec::new();
         for kind in 0..kinds(self.views) {
             let name = name_of(kind);
-            of_all.extend(each(&format!("{name} together")));
-            of_all.extend(["x", "y", "z"].map(|axis| format!("{name}: a common vector along {axis}")));
-            of_all.extend(COMMON.iter().flat_map(|stretches| {
+            let mut of_kind = each(&format!("{name} together"));
+            of_kind.extend(["x", "y", "z"].map(|axis| format!("{name}: a common vector along {axis}")));
+            of_kind.extend(COMMON.iter().flat_map(|stretches| {
                 ["", " along one axis"].map(|way| format!("{name}: a common vector{way} in stretches of 1/{stretches}"))
             }));
-            of_all.push(format!("{name}: outliers along a common vector"));
-            of_all.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
-            of_all.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
-            of_all.extend(BURSTS.map(|stretches| format!("{name}: noise that comes and goes in 1/{stretches}")));
+            of_kind.push(format!("{name}: outliers along a common vector"));
+            of_kind.extend(COMMON.map(|stretches| format!("{name}: a common factor in stretches of 1/{stretches}")));
+            of_kind.extend((0..STRETCHES).map(|stretch| format!("{name}: stretch {} of {STRETCHES}", stretch + 1)));
+            of_kind.extend(BURSTS.map(|stretches| format!("{name}: noise that comes and goes in 1/{stretches}")));
+            labels.extend(of_kind.into_iter().map(|what| Label::of(what, self.of_kind(kind))));
         }
-        of_all.extend(self.parts().map(|part| {
-            let names: Vec<&str> = self
-                .of_part(part)
-                .map(|channel| self.views[channel].name.as_str())
+        labels.extend(self.parts().map(|part| {
+            let channels: Vec<usize> = self.of_part(part).collect();
+            let names: Vec<&str> = channels
+                .iter()
+                .map(|channel| self.views[*channel].name.as_str())
                 .collect();
-            format!("{}: one frequency", names.join(" "))
+            Label::of(format!("{}: one frequency", names.join(" ")), channels)
         }));
-        of_all.extend(COMMON.iter().flat_map(|stretches| {
-            ["", " about one axis"]
-                .map(|way| format!("all sensors: a common rotation{way} in stretches of 1/{stretches}"))
+        labels.extend(COMMON.iter().flat_map(|stretches| {
+            ["", " about one axis"].map(|way| {
+                let what = format!("all sensors: a common rotation{way} in stretches of 1/{stretches}");
+                Label::of(what, (0..self.views.len()).collect())
+            })
         }));
-        of_all.extend(self.shared.iter().map(|shared| shared.what.clone()));
-        of_all.extend(self.strengths.iter().map(|strength| strength.what.clone()));
-        labels.extend(of_all.into_iter().map(|what| Label {
-            what,
-            channel: None,
-            is_claimed: false,
-            may_be_none: false,
+        labels.extend((self.shared.iter()).map(|shared| Label::of(shared.what.clone(), shared.channels().collect())));
+        labels.extend(self.strengths.iter().map(|strength| Label {
+            effect: Some(strength.effect.clone()),
+            ..Label::of(strength.what.clone(), strength.channels.clone())
         }));
         for channel in self.scattered {
             let view = &self.views[*channel];
+            let sizes = format!("{}: outliers have not the size that is claimed", view.name);
             labels.push(Label {
-                what: format!("{}: outliers have not the size that is claimed", view.name),
-                channel: Some(*channel),
-                is_claimed: true,
                 may_be_none: true,
+                ..Label::of(sizes, vec![*channel]).claimed()
             });
-            labels.extend(waves(view.phase.len()).into_iter().map(|length| Label {
-                what: format!(
+            labels.extend(waves(view.phase.len()).into_iter().map(|length| {
+                let what = format!(
                     "{}: waves of {length} samples have not the energy that is claimed",
                     view.name
-                ),
-                channel: Some(*channel),
-                is_claimed: true,
-                may_be_none: false,
+                );
+                Label::of(what, vec![*channel]).claimed()
             }));
         }
-        labels.extend(self.scattered_kinds().map(|kind| Label {
-            what: format!("{} go one way together", name_of(kind)),
-            channel: None,
-            is_claimed: false,
-            may_be_none: false,
+        labels.extend(
+            self.scattered_kinds()
+                .map(|kind| Label::of(format!("{} go one way together", name_of(kind)), self.of_kind(kind))),
+        );
+        labels.extend(["the size", "the distance from the sample before"].map(|what| {
+            let what = format!("outliers together have not {what} that is claimed");
+            Label {
+                may_be_none: true,
+                ..Label::of(what, self.scattered.to_vec()).claimed()
+            }
         }));
-        labels.extend(["the size", "the distance from the sample before"].map(|what| Label {
-            what: format!("outliers together have not {what} that is claimed"),
-            channel: None,
-            is_claimed: true,
-            may_be_none: true,
-        }));
-        labels.extend(coded(self.views).map(|view| Label {
-            what: format!("{}: bits that are set too often or too seldom", view.name),
-            channel: self.views.iter().position(|own| own.name == view.name),
-            is_claimed: false,
-            may_be_none: false,
+        let sends_codes = |(_, view): &(usize, &View)| view.codes.is_some();
+        labels.extend(self.views.iter().enumerate().filter(sends_codes).map(|(index, view)| {
+            let what = format!("{}: bits that are set too often or too seldom", view.name);
+            Label::of(what, vec![index])
         }));
         labels
+    }
+
+    /// The channels of a kind.
+    fn of_kind(&self, kind: usize) -> Vec<usize> {
+        (0..self.views.len())
+            .filter(|index| self.views[*index].kind == kind)
+            .collect()
     }
 
     /// The parts that there are.

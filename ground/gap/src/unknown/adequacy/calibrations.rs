@@ -91,6 +91,11 @@ impl Shared {
         })
     }
 
+    /// The channels, one as often as it has a place.
+    pub fn channels(&self) -> impl Iterator<Item = usize> {
+        self.places.iter().map(|(channel, _, _)| *channel)
+    }
+
     /// The square of what they share.
     pub fn sum(&self, fitted: &Fitted) -> f64 {
         let found = |(channel, place, by): &(usize, usize, Vector3<f64>)| by * fitted.nuisance[*channel][*place];

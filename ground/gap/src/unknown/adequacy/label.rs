@@ -8,8 +8,10 @@ pub const OF_CALIBRATION: &str = "a calibration beyond its sigmas";
 pub struct Label {
     /// In words.
     pub what: String,
-    /// The channel it belongs to, where there is one.
-    pub channel: Option<usize>,
+    /// The channels that it is of.
+    pub channels: Vec<usize>,
+    /// The named effect whose law it is of, where it is of one.
+    pub effect: Option<String>,
     /// Whether a named effect claims as much: then less speaks against it too.
     pub is_claimed: bool,
     /// Whether it is a mean over what may not be there at all, and then is zero.
@@ -17,6 +19,25 @@ pub struct Label {
 }
 
 impl Label {
+    /// Of some channels, claimed by nothing.
+    pub fn of(what: String, channels: Vec<usize>) -> Self {
+        Label {
+            what,
+            channels,
+            effect: None,
+            is_claimed: false,
+            may_be_none: false,
+        }
+    }
+
+    /// The same, claimed by an effect on the scatter.
+    pub fn claimed(self) -> Self {
+        Label {
+            is_claimed: true,
+            ..self
+        }
+    }
+
     /// Whether it is an energy that a named effect claims.
     pub fn is_energy_claimed(&self) -> bool {
         self.is_claimed && !self.may_be_none

@@ -83,7 +83,10 @@ fn judged(change: impl Fn(usize, &mut DVector<f64>)) -> Leftover {
 
 /// The channel that stands out most.
 fn first_channel(left: &Leftover) -> Option<usize> {
-    left.aspects.iter().find_map(|aspect| aspect.channel)
+    left.aspects.iter().find_map(|aspect| match aspect.channels[..] {
+        [channel] => Some(channel),
+        _ => None,
+    })
 }
 
 #[test]

@@ -29,7 +29,10 @@ const APART: f64 = 1e-6;
 pub struct Strength {
     /// In words.
     pub what: String,
-    channels: Vec<usize>,
+    /// The effect.
+    pub effect: String,
+    /// The channels that it touches.
+    pub channels: Vec<usize>,
     along: Along,
 }
 
@@ -77,6 +80,7 @@ impl Strength {
         let channels: Vec<usize> = entries.iter().map(|(channel, _)| *channel).collect();
         let strength = |how: String, along: Along| Strength {
             what: format!("{}: its strength changes {how}", suspect.name),
+            effect: suspect.name.clone(),
             channels: channels.clone(),
             along,
         };

@@ -1,7 +1,7 @@
 //! Cells of the log that stand out: a channel, a stretch of time, a regime of the motion.
 //!
 //! In: residuals in units of noise, of the log and of logs simulated from the model. Out: [`Cell`]s whose energy noise and
-//! calibration do not explain, at a false discovery rate of [`FALSE_CELLS`] over all cells together (Benjamini and Hochberg
+//! calibration do not explain, at a false discovery rate of [`CHANCE`] over all cells together (Benjamini and Hochberg
 //! 1995; cells that overlap depend on each other positively, for which it holds, Benjamini and Yekutieli 2001).
 //!
 //! The cube root of a cell's energy is near Gaussian (Wilson and Hilferty 1931); it is put in units of its spread over
@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use statrs::function::erf::erfc;
 use twin::predict::{Feel, UnitDescription};
 
-use crate::{null::problem::Problem, thresholds::FALSE_CELLS};
+use crate::{null::problem::Problem, thresholds::CHANCE};
 
 /// Stretches of time.
 const STRETCHES: usize = 10;
@@ -121,7 +121,7 @@ impl Layout {
             .map(|cell| size(observed[*cell], simulated.iter().map(|sums| sums[*cell])))
             .collect();
         let chances: Vec<f64> = sizes.iter().map(|size| upper_tail(*size)).collect();
-        let mut found: Vec<Cell> = discoveries(&chances, FALSE_CELLS)
+        let mut found: Vec<Cell> = discoveries(&chances, CHANCE)
             .into_iter()
             .map(|at| self.named(unit, looked_at[at], sizes[at], chances[at]))
             .collect();
@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn nothing_is_discovered_among_even_chances() {
         let chances: Vec<f64> = (1..=1000).map(|k| f64::from(k) / 1000.0).collect();
-        assert!(discoveries(&chances, FALSE_CELLS).is_empty());
+        assert!(discoveries(&chances, CHANCE).is_empty());
     }
 
     #[test]

@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use crate::{
     input::windows::Span,
     null::problem::Problem,
-    thresholds::{MOST_OF_EXCESS, PASSAGE_MARGIN, PASSAGE_QUIET},
+    thresholds::{MOST_OF, MOST_OF_EXCESS, STRETCH_MARGIN},
 };
 
 /// Stretches that the fit windows are cut into.
@@ -130,7 +130,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
             if is_all || count <= 0.0 || outside_count <= 0.0 {
                 continue;
             }
-            let is_quiet_outside = outside_energy / outside_count < PASSAGE_QUIET * energy / count;
+            let is_quiet_outside = outside_energy / outside_count < MOST_OF * energy / count;
             if is_quiet_outside {
                 let gain = (fit(energy, count) + fit(outside_energy, outside_count) - always) / spread;
                 gains.push((from, to, gain));
@@ -138,7 +138,9 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
         }
     }
     let (from, to, most) = gains.iter().copied().max_by(|one, other| one.2.total_cmp(&other.2))?;
-    if most < PASSAGE_MARGIN {
+    // The price of having compared so many pairs of edges.
+    let pairs = (length * (length + 1) / 2) as f64;
+    if most < pairs.ln() + STRETCH_MARGIN {
         return None;
     }
     let near = || gains.iter().filter(|(_, _, gain)| *gain > most - PROFILE);
