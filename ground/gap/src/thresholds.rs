@@ -183,15 +183,15 @@ thresholds! {
         larger: "more cells, more of them chance; shares of weak gaps are not printed; smaller sets",
         smaller: "fewer cells; shares of noise are printed; larger sets",
         Convention("one in twenty");
-    /// Part from which something is most of a whole: an effect's energy in one block, which is then an event that other blocks cannot predict; and of the mean inside a passage, which the mean outside it must stay below.
-    MOST_OF: f64 = 0.5, in "part",
-        larger: "events are held to other blocks; gaps that only vary get a time",
-        smaller: "effects escape cross-validation; passages are missed",
-        Convention("half");
-    /// Share of the excess that the channels looked at, or named for an unexplained gap, hold together; and of a recalibrated channel's held-out gap that an effect which helps it may leave.
+    /// Of the mean inside a passage, what the mean outside it must stay below.
+    PASSAGE_QUIET: f64 = 0.5, in "part",
+        larger: "gaps that only vary get a time",
+        smaller: "passages are missed",
+        Assumed("less is a gap that varies");
+    /// Share of the excess that the channels looked at, or named for an unexplained gap, hold together.
     MOST_OF_EXCESS: f64 = 0.8, in "share",
-        larger: "more channels are named, fewer are reported as left",
-        smaller: "fewer channels are named, more are reported as left",
+        larger: "more channels are named",
+        smaller: "fewer channels are named",
         Convention("four fifths");
     /// Sigmas of the reference or the field below which a slow remainder may be theirs.
     REFERENCE_SIGMAS: f64 = 2.0, in "sigmas",
@@ -209,6 +209,11 @@ thresholds! {
         smaller: "fewer do",
         Assumed("what the filter of the unit takes to come back to gravity and field");
     // Step 6, hold
+    /// Share of an effect's energy in one block from which it counts as an event, which other blocks cannot predict.
+    EVENT: f64 = 0.5, in "share",
+        larger: "events are held to other blocks",
+        smaller: "effects escape cross-validation",
+        Convention("most of it");
     /// Difference by which recalibration and an effect shrink a gap as much.
     SAME_SHRINK: f64 = 0.01, in "part of the gap",
         larger: "effects that recalibration beats are kept",
@@ -292,6 +297,11 @@ thresholds! {
         larger: "fewer channels are reported as left",
         smaller: "more",
         Derived("one in ten million");
+    /// Part of a recalibrated channel's held-out gap that an effect which helps it may leave.
+    HELPED: f64 = 0.8, in "part",
+        larger: "fewer channels are reported as left",
+        smaller: "more channels are reported as left",
+        Assumed("a fifth of a gap is help");
 }
 
 #[cfg(test)]

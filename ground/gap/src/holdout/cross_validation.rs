@@ -20,7 +20,7 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
-    thresholds::{EFFECT_MARGIN, MOST_OF},
+    thresholds::{EFFECT_MARGIN, EVENT},
 };
 
 /// Blocks, each left out in turn.
@@ -110,7 +110,7 @@ fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &
         }
     }
     let most = energies.iter().copied().fold(0.0, f64::max);
-    most > MOST_OF * energies.iter().sum::<f64>()
+    most > EVENT * energies.iter().sum::<f64>()
 }
 
 /// The errors on each block, left out of the fit, channel by channel.

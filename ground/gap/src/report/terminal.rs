@@ -15,7 +15,7 @@ use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     report::gained::gained,
-    thresholds::{CHANCE, MOST_OF_EXCESS, REMAINS},
+    thresholds::{CHANCE, HELPED, REMAINS},
 };
 
 /// Detection limits that are printed.
@@ -119,7 +119,7 @@ fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fm
 fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
     let is_left = |channel: usize| {
         let own = &diagnosis.shrink.channels[channel];
-        own.after > REMAINS && own.after > MOST_OF_EXCESS * own.recalibrated
+        own.after > REMAINS && own.after > HELPED * own.recalibrated
     };
     let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
     repeats.map(|repeat| (repeat.channel, repeat.change)).collect()

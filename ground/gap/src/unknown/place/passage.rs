@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use crate::{
     input::windows::Span,
     null::problem::Problem,
-    thresholds::{MOST_OF, MOST_OF_EXCESS, STRETCH_MARGIN},
+    thresholds::{MOST_OF_EXCESS, PASSAGE_QUIET, STRETCH_MARGIN},
 };
 
 /// Stretches that the fit windows are cut into.
@@ -130,7 +130,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
             if is_all || count <= 0.0 || outside_count <= 0.0 {
                 continue;
             }
-            let is_quiet_outside = outside_energy / outside_count < MOST_OF * energy / count;
+            let is_quiet_outside = outside_energy / outside_count < PASSAGE_QUIET * energy / count;
             if is_quiet_outside {
                 let gain = (fit(energy, count) + fit(outside_energy, outside_count) - always) / spread;
                 gains.push((from, to, gain));
