@@ -54,8 +54,9 @@ impl<'a> Belief<'a> {
         1.0 - (1.0 - self.left.unknown(UNKNOWN_PRIOR)) * self.kept
     }
 
-    /// Probability that an effect, which explains so much energy in these channels, is no stand-in for something else.
-    pub fn trust(&self, effect: &str, channels: &[usize], explained: f64) -> f64 {
+    /// Probability that an effect, which explains so much energy in these channels, is no stand-in for something else; of an explanation as
+    /// a whole where none is given, whose effects answer for their own laws.
+    pub fn trust(&self, effect: Option<&str>, channels: &[usize], explained: f64) -> f64 {
         let left = self.left.against(effect, channels);
         let loud: f64 = channels.iter().map(|channel| self.loud[*channel]).sum();
         let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * self.kept;
@@ -67,7 +68,7 @@ impl<'a> Belief<'a> {
     pub fn weigh(&self, causes: &mut [Cause], explained: impl Fn(&Cause) -> f64) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         for cause in causes {
-            let trust = self.trust(cause.effect, &cause.channels, explained(cause));
+            let trust = self.trust(Some(cause.effect), &cause.channels, explained(cause));
             let is_no_chance = 1.0 / (1.0 + ((DOUBTED - cause.gain) / DOUBT_STEP).exp());
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
@@ -192,12 +193,12 @@ mod tests {
         let surely = left(1e-9);
         let belief = Belief::of(&surely, &[0.0; 2], &[]);
         assert!(belief.unknown() > 0.99);
-        let of_a_large_effect = belief.trust("gyro-scale", &[0], 1e6);
-        let of_a_small_one = belief.trust("gyro-scale", &[0], 3e2);
+        let of_a_large_effect = belief.trust(Some("gyro-scale"), &[0], 1e6);
+        let of_a_small_one = belief.trust(Some("gyro-scale"), &[0], 3e2);
         assert!(of_a_large_effect > 0.99, "{of_a_large_effect}");
         assert!(of_a_small_one < 0.4, "{of_a_small_one}");
         let hardly = left(0.5);
-        assert!(Belief::of(&hardly, &[0.0; 2], &[]).trust("gyro-scale", &[0], 1e3) > 0.94);
+        assert!(Belief::of(&hardly, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 1e3) > 0.94);
     }
 
     fn aspect(channels: &[usize], effect: Option<&str>, size: f64) -> Aspect {
@@ -216,8 +217,9 @@ mod tests {
             scale: [3.0, 0.4],
             ..left(1e-9)
         };
-        let trust =
-            |left: &Leftover, channel: usize| Belief::of(left, &[0.0; 2], &[]).trust("gyro-scale", &[channel], 1e2);
+        let trust = |left: &Leftover, channel: usize| {
+            Belief::of(left, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[channel], 1e2)
+        };
         let in_another = surely(vec![aspect(&[0], None, 12.0)]);
         assert!(trust(&in_another, 0) < 0.2 && trust(&in_another, 1) > 0.94);
         let of_another = surely(vec![aspect(&[0, 1], Some("lever-arm"), 12.0)]);
@@ -234,7 +236,7 @@ mod tests {
             aspects: vec![aspect(&[0], None, 5.0)],
             ..left(1e-4)
         };
-        let trust = |loud: f64| Belief::of(&barely, &[loud, 0.0], &[]).trust("current-field", &[0], 2e3);
+        let trust = |loud: f64| Belief::of(&barely, &[loud, 0.0], &[]).trust(Some("current-field"), &[0], 2e3);
         assert!(
             trust(0.0) > 0.8 && trust(200.0) < 0.4,
             "{} {}",
@@ -258,7 +260,7 @@ mod tests {
         let hardly = left(0.5);
         let judged = |promises: &[Promised]| {
             let belief = Belief::of(&hardly, &[0.0; 2], promises);
-            (belief.unknown(), belief.trust("gyro-scale", &[0], 300.0))
+            (belief.unknown(), belief.trust(Some("gyro-scale"), &[0], 300.0))
         };
         let (unknown, trust) = judged(&[promised(1.1)]);
         assert!(unknown < 0.06 && trust > 0.94, "{unknown} {trust}");

@@ -76,7 +76,7 @@ impl Believed {
             promises,
             trust: match explanation.found.chosen.is_empty() {
                 true => 1.0 - belief.unknown(),
-                false => belief.trust("", &(0..problem.frames.len()).collect::<Vec<_>>(), whole),
+                false => belief.trust(None, &(0..problem.frames.len()).collect::<Vec<_>>(), whole),
             },
         }
     }

@@ -99,15 +99,17 @@ impl Leftover {
     }
 
     /// What of it speaks against an effect in some channels: its largest aspect in any of these that is not of another effect's law.
-    pub fn against(&self, effect: &str, channels: &[usize]) -> Leftover {
+    /// Aspects below [`STANDS_OUT`] are not kept; where none is, all that is left speaks, and says little.
+    pub fn against(&self, effect: Option<&str>, channels: &[usize]) -> Leftover {
         let is_its = |aspect: &Aspect| match &aspect.effect {
-            Some(of) => of == effect,
+            Some(of) => Some(of.as_str()) == effect,
             None => aspect.channels.iter().any(|channel| channels.contains(channel)),
         };
         match self.aspects.iter().position(is_its) {
             Some(0) => self.clone(),
             None if self.aspects.is_empty() => self.clone(),
             Some(at) => {
+                // The law of the largest of all aspects, which the largest of some stays below: this says too little rather than too much.
                 let log_tail = log_tail(self.aspects[at].size, self.scale);
                 Leftover {
                     p: log_tail.exp(),

@@ -1,8 +1,8 @@
 //! Energy by octave of frequency, with nothing lost between them.
 //!
 //! In: a series in the order of its rows. Out: the energy of each octave, from half the sampling rate downwards, and of all
-//! that is below the last; and what of it is above noise ([`excess`]). The octaves are those of the orthonormal Haar wavelet (Percival and Walden, "Wavelet methods for
-//! time series analysis", 2000, chapter 4), whose energies add up to that of the series exactly; they overlap in frequency
+//! that is below the last; and what of it is above noise ([`excess`]). The octaves are those of the orthonormal Haar wavelet
+//! (Percival and Walden, "Wavelet methods for time series analysis", 2000, chapter 4), whose energies add up to that of the series exactly; they overlap in frequency
 //! like a filter of two taps, so a tone also shows in the neighbours of its octave.
 //!
 //! A hole in the series is passed over: its neighbours are taken as consecutive.
