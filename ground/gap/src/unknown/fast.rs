@@ -5,7 +5,7 @@
 //! reference errs more than the sensor scatters, in a colour that nobody knows, only all together are looked at. White, nearly Gaussian
 //! energy is noise that is louder than described and no unknown effect; it is left out.
 
-use super::octaves;
+use super::octaves::{self, Excess};
 use crate::{
     null::{misfit::correlation_time, model::Model, problem::Problem},
     thresholds::{MISFIT_CALM, NOISE_TAILS},
@@ -48,32 +48,73 @@ fn excess(problem: &Problem, model: &Model, channel: usize, floor: &[f64], loude
     let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row as usize)).sum::<f64>() / count;
     let floor = mean(&|row| floor[row]);
     let squares = mean(&|row| problem.sigmas[channel][row].powi(2));
+    let above = above(rest.as_slice(), floor, !problem.is_limited(channel));
+    Some(Fast {
+        channel,
+        excess: above.energy / count,
+        floor,
+        error: above.error / count,
+        reference: mean(&|row| problem.instrument.fast_sigma(channel, row).powi(2)) / squares,
+        log_bayes_factor: above.log_bayes_factor,
+        sigma: squares.sqrt(),
+    })
+}
+
+/// What residuals in sigmas hold above a floor; octave by octave too where it `is_flat`.
+fn above(rest: &[f64], floor: f64, is_flat: bool) -> Excess {
+    let count = rest.len() as f64;
+    let energy: f64 = rest.iter().map(|value| value * value).sum();
+    let square = energy / count;
     let tails = rest.iter().map(|value| value.powi(4)).sum::<f64>() / count / (square * square) - 3.0;
-    let alike = correlation_time(rest.as_slice(), rest.norm_squared());
+    let alike = correlation_time(rest, energy);
     // Half as far below a Gaussian's is no sum of many small things: evenly spread values have -1.2, two values -2.
     let is_noise = tails > -0.5 * NOISE_TAILS && tails < NOISE_TAILS && alike < MISFIT_CALM;
-    let excess = square - floor;
     // Under nothing.
     let expected = floor * ((2.0 + NOISE_TAILS) / count).sqrt();
-    let z = (excess / expected).max(0.0);
-    let all = Fast {
-        channel,
-        excess,
-        floor,
+    let z = ((square - floor) / expected).max(0.0);
+    let all = Excess {
+        energy: energy - count * floor,
         // As it is.
-        error: square * ((2.0 + tails.max(0.0)) * alike / count).sqrt(),
-        reference: mean(&|row| problem.instrument.fast_sigma(channel, row).powi(2)) / squares,
+        error: energy * ((2.0 + tails.max(0.0)) * alike / count).sqrt(),
         log_bayes_factor: if is_noise { 0.0 } else { 0.5 * (z * z - count.ln()) },
-        sigma: squares.sqrt(),
     };
-    let by_octave = octaves::excess(rest.as_slice(), floor, NOISE_TAILS);
-    if is_noise || problem.is_limited(channel) || by_octave.log_bayes_factor < all.log_bayes_factor {
-        return Some(all);
+    if is_noise || !is_flat {
+        return all;
     }
-    Some(Fast {
-        excess: by_octave.energy / count,
-        error: by_octave.error / count,
-        log_bayes_factor: by_octave.log_bayes_factor,
-        ..all
-    })
+    let by_octave = octaves::excess(rest, floor, NOISE_TAILS);
+    if by_octave.log_bayes_factor < all.log_bayes_factor {
+        all
+    } else {
+        by_octave
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+    use super::*;
+
+    /// White noise of this sigma, and a sine of this amplitude.
+    fn noise_and(sigma: f64, amplitude: f64) -> Vec<f64> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let noise = |random: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(random) };
+        (0..1500)
+            .map(|k| sigma * noise(&mut random) + amplitude * (f64::from(k) * 0.1).sin())
+            .collect()
+    }
+
+    #[test]
+    fn a_tone_too_weak_for_the_whole_stands_out_of_its_octave_where_the_floor_is_flat() {
+        let hummed = noise_and(1.0, 0.5);
+        let (by_octave, whole) = (above(&hummed, 1.0, true), above(&hummed, 1.0, false));
+        assert!(by_octave.log_bayes_factor > 10.0, "{by_octave:?}");
+        assert!(whole.log_bayes_factor < 3.0, "{whole:?}");
+    }
+
+    #[test]
+    fn noise_that_is_louder_than_described_is_nothing_unknown() {
+        assert_eq!(above(&noise_and(1.5, 0.0), 1.0, true).log_bayes_factor, 0.0);
+    }
 }

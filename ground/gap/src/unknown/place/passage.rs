@@ -172,6 +172,9 @@ fn dispersion(energies: &[f64], counts: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use rand_distr::{ChiSquared, Distribution};
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
     use super::*;
 
     fn energies(level: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>) {
@@ -206,6 +209,20 @@ mod tests {
     fn a_gap_that_varies_is_no_passage() {
         let (energies, counts) = energies(|k| if k >= 30 { 5.0 } else { 3.5 });
         assert_eq!(passage(&energies, &counts), None);
+    }
+
+    #[test]
+    fn of_many_pairs_of_edges_the_best_in_noise_is_no_passage() {
+        let found = (0..200).filter(|seed| {
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(*seed);
+            let energies: Vec<f64> = ChiSquared::new(4.0)
+                .expect("a law")
+                .sample_iter(&mut random)
+                .take(STRETCHES)
+                .collect();
+            passage(&energies, &[4.0; STRETCHES]).is_some()
+        });
+        assert_eq!(found.count(), 0);
     }
 
     #[test]
