@@ -70,6 +70,8 @@ pub enum Command {
     Status,
     /// Report firmware version and board.
     Version,
+    /// Leave safe mode: estimate again, take every command.
+    LeaveSafeMode,
     /// List the words.
     Help,
     /// Derived frames on.
@@ -95,7 +97,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 20] = [
+pub const COMMANDS: [Entry; 21] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(b"G_MT", Command::SendPackets, "WAIT: packets to the umbilical"),
@@ -128,6 +130,7 @@ pub const COMMANDS: [Entry; 20] = [
     entry(b"G_MG", Command::Record, "FLIGHT: record packets"),
     entry(b"G_ST", Command::Status, "status"),
     entry(b"G_VE", Command::Version, "version"),
+    entry(b"G_XN", Command::LeaveSafeMode, "leave safe mode"),
     entry(b"G_HE", Command::Help, "this list"),
     entry(b"G_DL", Command::DerivedOn, "derived frames on"),
     entry(b"G_DX", Command::DerivedOff, "derived frames off"),

@@ -203,6 +203,7 @@ impl State {
             Command::Flight => self.enter(Mode::Flight),
             Command::Wait => self.enter(Mode::Wait),
             Command::Status | Command::Version | Command::Help => Verdict::Done(Action::Report(command)),
+            Command::LeaveSafeMode => Verdict::Done(Action::None),
             Command::DerivedOn | Command::DerivedOff => {
                 self.derived = command == Command::DerivedOn;
                 Verdict::Done(Action::None)

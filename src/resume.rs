@@ -81,7 +81,16 @@ pub struct Starts {
     pub without_health: u16,
 }
 
+/// Starts that ended within a minute each; the next one is in safe mode.
+const FAILED_STARTS: u16 = 3;
+
 impl Starts {
+    /// Whether this start reads, sends and records only: whatever ended the ones before is left out, if it was the estimation
+    /// or a command.
+    pub fn ask_for_safe_mode(&self) -> bool {
+        self.without_health > FAILED_STARTS
+    }
+
     /// One more start; keeps and returns it. The first thing a unit does: whatever it does next may end in a reset.
     pub fn count(memory: &mut impl Retained) -> Self {
         let before = Starts::recall(memory).unwrap_or_default();

@@ -20,7 +20,7 @@ use rand_xoshiro::{
 const BYTE_US: u64 = 87;
 
 /// Each word and what it reads of the unit, and writes to it, on the page of threats. None names an address.
-const REACH: [(&str, &str, &str); 20] = [
+const REACH: [(&str, &str, &str); 21] = [
     ("G_MV", "nothing", "mode"),
     ("G_ME", "nothing", "mode"),
     ("G_MT", "packets", "task"),
@@ -37,6 +37,7 @@ const REACH: [(&str, &str, &str); 20] = [
     ("G_MG", "nothing", "recording"),
     ("G_ST", "status", "nothing"),
     ("G_VE", "version", "nothing"),
+    ("G_XN", "nothing", "safe mode off"),
     ("G_HE", "the list of words", "nothing"),
     ("G_DL", "derived frames", "derived frames on"),
     ("G_DX", "nothing", "derived frames off"),

@@ -24,6 +24,8 @@ impl Health {
     pub const RECONFIGURED: Health = Health(1 << 23);
     /// The crystal did not start: the unit's time is off by up to 8 %.
     pub const INTERNAL_OSCILLATOR: Health = Health(1 << 24);
+    /// Safe mode: nothing is estimated.
+    pub const SAFE_MODE: Health = Health(1 << 25);
 
     /// With these bits set too. Bits 0 to 15 are the packet's error identifier.
     pub fn with(self, more: Health) -> Health {

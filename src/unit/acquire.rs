@@ -27,13 +27,16 @@ use crate::{
     geometry::PLATES,
     increments::forces::{self, READINGS},
     packet,
-    resume::Resume,
+    resume::{Resume, Starts},
     sample::{Kind, NO_SLOT, NOT_READ, Reading, SENSOR_COUNT, SENSORS, Sample, Sensor},
     sensor::tca9548a::Switch,
 };
 
 /// [ms] after power-on until the gyros answer (ADIS16265 data sheet, Table 1: 220 ms).
 const GYRO_START_MS: u64 = 250;
+
+/// Cycles closed until then make a start a healthy one: the count of those that were not begins anew.
+const HEALTHY: Instant = Instant::from_secs(60);
 
 /// What is known of a sensor.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -87,7 +90,7 @@ pub async fn run<B: Board>(
     votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
     acquisition.cycle(counter, start).await;
     start += period / 4;
-    let mut verified = 0;
+    let (mut verified, mut healthy) = (0, false);
     loop {
         votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
         let cycle = acquisition.cycle(counter, start).await;
@@ -103,6 +106,14 @@ pub async fn run<B: Board>(
             next_counter: counter,
         };
         resume.keep(&mut *memory.borrow_mut());
+        if !healthy && start >= HEALTHY {
+            healthy = true;
+            let starts = Starts {
+                without_health: 0,
+                ..shared.start.starts
+            };
+            starts.keep(&mut *memory.borrow_mut());
+        }
         start += period;
         let limit_us = acquisition.budget.limit_us(0, 0, true);
         if now() + Duration::from_micros(2 * limit_us) < start {

@@ -40,13 +40,20 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
     if shared.set_loaded.take() {
         estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
     }
-    go_on(shared, estimator, &*memory.borrow(), &mut kept);
+    if shared.safe.get() {
+        // It may be what ended the starts before; and once it is older than one start, nobody knows how old it is.
+        ATTITUDE.forget(&mut *memory.borrow_mut());
+    } else {
+        go_on(shared, estimator, &*memory.borrow(), &mut kept);
+    }
     loop {
         let next = select(cycles.next_message_pure(), shared.force.wait());
         let cycle = match votes.waiting(Voter::Estimate, next).await {
             Either::First(cycle) => cycle,
             Either::Second((counter, force)) => {
-                estimator.take_force(counter, &force);
+                if !shared.safe.get() {
+                    estimator.take_force(counter, &force);
+                }
                 continue;
             }
         };
@@ -59,6 +66,12 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
                 Health::INTERNAL_OSCILLATOR,
                 shared.start.oscillator == Oscillator::Internal,
             );
+        if shared.safe.get() {
+            let health = health.with(Health::SAFE_MODE);
+            let start = shared.start.in_short();
+            shared.publish_derived(derive(&cycle, state, health, start, 0, Estimate::NOTHING));
+            continue;
+        }
         if shared.set_loaded.take() {
             estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
         }

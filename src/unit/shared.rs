@@ -122,6 +122,8 @@ pub struct Shared {
     pub settings: Settings,
     /// What the board says of this start.
     pub start: Start,
+    /// Safe mode: nothing is estimated, and of commands only those that ask are taken.
+    pub safe: Cell<bool>,
     /// Mode, task, confirmations.
     pub state: RefCell<State>,
     /// The gyros' running integration.
@@ -185,6 +187,7 @@ impl Shared {
             clock: Clock::new(),
             settings,
             state: RefCell::new(State::resumed(start.resume)),
+            safe: Cell::new(start.starts.ask_for_safe_mode()),
             start,
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
             discretes: Cell::default(),

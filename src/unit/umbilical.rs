@@ -41,6 +41,12 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
         env!("CARGO_PKG_VERSION"),
         shared.start.reset
     ));
+    if shared.safe.get() {
+        let starts = shared.start.starts.without_health;
+        shared.say(format_args!(
+            "SAFE MODE: start {starts} without a minute of health; no estimation, no commands; G_XN leaves it"
+        ));
+    }
     loop {
         let next = select4(
             shared.replies.receive(),
@@ -112,6 +118,17 @@ async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) 
             ));
         }
     };
+    if command == Command::LeaveSafeMode {
+        let safe = if shared.safe.take() { "left" } else { "was not on" };
+        return shared.say(format_args!("G_XN ok: safe mode {safe}"));
+    }
+    let only_asks = matches!(command, Command::Status | Command::Version | Command::Help);
+    if shared.safe.get() && !only_asks {
+        return shared.say(format_args!(
+            "{} no: safe mode, G_XN leaves it",
+            Printable(word_of(command))
+        ));
+    }
     let verdict = shared.change(Cause::Command, |state| state.command(command, now().as_micros()));
     let word = Printable(word_of(command));
     if let (Verdict::Confirm(_), Command::LoadSet) = (verdict, command)
@@ -161,7 +178,7 @@ fn status(shared: &Shared) {
     let recorder = shared.recorder.get();
     let resets = shared.start.resets();
     shared.say(format_args!(
-        "G_ST {} task {} recording {} derived {}",
+        "G_ST {} task {} recording {} derived {}{}",
         state.mode.name(),
         match state.task {
             Task::Idle => "none",
@@ -169,7 +186,8 @@ fn status(shared: &Shared) {
             Task::Dump { .. } => "G_Ml",
         },
         u8::from(state.recording),
-        u8::from(state.derived)
+        u8::from(state.derived),
+        if shared.safe.get() { " SAFE MODE" } else { "" }
     ));
     shared.say(format_args!(
         "G_ST lift-off {} micro-g {} errors {:04X} noise {} lost {}",
