@@ -1,7 +1,10 @@
-//! `ground size`: what a firmware image takes of flash and RAM, against ceilings.
+//! `ground size`: what a firmware image takes of flash and RAM, and in how many places it may panic, against ceilings.
 //!
 //! In: an ELF file. Out: text, data and bss in bytes, as `size` counts them: text is all that is only read, data what is
-//! copied from flash to RAM at start, bss what is cleared. Refuses a file that is no ELF, and one over a ceiling.
+//! copied from flash to RAM at start, bss what is cleared; and the places that may panic, by why (panics.rs). Refuses a
+//! file that is no ELF, and one over a ceiling.
+
+mod panics;
 
 use std::path::PathBuf;
 
@@ -18,6 +21,9 @@ pub struct Arguments {
     /// Bytes of RAM it may take (data and bss)
     #[arg(long, default_value_t = u64::MAX, hide_default_value = true)]
     ram_ceiling: u64,
+    /// Places that may panic
+    #[arg(long, default_value_t = u64::MAX, hide_default_value = true)]
+    panic_ceiling: u64,
 }
 
 /// Why an image is refused.
@@ -29,10 +35,10 @@ pub enum SizeError {
     /// It is no ELF file.
     #[error("{0}: {1}")]
     Parse(PathBuf, object::read::Error),
-    /// It is too large.
-    #[error("{what} takes {bytes} bytes of {ceiling}")]
+    /// It has too much of something.
+    #[error("{what} takes {bytes} of {ceiling}")]
     Ceiling {
-        /// Which memory.
+        /// What.
         what: &'static str,
         /// What the image takes.
         bytes: u64,
@@ -63,8 +69,18 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
         text + data,
         data + bss
     );
+    let panics = panics::sites(&bytes).map_err(|error| SizeError::Parse(path.clone(), error))?;
+    let sites = panics.values().sum();
+    let mut by_kind: Vec<_> = panics.into_iter().collect();
+    by_kind.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), name.clone()));
+    let by_kind: Vec<String> = by_kind
+        .into_iter()
+        .map(|(name, count)| format!("{count} {}", name.trim_start_matches("panic_const_").replace('_', " ")))
+        .collect();
+    println!("places that may panic {sites}: {}", by_kind.join(", "));
     below("flash", text + data, arguments.flash_ceiling)?;
-    below("static RAM", data + bss, arguments.ram_ceiling)
+    below("static RAM", data + bss, arguments.ram_ceiling)?;
+    below("the image in places that may panic", sites, arguments.panic_ceiling)
 }
 
 fn below(what: &'static str, bytes: u64, ceiling: u64) -> Result<(), SizeError> {
@@ -105,7 +121,7 @@ mod tests {
         assert!(sizes(b"not an image").is_err());
         assert!(below("flash", 10, 10).is_ok());
         let refused = below("flash", 11, 10).map_err(|error| error.to_string());
-        assert_eq!(refused, Err("flash takes 11 bytes of 10".into()));
+        assert_eq!(refused, Err("flash takes 11 of 10".into()));
     }
 
     #[test]
