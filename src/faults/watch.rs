@@ -165,7 +165,7 @@ impl Watch {
     /// Is no longer believed. A learned offset that has crept beyond what is allowed is given up with it.
     pub(super) fn exclude(&mut self, verdict: Verdict) {
         if !self.excluded() {
-            self.relapses = (self.relapses + 1).min(6);
+            self.relapses = self.relapses.saturating_add(1).min(6);
             let most = OFFSET_LIMIT * root(self.allowed);
             self.offset = if self.offset.abs() < most { self.offset } else { 0.0 };
         }

@@ -329,7 +329,7 @@ impl<N: Nand> FlightLog<N> {
                 continue;
             }
             self.chip.read(at, &mut self.back)?;
-            for (half, key) in self.whole_records().into_iter().enumerate() {
+            for (half, key) in [0, 1].into_iter().zip(self.whole_records()) {
                 let Some(key) = key else { continue };
                 self.superblock.boot = self.superblock.boot.max(key.boot);
                 let bytes = page::record(&self.back, half);

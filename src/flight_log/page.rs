@@ -110,7 +110,7 @@ pub fn stamp(spare: &SpareBytes, at: PageAddress) -> Stamp {
     if zeros(spare) <= STRAY_ZEROS / 3 {
         return Stamp::Blank;
     }
-    let mut bytes = TAG.map(|column| spare[column]);
+    let mut bytes = TAG.map(|column| spare.get(column).copied().unwrap_or(0xFF));
     if !fits(&bytes, at.page) {
         // The CRC-16 tells any two single-bit errors in nine bytes apart (its distance is 4 up to 4 KiB).
         let Some(bit) = (0..8 * TAG.len()).find(|bit| fits(&flipped(bytes, *bit), at.page)) else {

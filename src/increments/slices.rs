@@ -49,7 +49,7 @@ impl Slice {
 }
 
 /// The slice that is under way, and those that are complete.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Slicer {
     done: [Slice; SLICES],
     /// [us] end of each of them.

@@ -42,7 +42,8 @@ pub fn code(half: &[u8; HALF_BYTES]) -> Code {
 /// Puts right what can be put right; how many bits were wrong, the code's own included.
 pub fn correct(half: &mut [u8; HALF_BYTES], stored: Code) -> Result<u32, Uncorrectable> {
     let computed = code(half);
-    let [first, second, third] = [0, 1, 2].map(|byte: usize| stored[byte] ^ computed[byte]);
+    let ([a, b, c], [x, y, z]) = (stored, computed);
+    let (first, second, third) = (a ^ x, b ^ y, c ^ z);
     // The lowest two bits of the third byte are no parities; they are written as ones and may flip unnoticed.
     let syndrome = u32::from(first) << 14 | u32::from(second) << 6 | u32::from(third >> 2);
     // One wrong bit changes exactly one of the two parities of each of the eleven pairs.
