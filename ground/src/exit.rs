@@ -113,7 +113,7 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
         return matches!(error, AllanError::Table(_));
     }
     if let Some(error) = error.downcast_ref::<GapError>() {
-        return matches!(error, GapError::Case(_) | GapError::Word(_));
+        return matches!(error, GapError::Case(_) | GapError::Word(_) | GapError::Against);
     }
     if let Some(error) = error.downcast_ref::<DumpError>() {
         return matches!(error, DumpError::Port { .. });

@@ -15,10 +15,11 @@ use twin::predict::UnitDescription;
 use crate::{
     against::against,
     diagnose::{Diagnosis, diagnose},
-    input::case::{CaseError, Subject},
+    input::case::{CaseError, Opened, Subject},
     kept::{self, Analysis, Kept},
     library::hypotheses::Library,
     null::problem::Problem,
+    parity::{self, ParityError},
     report::{page, terminal, verdict::Verdict},
     search::baseline,
 };
@@ -27,6 +28,7 @@ use crate::{
 ///
 /// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
 /// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
+/// A case without a motion is judged by the redundancy of its sensors alone, and is told what that cannot see.
 /// The twin with the effect in and, where the unit can correct the cause, the calibration set go into CASE/corrected; what was
 /// said is kept in CASE/analysis until a byte of the case changes.
 #[derive(Clone, Debug, clap::Args)]
@@ -46,6 +48,9 @@ pub struct Arguments {
     /// Leave an effect out of the library; may be given several times
     #[arg(long, value_name = "EFFECT")]
     pub withhold: Vec<String>,
+    /// Do not look at the case's motion: what the unit's own redundancy says alone. A case without a motion needs no such word
+    #[arg(long, conflicts_with = "against")]
+    pub blind_motion: bool,
     /// Print verdict.json instead of the screen
     #[arg(long)]
     pub json: bool,
@@ -74,6 +79,9 @@ pub enum GapError {
     /// An effect to leave out is not in the library.
     #[error("--withhold {0}: no effect of that name is in the library")]
     Effect(String),
+    /// A log without a reference cannot be held against another.
+    #[error("--against needs a case with a motion: without one nothing is corrected that could be compared")]
+    Against,
     /// A file cannot be written.
     #[error("{file}: cannot be written: {source}")]
     Write {
@@ -91,6 +99,16 @@ pub enum GapError {
     /// The verdict is not finite somewhere.
     #[error("the verdict cannot be written: {0}")]
     Json(#[from] serde_json::Error),
+}
+
+impl From<ParityError> for GapError {
+    fn from(error: ParityError) -> Self {
+        match error {
+            ParityError::Case(error) => error.into(),
+            ParityError::Json(error) => error.into(),
+            ParityError::Chart(error) => error.into(),
+        }
+    }
 }
 
 /// Runs `ground gap`.
@@ -114,7 +132,14 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
         return Err(GapError::Effect(stranger.clone()));
     }
     let case = Path::new(case);
-    let (kept, analysis) = asked(case, &arguments.withhold)?;
+    let is_blind = arguments.blind_motion || Opened::open(case)?.is_without_motion();
+    if is_blind && arguments.against.is_some() {
+        return Err(GapError::Against);
+    }
+    let (kept, analysis) = match is_blind {
+        true => asked_blind(case, &arguments.withhold)?,
+        false => asked(case, &arguments.withhold)?,
+    };
     let name = if arguments.json {
         VERDICT.to_owned()
     } else {
@@ -122,8 +147,10 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     };
     print!("{}", kept::text(&analysis, &name).unwrap_or_default());
     if word == "all" && arguments.withhold.is_empty() && !arguments.json {
-        let unit = beside(&kept, CORRECTED).join(UNIT);
-        println!("{}\n{}", unit.display(), kept.folder().join(PAGE).display());
+        if !is_blind {
+            println!("{}", beside(&kept, CORRECTED).join(UNIT).display());
+        }
+        println!("{}", kept.folder().join(PAGE).display());
     }
     if let Some(other) = &arguments.against {
         let unit = kept::text(&analysis, UNIT).unwrap_or_default();
@@ -136,7 +163,9 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
         for name in [VERDICT, PAGE] {
             put(folder, name, kept::text(&analysis, name).unwrap_or_default())?;
         }
-        write_twin(folder, &analysis)?;
+        if !is_blind {
+            write_twin(folder, &analysis)?;
+        }
         println!("{}", folder.join(PAGE).display());
     }
     Ok(())
@@ -171,17 +200,46 @@ pub fn asked(case: &Path, withheld: &[String]) -> Result<(Kept, Analysis), GapEr
     Ok((kept, analysis))
 }
 
+/// Every text of a case whose motion is not looked at, by parity alone. No corrected twin is written: what one log says without
+/// a reference is a reason to test, none to change a unit.
+///
+/// # Errors
+/// When the case cannot be judged, and when its unit has no redundancy.
+pub fn asked_blind(case: &Path, withheld: &[String]) -> Result<(Kept, Analysis), GapError> {
+    let kept = Kept::blind(case, withheld)?;
+    if let Some(analysis) = kept.read() {
+        return Ok((kept, analysis));
+    }
+    let bar = bar();
+    let analysis = parity::analysed(case, withheld, &|what, share| {
+        bar.set_message(what);
+        bar.set_position((100.0 * share) as u64);
+    });
+    bar.finish_and_clear();
+    let analysis = analysis?;
+    if let Err(error) = kept.write(&analysis) {
+        // What was found is worth saying all the same.
+        eprintln!("warning: {}: cannot be written: {error}", kept.folder().display());
+    }
+    Ok((kept, analysis))
+}
+
+fn bar() -> ProgressBar {
+    let bar = ProgressBar::new(100).with_style(
+        ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
+}
+
 /// Diagnoses a case on a terminal; every text of it.
 ///
 /// # Errors
 /// When the case cannot be judged.
 pub fn analysed(case: &Path, withheld: &[String]) -> Result<Analysis, GapError> {
     let subject = Subject::open(case)?;
-    let bar = ProgressBar::new(100).with_style(
-        ProgressStyle::with_template("{spinner} {msg:10} {bar:40} {elapsed}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    bar.enable_steady_tick(Duration::from_millis(100));
+    let bar = bar();
     let diagnosis = diagnose(&subject, withheld, &|what, share| {
         bar.set_message(what);
         bar.set_position((100.0 * share) as u64);

@@ -1,8 +1,8 @@
 //! What a diagnosis says, kept beside its case: asked again, it costs nothing.
 //!
 //! In: a case and what is left out of the library. Out: every text that `ground gap` prints or writes, by file name
-//! ([`Analysis`]), and where it is kept: `CASE/analysis/`, with effects left out `CASE/analysis-without-NAME/`. Beside the texts
-//! stands `key`: the SHA-256 of `case.toml`, of every file it names, of what was left out, and of the tool (its version, and the
+//! ([`Analysis`]), and where it is kept: `CASE/analysis/`, with effects left out `CASE/analysis-without-NAME/`, without the
+//! motion `CASE/analysis-parity/`. Beside the texts stands `key`: the SHA-256 of `case.toml`, of every file it names, of what was left out, and of the tool (its version, and the
 //! size and date of the program). Any other byte is another key, and the diagnosis is made anew. `answer.toml` is no part of it.
 //!
 //! A folder that cannot be written is no error: the analysis is not kept.
@@ -36,9 +36,22 @@ impl Kept {
     /// # Errors
     /// When a file of it cannot be read.
     pub fn of(case: &Path, withheld: &[String]) -> Result<Self, CaseError> {
+        Self::seeing(case, withheld, true)
+    }
+
+    /// The same without its motion.
+    ///
+    /// # Errors
+    /// When a file of it cannot be read.
+    pub fn blind(case: &Path, withheld: &[String]) -> Result<Self, CaseError> {
+        Self::seeing(case, withheld, false)
+    }
+
+    fn seeing(case: &Path, withheld: &[String], sees_motion: bool) -> Result<Self, CaseError> {
         let opened = Opened::open(case)?;
         let text = &opened.text;
-        let named = [Some(&text.unit), Some(&text.measured), text.motion.as_ref()];
+        let motion = text.motion.as_ref().filter(|_| sees_motion);
+        let named = [Some(&text.unit), Some(&text.measured), motion];
         let files = named.into_iter().flatten().map(|relative| opened.path(relative));
         let mut sum = Sha256::new();
         // Lengths first, so that a byte that goes from one to the next is another key.
@@ -54,9 +67,10 @@ impl Kept {
             add(&fs::read(&file).map_err(|source| CaseError::Read { file, source })?);
         }
         let key = sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let blind = if sees_motion { "" } else { "-parity" };
         let name = match withheld {
-            [] => "analysis".to_owned(),
-            names => format!("analysis-without-{}", names.join("-")),
+            [] => format!("analysis{blind}"),
+            names => format!("analysis{blind}-without-{}", names.join("-")),
         };
         Ok(Kept {
             folder: opened.path(Path::new(&name)),

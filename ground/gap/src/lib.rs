@@ -16,6 +16,8 @@
 //! | 9 | [`advise`] | what should be measured next, and what would not have been seen? | advice, sets, limits |
 //! | 10 | [`report`] | how is it told? | `verdict.json`, a screen, a page |
 //!
+//! A log that no reference saw goes another way through the rooms 1 to 4: [`parity`], what the unit's own redundancy says.
+//!
 //! Beside the rooms, and only for [`command`] and other programs: [`kept`] keeps what was said beside the case, [`against`] holds a
 //! corrected twin against another case.
 //!
@@ -32,6 +34,7 @@ pub mod input;
 pub mod kept;
 pub mod library;
 pub mod null;
+pub mod parity;
 pub mod probability;
 pub mod report;
 pub mod search;

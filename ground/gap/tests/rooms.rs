@@ -8,9 +8,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The thresholds, the ten rooms in the order of the steps, around the last the conductor, what is kept and held against another
-/// case, and the shell.
-const ORDER: [&str; 15] = [
+/// The thresholds, the ten rooms in the order of the steps, around the last the conductor, the way without a reference, what is
+/// kept and held against another case, and the shell.
+const ORDER: [&str; 16] = [
     "thresholds",
     "input",
     "null",
@@ -23,6 +23,7 @@ const ORDER: [&str; 15] = [
     "advise",
     "diagnose",
     "report",
+    "parity",
     "kept",
     "against",
     "command",

@@ -112,7 +112,9 @@ impl Scene {
         Self::through(nodes_s[0], nodes_s[1] - nodes_s[0], &rows)
     }
 
-    fn through(from_s: f64, step_s: f64, rows: &[Feel]) -> Self {
+    /// States of the centre every `step_s` from `from_s` on, at least two, whatever told them: the rows' `t_s` and
+    /// `temperature_rate` are not looked at.
+    pub fn through(from_s: f64, step_s: f64, rows: &[Feel]) -> Self {
         let pose = |row: &Feel| {
             let (q, p) = (row.q_nb.into_inner(), row.position_n);
             SVector::from([q.w, q.i, q.j, q.k, p.x, p.y, p.z])

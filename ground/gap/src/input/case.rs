@@ -29,8 +29,9 @@ use crate::input::{
 };
 
 pub use allowance::{Bars, SlowErrors};
+pub use environment::environment as environment_of;
 pub use measured::read_measured;
-pub use subject::Subject;
+pub use subject::{Subject, columns as columns_of};
 pub use table::{Position, read_table};
 pub use text::read_bytes;
 
@@ -106,8 +107,11 @@ pub struct CaseFile {
     pub unit: PathBuf,
     /// Path of the log.
     pub measured: PathBuf,
-    /// Path of the reference; none for a table.
+    /// Path of the reference; none for a table, and none where nobody saw the motion.
     pub motion: Option<PathBuf>,
+    /// What is known of the motion where nobody saw it.
+    #[serde(default)]
+    pub motion_known: MotionKnown,
     /// Surroundings.
     #[serde(default)]
     pub environment: Surroundings,
@@ -119,6 +123,15 @@ pub struct CaseFile {
     pub matters: Matters,
     /// What is fitted and what only judges.
     pub windows: WindowPairs,
+}
+
+/// `[motion_known]`.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionKnown {
+    /// Nothing.
+    #[serde(default)]
+    pub none: bool,
 }
 
 /// `[matters]`: see [`Bars`].
@@ -203,6 +216,11 @@ pub struct Opened {
 }
 
 impl Opened {
+    /// Whether nobody saw the motion.
+    pub fn is_without_motion(&self) -> bool {
+        self.text.kind != Kind::Table && self.text.motion.is_none()
+    }
+
     /// Reads `case.toml`, given itself or its folder.
     ///
     /// # Errors
@@ -223,8 +241,9 @@ impl Opened {
                 format!("is {:?}, known is \"gap-case/1\"", text.format),
             ));
         }
-        if text.kind != Kind::Table && text.motion.is_none() {
-            return Err(CaseError::key(&file, "motion", "is absent; only a table needs none"));
+        if text.motion_known.none && text.motion.is_some() {
+            let problem = "says that no motion is known, and motion names one; keep one of the two";
+            return Err(CaseError::key(&file, "motion_known.none", problem));
         }
         let windows = Windows::new(
             spans(&file, "windows.fit", &text.windows.fit)?,

@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 pub use place::{places, when};
 pub use shrink::shrink;
-use wrap::wrapped;
+pub use wrap::wrapped;
 
 use crate::{
     diagnose::Diagnosis,

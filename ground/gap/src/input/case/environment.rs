@@ -12,7 +12,10 @@ use twin::{
 use super::{CaseError, Opened};
 
 /// Of an opened case.
-pub(super) fn environment(opened: &Opened, unit: &UnitDescription) -> Result<Environment, CaseError> {
+///
+/// # Errors
+/// When a sensor needs what is not given, or it is given in another unit.
+pub fn environment(opened: &Opened, unit: &UnitDescription) -> Result<Environment, CaseError> {
     let given = &opened.text.environment;
     let needs = |kind: Kind| unit.channels.iter().any(|channel| channel.sensor == kind);
     let absent = |key: &str, sensors: &str| {

@@ -78,6 +78,10 @@ impl Subject {
     /// When anything of it cannot be read or does not fit the rest.
     pub fn open_with(path: &Path, believed: impl FnOnce(&mut UnitDescription)) -> Result<Self, CaseError> {
         let opened = Opened::open(path)?;
+        if opened.is_without_motion() {
+            let problem = "is absent, and this compares with a reference; what the unit's redundancy says without one: ground gap CASE";
+            return Err(CaseError::key(&opened.file, "motion", problem));
+        }
         let mut unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
         believed(&mut unit);
         if opened.text.kind == super::Kind::Table {
@@ -85,7 +89,7 @@ impl Subject {
         }
         let environment = environment(&opened, &unit)?;
         let (slow, bars) = allowance(&opened)?;
-        let columns: Vec<Column> = unit.channels.iter().map(column).collect();
+        let columns = columns(&unit);
         let mut log = opened.log(&columns, unit.cycle_s)?;
         let name = opened.text.motion.clone().unwrap_or_default();
         let file = opened.path(&name);
@@ -170,7 +174,7 @@ impl Subject {
         let (slow, bars) = allowance(&opened)?;
         let mut positions = read_table(&file, &unit.channels)?;
         let gross = put_right(&mut positions, &mut unit.channels);
-        let columns: Vec<Column> = unit.channels.iter().map(column).collect();
+        let columns = columns(&unit);
         let mut log = Log::empty(columns.len());
         for position in &positions {
             log.begin_row(position.seq);
@@ -250,6 +254,11 @@ fn steady(position: &Position, temperature_c: f64) -> Feel {
         heading_rate: 0.0,
         heading_acc: 0.0,
     }
+}
+
+/// What the log's reader must know of each channel.
+pub fn columns(unit: &UnitDescription) -> Vec<Column> {
+    unit.channels.iter().map(column).collect()
 }
 
 fn column(channel: &Channel) -> Column {

@@ -1,0 +1,92 @@
+//! A log without a reference motion: what the unit's own redundancy says.
+//!
+//! In: a case without `motion`, or one whose motion is not to be looked at. Out: the texts of an analysis, of which each says that
+//! it rests on parity alone. The steps, a file each:
+//!
+//! | step | file | gives |
+//! |---|---|---|
+//! | 1 | [`flight`] | the fit windows of the log, and the unit in its environment |
+//! | 2 | [`codes`] | samples sent twice, lost bits: no model is needed for these |
+//! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
+//! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
+//! | 5 | [`space`] | inner products with motion and calibration marginalised |
+//! | 6 | [`visible`], [`nulls`] | of each effect, what this log can show at all, before anything is sought |
+//! | 7 | [`search`] | which effects the evidence prefers among those that can be seen |
+//! | 8 | [`findings`] | which of them are said, and where the gap is |
+//! | 9 | [`text`], [`verdict`], [`page`] | how it is told |
+//!
+//! Per packet the channels are `y = h + A x + C beta + E theta + noise`. `x` is the deviation from the smoothed motion: rate,
+//! specific force, field and temperature, which are free, and the derivatives of rate and force, which are known about as well
+//! as the packets before and after tell them. Within the packet `m' = -w x m` and `f' = -w x f + jerk`. With `[A; P] = Q R`, `P`
+//! being the prior rows, the motion is marginalised by `<u, v> = u'v - (Q'[u; 0])'(Q'[v; 0])`; residual, calibration and effects
+//! go through the same operator, so an effect that is another motion has no column left. No attitude is needed, and none is
+//! found: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
+//!
+//! Columns are those of [`crate::library`], made about the smoothed motion. What the hold windows would say is not asked yet.
+
+pub mod codes;
+pub mod course;
+pub mod findings;
+pub mod flight;
+pub mod nulls;
+pub mod packet;
+pub mod page;
+pub mod search;
+pub mod space;
+pub mod spline;
+pub mod text;
+pub mod verdict;
+pub mod visible;
+
+use std::path::Path;
+
+use crate::{
+    input::case::CaseError,
+    parity::{findings::Findings, flight::Flight, verdict::Verdict},
+};
+
+/// File of the verdict, of the screen and of the page among the texts.
+const FILES: [&str; 3] = ["verdict.json", "all.txt", "index.html"];
+
+/// Why nothing is said.
+#[derive(Debug, thiserror::Error)]
+pub enum ParityError {
+    /// The case cannot be judged, or its unit has no redundancy.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The verdict is not finite somewhere.
+    #[error("the verdict cannot be written: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] chart::ChartError),
+}
+
+/// Diagnoses a log by parity; every text of it, by file name. `progress` is told what goes on and how far it is, 0 to 1.
+///
+/// # Errors
+/// When the case cannot be judged, and when its unit has no redundancy.
+pub fn analysed(
+    case: &Path,
+    withheld: &[String],
+    progress: &dyn Fn(&'static str, f64),
+) -> Result<Vec<(String, String)>, ParityError> {
+    let flight = Flight::open(case)?;
+    let findings = Findings::of(&flight, withheld, progress)?;
+    let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings))?;
+    let screen = text::screen(&flight, &findings);
+    let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings)?];
+    let mut texts: Vec<(String, String)> = FILES.iter().map(|name| (*name).to_owned()).zip(texts).collect();
+    let sections = [
+        ("where.txt", text::places(&findings)),
+        ("why.txt", text::why(&flight, &findings)),
+        ("next.txt", text::next(&findings)),
+        ("limits.txt", text::visibility(&findings)),
+        (
+            "shrink.txt",
+            "without a reference nothing is asked of the held-out windows yet\n".to_owned(),
+        ),
+    ];
+    texts.extend(sections.map(|(name, text)| (name.to_owned(), text)));
+    Ok(texts)
+}

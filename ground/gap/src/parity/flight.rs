@@ -1,0 +1,91 @@
+//! A case whose motion nobody recorded: the fit windows of its log, and the unit in its environment.
+//!
+//! In: the folder of a case. Out: [`Flight`]. A `motion` that is there is not opened.
+//!
+//! Refuses, naming file and key, what any case is refused for, and tables, which are nothing but commanded motion.
+
+use std::path::Path;
+
+use twin::{environment::Environment, predict::UnitDescription};
+
+use crate::input::{
+    case::{CaseError, Kind, Opened, columns_of, environment_of},
+    log::{Log, Series},
+};
+
+/// Rows that are kept at most: 20 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
+const MOST_ROWS: usize = 6000;
+
+/// Rows from which anything can be said.
+const LEAST_ROWS: usize = 16;
+
+/// A log without a reference.
+pub struct Flight {
+    /// Its file.
+    pub opened: Opened,
+    /// The unit as described.
+    pub unit: UnitDescription,
+    /// Where it was.
+    pub environment: Environment,
+    /// The rows of the fit windows.
+    pub log: Log,
+    /// One row in so many was kept.
+    pub thinned: usize,
+}
+
+impl Flight {
+    /// Reads a case.
+    ///
+    /// # Errors
+    /// When anything of it cannot be read or does not fit the rest.
+    pub fn open(path: &Path) -> Result<Self, CaseError> {
+        let opened = Opened::open(path)?;
+        if opened.text.kind == Kind::Table {
+            let problem = "is \"table\", which is nothing but commanded motion; leave --blind-motion out";
+            return Err(CaseError::key(&opened.file, "kind", problem));
+        }
+        let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
+        let environment = environment_of(&opened, &unit)?;
+        let log = opened.log(&columns_of(&unit), unit.cycle_s)?;
+        let is_fit = |start_s: f64| opened.windows.fit().iter().any(|span| span.contains(start_s));
+        let rows: Vec<usize> = (0..log.start_s.len()).filter(|row| is_fit(log.start_s[*row])).collect();
+        if rows.len() < LEAST_ROWS {
+            let problem = format!("hold {} rows of the log; at least {LEAST_ROWS} are needed", rows.len());
+            return Err(CaseError::key(&opened.file, "windows.fit", problem));
+        }
+        let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
+        let rows: Vec<usize> = rows.into_iter().step_by(thinned).collect();
+        Ok(Flight {
+            log: only(log, &rows),
+            opened,
+            unit,
+            environment,
+            thinned,
+        })
+    }
+
+    /// Names of channels.
+    pub fn names(&self, channels: &[usize]) -> Vec<String> {
+        let name = |index: &usize| self.unit.channels.get(*index).map(|channel| channel.name.clone());
+        channels.iter().filter_map(name).collect()
+    }
+}
+
+/// These rows of a log, which rise.
+fn only(log: Log, rows: &[usize]) -> Log {
+    let mut new_row = vec![None; log.start_s.len()];
+    rows.iter()
+        .enumerate()
+        .for_each(|(new, old)| new_row[*old] = Some(new as u32));
+    let series = |series: &Series| {
+        let kept = series.rows.iter().zip(&series.values);
+        let kept = kept.filter_map(|(row, value)| Some((new_row[*row as usize]?, *value)));
+        let (rows, values) = kept.unzip();
+        Series { rows, values }
+    };
+    Log {
+        start_s: rows.iter().map(|row| log.start_s[*row]).collect(),
+        channels: log.channels.iter().map(series).collect(),
+        ..log
+    }
+}

@@ -1,0 +1,97 @@
+//! What no redundancy can show, in words, and the ground test that would.
+//!
+//! In: nothing but the physics of one body with several sensors. Out: [`NULLS`]. An effect that is the same in every sensor of a
+//! kind is another motion, exactly. The columns of those that have one are free in the fit before anything is sought, so that
+//! what linearisation and priors leave of them is no evidence; and none of them is ever named.
+
+use twin::effect::Locality;
+
+use crate::{library::hypotheses::Hypothesis, library::hypotheses::Library, library::products::Entries};
+
+/// [prior sigmas] how large they may be: as large as an effect may be before it stands for something else.
+const FREE: f64 = 20.0;
+
+/// Something that cannot be seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Null {
+    /// In words.
+    pub what: &'static str,
+    /// Effects of the library that are nothing else where all sensors of a kind share them.
+    pub effects: &'static [&'static str],
+    /// The cheapest test on the ground that would settle it.
+    pub settled_by: &'static str,
+}
+
+/// All of them.
+pub const NULLS: &[Null] = &[
+    Null {
+        what: "a delay of all sensors, or of all of one kind, a clock that runs wrong, a packet time that is off: the motion is simply another one",
+        effects: &[
+            "latency",
+            "gyro-latency",
+            "accel-latency",
+            "mag-latency",
+            "gyro-lag",
+            "eddy-current",
+            "clock-rate",
+            "packet-loss",
+        ],
+        settled_by: "turn the unit on a table whose angle is logged on the unit's clock, or strike it beside a sensor with a clock of its own",
+    },
+    Null {
+        what: "one rotation of all sensors, or of all of one kind, and one of the frame n: mounting, the table's tilt, the field's direction",
+        effects: &["mounting", "table-tilt", "field-model"],
+        settled_by: "stand the unit on its six faces on a levelled plate, and turn it about each axis of a table",
+    },
+    Null {
+        what: "a scale or a bias that all sensors of a kind share; gravity against the scale of all accelerometers, the size of the field against that of all magnetometers",
+        effects: &[
+            "gravity-value",
+            "earth-rate",
+            "gyro-bias",
+            "gyro-scale",
+            "accel-bias",
+            "accel-scale",
+            "hard-iron",
+        ],
+        settled_by: "rest in two opposite attitudes tells bias and scale of the accelerometers; a full turn of a table, those of the gyros; a site whose field is surveyed, those of the magnetometers",
+    },
+    Null {
+        what: "a lever arm that all accelerometers share: it is the origin of the track",
+        effects: &["lever-arm"],
+        settled_by: "turn the unit about two axes through a point that is measured",
+    },
+    Null {
+        what: "what a reference does, for there is none",
+        effects: &["reference-rate-scale", "reference-lag", "reference-sign"],
+        settled_by: "",
+    },
+];
+
+/// The null that a hypothesis belongs to: one sensor's delay or bias among others is none.
+pub fn of(hypothesis: &Hypothesis) -> Option<&'static Null> {
+    let is_shared = matches!(hypothesis.cause.locality, Locality::Unit | Locality::Common);
+    let own = NULLS.iter().find(|null| null.effects.contains(&hypothesis.effect()));
+    own.filter(|_| is_shared)
+}
+
+/// Columns of the nulls that hold for the unit as a whole, for a size that leaves them free.
+pub fn columns(library: &Library) -> Vec<Entries> {
+    let is_whole = |hypothesis: &&Hypothesis| {
+        // One that begins at some instant has a column for each.
+        let variants = hypothesis.cause.effect.variants(&[0.0, 1.0]).len();
+        of(hypothesis).is_some() && variants == 1
+    };
+    let mut places: Vec<usize> = (library.hypotheses.iter())
+        .filter(is_whole)
+        .flat_map(|hypothesis| hypothesis.places.clone())
+        .collect();
+    places.sort_unstable();
+    places.dedup();
+    let free = |place: usize| -> Entries {
+        let size = FREE * library.prior_sigmas[place];
+        let column = library.products.column(place).iter();
+        column.map(|(channel, values)| (*channel, values * size)).collect()
+    };
+    places.into_iter().map(free).collect()
+}

@@ -1,0 +1,184 @@
+//! The findings on a screen.
+//!
+//! In: [`Findings`]. Out: text. What can be seen stands before what was found, so that a silence is read as what it is.
+
+use std::fmt::Write;
+
+use crate::{
+    parity::{
+        findings::{Findings, Name},
+        flight::Flight,
+        nulls::NULLS,
+        visible::Row,
+    },
+    probability::outcome::Outcome,
+    report::terminal::wrapped,
+    thresholds::PARITY_SNR,
+};
+
+/// Channels that are said to stand out.
+const SHOWN: usize = 6;
+
+/// Gap of a channel from which it stands out.
+const STANDS_OUT: f64 = 1.1;
+
+/// All of it.
+pub fn screen(flight: &Flight, findings: &Findings) -> String {
+    let text = &flight.opened.text;
+    let mut out = format!("{}  {}\n", text.name, text.about);
+    // Writing to a string cannot fail.
+    let [gyros, accelerometers, magnetometers, thermometers] = findings.free;
+    let thinned = if flight.thinned > 1 {
+        format!(", one of {} kept", flight.thinned)
+    } else {
+        String::new()
+    };
+    let _ = writeln!(
+        out,
+        "PARITY  no reference: only what the sensors say against each other, {} packets of the fit windows{thinned}; degrees of freedom a packet: \
+         gyros {gyros:.1}, accelerometers {accelerometers:.1}, magnetometers {magnetometers:.1}, thermometers {thermometers:.1}",
+        findings.rows
+    );
+    out += &seen_and_not(findings);
+    let _ = writeln!(
+        out,
+        "GAP     {:.3} sigma where 1 is noise and calibration alone",
+        findings.gap[0]
+    );
+    out += &places(findings);
+    out += &why(flight, findings);
+    let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
+    wrapped(&out)
+}
+
+/// Which effects can be named from this log and which cannot, in two lines.
+fn seen_and_not(findings: &Findings) -> String {
+    let (seen, unseen) = effects(&findings.visible);
+    format!(
+        "SEEN    of usual size, by parity: {}\nUNSEEN  never named from this log: {}\n",
+        seen.join(", "),
+        unseen.join(", ")
+    )
+}
+
+/// Effects that can be named somewhere, and those that cannot anywhere.
+pub fn effects(rows: &[Row]) -> (Vec<&'static str>, Vec<&'static str>) {
+    let mut names: Vec<&'static str> = rows.iter().map(|row| row.effect).collect();
+    names.dedup();
+    names
+        .into_iter()
+        .partition(|name| rows.iter().any(|row| row.effect == *name && row.is_visible))
+}
+
+/// Where the gap is.
+pub fn places(findings: &Findings) -> String {
+    let mut channels: Vec<&(String, f64)> = findings.channels.iter().filter(|(_, gap)| *gap > STANDS_OUT).collect();
+    channels.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let told: Vec<String> = channels
+        .iter()
+        .take(SHOWN)
+        .map(|(name, gap)| format!("{name} {gap:.2}"))
+        .collect();
+    match told.is_empty() {
+        true => "WHERE   no channel stands out\n".to_owned(),
+        false => format!("WHERE   sigma of what the others do not explain: {}\n", told.join(", ")),
+    }
+}
+
+/// Which effects, and how sure.
+pub fn why(flight: &Flight, findings: &Findings) -> String {
+    let mut out = String::new();
+    for name in &findings.names {
+        let _ = writeln!(
+            out,
+            "CAUSE   {} at {}, probability {:.3}{}",
+            name.effect,
+            flight.names(&name.channels).join(" "),
+            name.probability,
+            evidence(name)
+        );
+        let _ = writeln!(out, "        {}", name.physics);
+        for sized in &name.parameters {
+            let parameter = &sized.parameter;
+            let _ = writeln!(
+                out,
+                "        {} {:.4e} +- {:.1e} {}",
+                parameter.name, sized.value, sized.sigma, parameter.unit
+            );
+        }
+        if !name.or_at.is_empty() {
+            let _ = writeln!(out, "        or, as likely from this log, at {}", name.or_at.join(", "));
+        }
+        if let Some(which) = &name.which {
+            let _ = writeln!(out, "        which: {which}");
+        }
+        let _ = writeln!(out, "        confirm: {}", name.confirm_by);
+    }
+    if !findings.alternatives.is_empty() {
+        let told = findings
+            .alternatives
+            .iter()
+            .map(|(name, probability)| format!("{name} {probability:.3}"));
+        let _ = writeln!(out, "OR      {}", told.collect::<Vec<_>>().join(", "));
+    }
+    let left = match findings.outcome {
+        Outcome::Clean => {
+            "NO EFFECT is needed for what parity shows; what it cannot show is listed under UNSEEN".to_owned()
+        }
+        Outcome::Named => format!("LEFT    {:.3} sigma once the causes are in", findings.gap[1]),
+        _ => format!(
+            "LEFT    {:.3} sigma that nothing named explains: an effect outside the library, one of a kind that is listed under \
+             UNSEEN and is far above its usual size, or a motion too quick for the packets",
+            findings.gap[1]
+        ),
+    };
+    out + &left + "\n"
+}
+
+fn evidence(name: &Name) -> String {
+    match (name.gain, name.snr) {
+        (Some(gain), Some([usual, found])) => {
+            format!(", {gain:.1} nats, signal-to-noise ratio {found:.1} at this size and {usual:.1} at the usual")
+        }
+        _ => ", by the codes alone".to_owned(),
+    }
+}
+
+/// What to do next.
+pub fn next(findings: &Findings) -> String {
+    match findings.names.first() {
+        Some(name) => format!("To be sure: {}\n", name.confirm_by),
+        None => format!(
+            "What this log cannot show, a test on the ground would: {}.\n",
+            NULLS[0].settled_by
+        ),
+    }
+}
+
+/// What of each effect can be seen, and what cannot and why.
+pub fn visibility(findings: &Findings) -> String {
+    let mut out = format!(
+        "signal-to-noise ratio of an effect of usual size, where it is seen best: with the motion known, by parity, and the share \
+         that remains; from {PARITY_SNR:.0} on it may be named\n{:30} {:8} {:>10} {:>8} {:>6}\n",
+        "effect", "place", "reference", "parity", "share"
+    );
+    for row in &findings.visible {
+        let (effect, place) = (row.effect, row.place);
+        let note = if row.is_visible { "" } else { "  not seen" };
+        let _ = writeln!(
+            out,
+            "{effect:30} {place:8} {:10.1} {:8.1} {:6.2}{note}",
+            row.with_reference,
+            row.snr,
+            row.share()
+        );
+    }
+    out += "\nWhat no redundancy can show, and what would:\n";
+    for null in NULLS {
+        let _ = writeln!(out, "- {}.", null.what);
+        if !null.settled_by.is_empty() {
+            let _ = writeln!(out, "  Test: {}.", null.settled_by);
+        }
+    }
+    out
+}

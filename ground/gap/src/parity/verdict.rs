@@ -1,0 +1,142 @@
+//! `verdict.json` of a log without a reference: `gap-verdict/2` with `"from": "parity"`.
+//!
+//! In: [`Findings`]. Out: the keys of the format that parity can fill. There is no `shrink`, for the held-out windows are not asked;
+//! `visible` and `not_visible` say what a silence means.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::parity::{
+    findings::{Findings, Name},
+    flight::Flight,
+    nulls::NULLS,
+    text,
+};
+
+/// The whole file.
+#[derive(Debug, Serialize)]
+pub struct Verdict {
+    case: String,
+    format: &'static str,
+    from: &'static str,
+    gap: Gap,
+    causes: Vec<Cause>,
+    alternatives: Vec<Alternative>,
+    none_of_these: f64,
+    outcome: &'static str,
+    visible: Vec<Visible>,
+    not_visible: Vec<NotVisible>,
+    never_named: Vec<&'static str>,
+    next_experiment: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Gap {
+    before: f64,
+    after: f64,
+    floor: f64,
+    units: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Cause {
+    effect: &'static str,
+    channels: Vec<String>,
+    or_at: Vec<String>,
+    probability: f64,
+    by: &'static str,
+    parameters: BTreeMap<String, Parameter>,
+}
+
+#[derive(Debug, Serialize)]
+struct Parameter {
+    value: f64,
+    sigma: f64,
+    unit: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Alternative {
+    effect: &'static str,
+    probability: f64,
+}
+
+/// Ratios of an effect of usual size.
+#[derive(Debug, Serialize)]
+struct Visible {
+    effect: &'static str,
+    place: &'static str,
+    with_reference: f64,
+    by_parity: f64,
+    may_be_named: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct NotVisible {
+    what: &'static str,
+    settled_by: &'static str,
+}
+
+/// Four decimals: what is beyond is noise.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+impl Verdict {
+    /// Of findings.
+    pub fn new(flight: &Flight, findings: &Findings) -> Self {
+        let cause = |name: &Name| Cause {
+            effect: name.effect,
+            channels: flight.names(&name.channels),
+            or_at: name.or_at.clone(),
+            probability: rounded(name.probability),
+            by: if name.gain.is_some() { "evidence" } else { "codes" },
+            parameters: (name.parameters.iter())
+                .map(|sized| {
+                    let parameter = Parameter {
+                        value: sized.value,
+                        sigma: sized.sigma,
+                        unit: sized.parameter.unit,
+                    };
+                    (sized.parameter.name.clone(), parameter)
+                })
+                .collect(),
+        };
+        let visible = findings.visible.iter().map(|row| Visible {
+            effect: row.effect,
+            place: row.place,
+            with_reference: rounded(row.with_reference),
+            by_parity: rounded(row.snr),
+            may_be_named: row.is_visible,
+        });
+        let alternative = |(effect, probability): &(&'static str, f64)| Alternative {
+            effect,
+            probability: rounded(*probability),
+        };
+        Self {
+            case: flight.opened.text.name.clone(),
+            format: "gap-verdict/2",
+            from: "parity",
+            gap: Gap {
+                before: rounded(findings.gap[0]),
+                after: rounded(findings.gap[1]),
+                floor: 1.0,
+                units: "sigma",
+            },
+            causes: findings.names.iter().map(cause).collect(),
+            alternatives: findings.alternatives.iter().map(alternative).collect(),
+            none_of_these: rounded(findings.none_of_these),
+            outcome: findings.outcome.word(),
+            visible: visible.collect(),
+            not_visible: (NULLS.iter())
+                .map(|null| NotVisible {
+                    what: null.what,
+                    settled_by: null.settled_by,
+                })
+                .collect(),
+            never_named: text::effects(&findings.visible).1,
+            next_experiment: text::next(findings).trim_end().to_owned(),
+        }
+    }
+}

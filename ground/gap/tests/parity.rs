@@ -1,0 +1,158 @@
+//! Logs without a reference, from files to what is said: simulated here along motions of the twin, with and without an effect.
+
+use std::fs;
+
+use gap::parity::{analysed, findings::Findings, flight::Flight};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use serde_json::Value;
+use tempfile::TempDir;
+use twin::{
+    effect::{Active, Cause, Locality, by_name},
+    motion,
+    predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
+};
+
+/// [s] of a log.
+const SECONDS: f64 = 120.0;
+
+/// A case of a unit along a motion, from `from_s` on, whose calibration is off by what its description allows.
+fn flown(name: &str, from_s: f64, seed: u64, active: &[Active], only: impl Fn(&str) -> bool) -> TempDir {
+    let world = motion::world_by_name(name).expect("a motion");
+    let environment = world.environment;
+    let mut unit = emems(thesis_slot_s);
+    unit.channels.retain(|channel| only(&channel.group));
+    let scene = Scene::new(&world.motion, &environment, from_s - 2.0, from_s + SECONDS + 2.0, 0.01);
+    let starts_s: Vec<f64> = (0..(SECONDS / 0.2) as usize)
+        .map(|row| from_s + 0.2 * row as f64)
+        .collect();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut real: UnitDescription = unit.clone();
+    for channel in &mut real.channels {
+        channel.bias += channel.bias_sigma * normal();
+        let scale = 1.0 + channel.scale_sigma * normal();
+        let across = channel.across().map(|axis| axis * (channel.axis_sigma_rad * normal()));
+        if channel.axis_b.norm() > 0.0 {
+            channel.axis_b = (channel.axis_b + across[0] + across[1]) * scale;
+        }
+    }
+    let twin = Twin::new(real, environment, scene, starts_s.clone()).expect("a twin");
+    let readings = twin.predict(active);
+    let mut text = format!(
+        "t_s,{}\n",
+        unit.channels
+            .iter()
+            .map(|channel| channel.name.as_str())
+            .collect::<Vec<_>>()
+            .join(",")
+    );
+    for (row, start_s) in starts_s.iter().enumerate() {
+        let cells = unit.channels.iter().zip(&readings).map(|(channel, own)| {
+            let value = own[row] + channel.noise_sigma * normal();
+            format!("{:.9}", channel.logged(value))
+        });
+        text += &format!("{:.1},{}\n", start_s - from_s, cells.collect::<Vec<_>>().join(","));
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let case = format!(
+        "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
+         [motion_known]\nnone = true\n[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
+         [windows]\nfit = [[0.0, 110.0]]\nhold = [[110.0, 120.0]]\n",
+        environment.gravity,
+        environment.latitude.to_degrees(),
+        environment.field_n_ut.x,
+        environment.field_n_ut.y,
+        environment.field_n_ut.z
+    );
+    for (name, text) in [("case.toml", case), ("unit.toml", unit.text()), ("measured.csv", text)] {
+        fs::write(folder.path().join(name), text).expect("a file");
+    }
+    folder
+}
+
+fn found(folder: &TempDir) -> Findings {
+    let flight = Flight::open(folder.path()).expect("opens");
+    Findings::of(&flight, &[], &|_, _| ()).expect("has redundancy")
+}
+
+fn iron(plate: &str, theta: [f64; 3]) -> Active {
+    Active {
+        cause: Cause {
+            effect: by_name("hard-iron").expect("an effect"),
+            locality: Locality::Group(plate.to_owned()),
+            variant: 0.0,
+        },
+        theta: theta.to_vec(),
+    }
+}
+
+fn check_healthy(name: &str, from_s: f64) {
+    let findings = found(&flown(name, from_s, 3, &[], |_| true));
+    let names: Vec<&str> = findings.names.iter().map(|name| name.effect).collect();
+    assert!(names.is_empty(), "{name}: {names:?}");
+    assert!((0.97..1.03).contains(&findings.gap[0]), "{name}: {}", findings.gap[0]);
+}
+
+#[test]
+fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
+    check_healthy("still", 10.0);
+    check_healthy("tumble", 20.0);
+}
+
+/// The other motions of the twin, some 10 s each.
+#[test]
+#[ignore = "a minute of processor; cargo test -p gap --test parity -- --ignored"]
+fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
+    for (name, from_s) in [
+        ("rate-table", 20.0),
+        ("rotation-1", 10.0),
+        ("rotation-2", 10.0),
+        ("rocket", 60.0),
+    ] {
+        check_healthy(name, from_s);
+    }
+}
+
+#[test]
+fn a_magnet_on_one_plate_is_named_sized_and_said_to_rest_on_parity() {
+    let folder = flown("tumble", 20.0, 4, &[iron("plate 3", [1.0, -0.8, 0.6])], |_| true);
+    let texts = analysed(folder.path(), &[], &|_, _| ()).expect("an analysis");
+    let text = |file: &str| &texts.iter().find(|(name, _)| name == file).expect(file).1;
+    let verdict: Value = serde_json::from_str(text("verdict.json")).expect("is JSON");
+    assert_eq!(
+        (&verdict["format"], &verdict["from"]),
+        (&"gap-verdict/2".into(), &"parity".into())
+    );
+    assert_eq!(verdict["causes"][0]["effect"], "hard-iron");
+    assert_eq!(
+        verdict["causes"][0]["channels"],
+        serde_json::json!(["m3x", "m3y", "m3z"])
+    );
+    let parameters = verdict["causes"][0]["parameters"].as_object().expect("parameters");
+    for (own, truth) in parameters.values().zip([1.0, -0.8, 0.6]) {
+        let [value, sigma] = ["value", "sigma"].map(|key| own[key].as_f64().expect("a number"));
+        assert!((value - truth).abs() < 4.0 * sigma, "{value} +- {sigma}, truth {truth}");
+    }
+    let never = verdict["never_named"].as_array().expect("a list");
+    assert!(
+        ["latency", "mounting"]
+            .iter()
+            .all(|name| never.contains(&(*name).into())),
+        "{never:?}"
+    );
+    let screen = text("all.txt");
+    assert!(screen.find("UNSEEN") < screen.find("CAUSE"), "{screen}");
+}
+
+#[test]
+fn one_plate_alone_has_no_parity_and_that_is_said() {
+    let folder = flown("tumble", 20.0, 5, &[], |group| group == "plate 1");
+    let error = analysed(folder.path(), &[], &|_, _| ())
+        .expect_err("is refused")
+        .to_string();
+    assert!(
+        error.contains("unit.toml") && error.contains("Parity is empty"),
+        "{error}"
+    );
+}
