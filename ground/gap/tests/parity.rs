@@ -2,13 +2,20 @@
 
 use std::fs;
 
-use gap::parity::{analysed, findings::Findings, flight::Flight};
+use clap::Parser;
+use gap::{
+    command::{Arguments, run},
+    input::case::Subject,
+    parity::{analysed, findings::Findings, flight::Flight},
+    probability::outcome::Outcome,
+    thresholds::PARITY_SNR,
+};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;
 use tempfile::TempDir;
 use twin::{
-    effect::{Active, Cause, Locality, by_name},
+    effect::{Active, Cause, LIBRARY, Locality, by_name},
     motion,
     predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
 };
@@ -92,6 +99,10 @@ fn check_healthy(name: &str, from_s: f64) {
     let names: Vec<&str> = findings.names.iter().map(|name| name.effect).collect();
     assert!(names.is_empty(), "{name}: {names:?}");
     assert!((0.97..1.03).contains(&findings.gap[0]), "{name}: {}", findings.gap[0]);
+    assert!(findings.none_of_these < 0.5, "{name}: gap {:?}", findings.gap);
+    let (named, small): (Vec<_>, Vec<_>) = findings.visible.iter().partition(|row| row.is_visible);
+    assert!(!named.is_empty() && !small.is_empty());
+    assert!(named.iter().all(|row| row.snr >= PARITY_SNR), "{name}: {named:?}");
 }
 
 #[test]
@@ -108,10 +119,17 @@ fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
         ("rate-table", 20.0),
         ("rotation-1", 10.0),
         ("rotation-2", 10.0),
-        ("rocket", 60.0),
+        ("rocket", 120.0),
     ] {
         check_healthy(name, from_s);
     }
+}
+
+#[test]
+fn a_boost_is_too_quick_for_the_packets_and_that_is_no_name_but_unknown() {
+    let findings = found(&flown("rocket", 60.0, 3, &[], |_| true));
+    assert!(findings.names.is_empty(), "{:?}", findings.names);
+    assert_eq!(findings.outcome, Outcome::Unknown);
 }
 
 #[test]
@@ -155,4 +173,61 @@ fn one_plate_alone_has_no_parity_and_that_is_said() {
         error.contains("unit.toml") && error.contains("Parity is empty"),
         "{error}"
     );
+}
+
+#[test]
+fn what_is_another_motion_gets_no_name_and_leaves_no_gap() {
+    for (effect, locality, theta) in [
+        ("latency", Locality::Unit, vec![0.15]),
+        ("gravity-value", Locality::Unit, vec![0.2]),
+        ("accel-scale", Locality::Common, vec![0.05]),
+        ("hard-iron", Locality::Common, vec![9.0, -8.0, 6.0]),
+    ] {
+        let cause = Cause {
+            effect: by_name(effect).expect("an effect"),
+            locality,
+            variant: 0.0,
+        };
+        let findings = found(&flown("tumble", 20.0, 6, &[Active { cause, theta }], |_| true));
+        let names: Vec<&str> = findings.names.iter().map(|name| name.effect).collect();
+        assert!(findings.none_of_these < 0.5, "{effect}: gap {:?}", findings.gap);
+        assert!(names.is_empty(), "{effect}: {names:?}");
+        assert!((0.97..1.03).contains(&findings.gap[0]), "{effect}: {}", findings.gap[0]);
+    }
+}
+
+#[test]
+fn what_no_effect_of_the_library_explains_is_called_unknown() {
+    let folder = flown("tumble", 20.0, 4, &[iron("plate 3", [1.0, -0.8, 0.6])], |_| true);
+    let flight = Flight::open(folder.path()).expect("opens");
+    let names = LIBRARY.iter().map(|effect| effect.page().name);
+    let withheld: Vec<String> = names.filter(|name| *name != "latency").map(str::to_owned).collect();
+    let findings = Findings::of(&flight, &withheld, &|_, _| ()).expect("has redundancy");
+    assert!(findings.names.is_empty(), "{:?}", findings.names);
+    assert!(findings.none_of_these > 0.5, "gap {:?}", findings.gap);
+    assert_eq!(findings.outcome, Outcome::Unknown);
+}
+
+#[derive(Parser)]
+struct Line {
+    #[command(flatten)]
+    arguments: Arguments,
+}
+
+#[test]
+fn what_needs_a_reference_is_refused_with_a_word_of_what_to_do() {
+    let folder = flown("still", 10.0, 3, &[], |_| true);
+    let Err(error) = Subject::open(folder.path()) else {
+        panic!("a reference where there is none");
+    };
+    assert!(error.to_string().contains("ground gap CASE"), "{error}");
+    let path = folder.path().to_str().expect("a path");
+    let line = Line::parse_from(["gap", path, "--against", path]);
+    let error = run(&line.arguments).expect_err("is refused").to_string();
+    assert!(error.contains("--against needs a case with a motion"), "{error}");
+    let case = folder.path().join("case.toml");
+    let text = fs::read_to_string(&case).expect("a case");
+    fs::write(&case, format!("motion = \"motion.csv\"\n{text}")).expect("a file");
+    let error = Flight::open(folder.path()).err().expect("is refused").to_string();
+    assert!(error.contains("motion_known.none"), "{error}");
 }

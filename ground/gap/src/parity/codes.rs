@@ -215,7 +215,7 @@ mod tests {
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
     /// Four plates with three accelerometers each, a noise of two codes, changed as told.
-    fn found(change: impl Fn(usize, usize, f64, f64) -> f64) -> Vec<Finding> {
+    fn logged(change: impl Fn(usize, usize, f64, f64) -> f64) -> (Log, UnitDescription) {
         let mut text = "name = \"x\"\ncycle_s = 0.2\n".to_owned();
         for index in 0..12 {
             text += &format!(
@@ -238,6 +238,11 @@ mod tests {
                 log.channels[index].values.push(value);
             }
         }
+        (log, unit)
+    }
+
+    fn found(change: impl Fn(usize, usize, f64, f64) -> f64) -> Vec<Finding> {
+        let (log, unit) = logged(change);
         look(&log, &unit)
     }
 
@@ -271,5 +276,26 @@ mod tests {
             [("coarse-quantisation", vec![3, 4, 5]), ("stuck-channel", vec![9])]
         );
         assert_eq!(coarse[0].step, Some(4));
+    }
+
+    #[test]
+    fn what_was_found_no_longer_speaks_in_the_fit() {
+        let (mut log, mut unit) = logged(|index, row, value, before| match index {
+            0..=2 if row % 20 == 7 => before,
+            3 => (value / 0.4).floor() * 0.4,
+            9 => 1.3,
+            _ => value,
+        });
+        let found = look(&log, &unit);
+        taken_out(&mut log, &mut unit, &found);
+        let rows = |channel: usize| log.channels[channel].rows.len();
+        // Thirty were sent twice; a few more repeat by chance.
+        assert!((560..=570).contains(&rows(0)) && rows(0) == rows(1), "{}", rows(0));
+        assert_eq!([rows(9), rows(11)], [0, 600]);
+        // A step of 0.4 has the deviation 0.4 / sqrt(12) and cuts off half of it at most.
+        let coarse = &unit.channels[3];
+        assert!((coarse.noise_sigma - 0.2_f64.hypot(0.115_470)).abs() < 1e-6);
+        assert!((coarse.bias_sigma - 0.2).abs() < 1e-9, "{}", coarse.bias_sigma);
+        assert_eq!(unit.channels[11].noise_sigma, 0.2);
     }
 }

@@ -3,11 +3,13 @@
 //! In: a [`Flight`]. Out: [`Findings`]. Everything that is said rests on the fit windows.
 //!
 //! The gap is the root mean square of what a packet keeps once motion and calibration are marginalised: over degrees of
-//! freedom, so that 1 is noise and calibration alone. Beyond [`PARITY_GAP`] something is there, or the smoothed motion did
-//! not come near enough to the true one: both are said in one sentence, for one log cannot tell them apart.
+//! freedom, so that 1 is noise and calibration alone. Beyond [`PARITY_GAP`], or with a calibration that is off by more than chance,
+//! something is there, or the smoothed motion did not come near enough to the true one: both are said in one sentence, for one
+//! log cannot tell them apart.
 //!
 //! Refuses a unit whose sensors are no more than what a motion has: one plate. Then parity is empty.
 
+use statrs::function::erf::erfc;
 use twin::{
     effect::{Parameter, by_name},
     predict::{Kind, Twin},
@@ -31,7 +33,7 @@ use crate::{
         visible::{self, Row},
     },
     probability::{cause::Sized, outcome::Outcome},
-    thresholds::{LISTED, PARITY_FREE, PARITY_GAP, SAID, UNKNOWN_PRIOR},
+    thresholds::{CHANCE, LISTED, PARITY_FREE, PARITY_GAP, SAID, UNKNOWN_PRIOR},
 };
 
 /// Probability of a name that codes alone give: chance is ruled out, the library's other effects on codes are not.
@@ -136,7 +138,7 @@ impl Findings {
             .retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
         alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
         alternatives.dedup_by_key(|(name, _)| *name);
-        let is_unexplained = gap[1] > PARITY_GAP;
+        let is_unexplained = gap[1] > PARITY_GAP || beyond_chance(&space.calibration(&left));
         let none_of_these = if is_unexplained {
             1.0 - UNKNOWN_PRIOR
         } else {
@@ -197,6 +199,14 @@ fn total(kept: &[(f64, f64)]) -> f64 {
         .iter()
         .fold((0.0, 0.0), |(energy, free), own| (energy + own.0, free + own.1));
     (energy / free.max(1.0)).max(0.0).sqrt()
+}
+
+/// Whether the calibration must be off by more of its own sigmas than chance gives one log in twenty over all its parameters: a
+/// magnet beside one of forty channels is lost in the gap of the whole, and found here.
+fn beyond_chance(sizes: &[f64]) -> bool {
+    let most = sizes.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
+    // Of a standard normal: what is fitted is off by no more than what it is fitted to.
+    erfc(most / 2f64.sqrt()) * (sizes.len() as f64) < CHANCE
 }
 
 /// Their places, each once.

@@ -118,17 +118,34 @@ impl<'a> Space<'a> {
         dot(&one.column, &other.column) - own.motion.dot(&others.motion) - own.open.dot(&others.open)
     }
 
+    /// By how many of its own sigmas each parameter of the calibration is off, channel by channel, as this residual has it.
+    pub fn calibration(&self, residual: &Projected) -> Vec<f64> {
+        let own = self.problem.frames.iter().map(|frame| frame.nuisance.ncols()).sum();
+        self.open(residual).iter().take(own).copied().collect()
+    }
+
+    /// What calibration and nulls come to, in their own sigmas.
+    fn open(&self, residual: &Projected) -> DVector<f64> {
+        let mut open = residual.imitated.open.clone();
+        if let Some(factor) = &self.factor {
+            factor.l_dirty().tr_solve_lower_triangular_mut(&mut open);
+        }
+        open
+    }
+
     /// Of each channel, the energy that a residual keeps and the degrees of freedom that it has there: both are equal on the whole
-    /// where noise and calibration are enough.
+    /// where noise and calibration are enough. What the calibration must be off by, in its own sigmas, is energy too: without
+    /// it a calibration could explain anything at no price.
     pub fn kept(&self, residual: &Projected) -> Vec<(f64, f64)> {
         let mut left = residual.column.clone();
-        if let Some(factor) = &self.factor {
-            let mut found = residual.imitated.open.clone();
-            factor.l_dirty().tr_solve_lower_triangular_mut(&mut found);
+        let mut price = vec![0.0; self.problem.frames.len()];
+        if self.factor.is_some() {
+            let found = self.open(residual);
             let mut next = 0;
             for (channel, frame) in self.problem.frames.iter().enumerate() {
                 let own = found.rows(next, frame.nuisance.ncols());
                 next += frame.nuisance.ncols();
+                price[channel] = own.norm_squared();
                 if let Some((_, values)) = left.iter_mut().find(|(own, _)| *own == channel) {
                     values.gemv(-1.0, &frame.nuisance, &own, 1.0);
                 }
@@ -145,7 +162,8 @@ impl<'a> Space<'a> {
         let mut kept = vec![(0.0, 0.0); self.problem.frames.len()];
         for (channel, values) in &left {
             let imitated = self.motion.imitated(*channel, &part);
-            kept[*channel] = (values.dot(values) - values.dot(&imitated), self.motion.free(*channel));
+            let energy = values.dot(values) - values.dot(&imitated) + price[*channel];
+            kept[*channel] = (energy, self.motion.free(*channel));
         }
         kept
     }
