@@ -111,9 +111,7 @@ fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
     check_healthy("tumble", 20.0);
 }
 
-/// The other motions of the twin, some 10 s each.
 #[test]
-#[ignore = "a minute of processor; cargo test -p gap --test parity -- --ignored"]
 fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
     for (name, from_s) in [
         ("rate-table", 20.0),

@@ -5,10 +5,10 @@
 //! is about as large) and field ([`TURNS_TOWARDS_S`], the complementary filter of Mahony 2008). In the frame that it makes,
 //! force and field change slowly, and are splines too.
 //!
-//! It needs to be right to some percent only: what it is off by is eliminated packet by packet ([`crate::parity::packet`]). How far the
-//! derivatives may be off is taken from the second differences of the splines themselves, less what noise puts there.
+//! It needs to be right to some percent only: what it is off by is eliminated packet by packet ([`crate::parity::packet`]).
+//! How far the derivatives may be off is taken from the second differences of the splines themselves, less what noise puts there.
 
-use nalgebra::{Matrix3, Rotation3, SVector, UnitQuaternion, Vector1, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector1, Vector3};
 use twin::{
     environment::Environment,
     predict::{Channel, Feel, Kind, Scene, UnitDescription},
@@ -266,9 +266,9 @@ fn lively(spline: &Spline<3>, starts_s: &[f64], knot_s: f64, sigma: f64) -> Vec<
         while to < starts_s.len() && starts_s[to] <= now_s + ALIKE_S {
             to += 1;
         }
-        let around: SVector<f64, 1> = Vector1::new(squares[from..to].iter().sum::<f64>() / (to - from) as f64);
+        let around = squares[from..to].iter().sum::<f64>() / (to - from) as f64;
         let chance = 1.0 + 3.0 * (2.0 / (3.0 * (to - from) as f64)).sqrt();
-        (around.x - noise * chance).max(0.0).sqrt()
+        (around - noise * chance).max(0.0).sqrt()
     };
     starts_s.iter().map(about).collect()
 }

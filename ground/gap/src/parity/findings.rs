@@ -68,7 +68,7 @@ pub struct Name {
 
 /// Everything that is said.
 pub struct Findings {
-    /// Rows of the fit windows, and one of so many of the log.
+    /// Packets of the fit windows that were used.
     pub rows: usize,
     /// Degrees of freedom a packet that the motion leaves: gyros, accelerometers, magnetometers, thermometers.
     pub free: [f64; 4],
@@ -138,8 +138,7 @@ impl Findings {
             .retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
         alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
         alternatives.dedup_by_key(|(name, _)| *name);
-        let is_unexplained = gap[1] > PARITY_GAP || beyond_chance(&space.calibration(&left));
-        let none_of_these = if is_unexplained {
+        let none_of_these = if is_unexplained(gap[1], &space.calibration(&left)) {
             1.0 - UNKNOWN_PRIOR
         } else {
             UNKNOWN_PRIOR
@@ -201,12 +200,13 @@ fn total(kept: &[(f64, f64)]) -> f64 {
     (energy / free.max(1.0)).max(0.0).sqrt()
 }
 
-/// Whether the calibration must be off by more of its own sigmas than chance gives one log in twenty over all its parameters: a
-/// magnet beside one of forty channels is lost in the gap of the whole, and found here.
-fn beyond_chance(sizes: &[f64]) -> bool {
-    let most = sizes.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
+/// Whether something is there that nothing named explains: a gap too large, or a calibration that is off by more of its own sigmas
+/// than chance gives one log in twenty over all its parameters. A magnet beside one of forty channels is lost in the gap of
+/// the whole, and found in the calibration.
+fn is_unexplained(gap: f64, calibration: &[f64]) -> bool {
+    let most = calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
     // Of a standard normal: what is fitted is off by no more than what it is fitted to.
-    erfc(most / 2f64.sqrt()) * (sizes.len() as f64) < CHANCE
+    gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE
 }
 
 /// Their places, each once.
@@ -256,5 +256,20 @@ fn by_search(problem: &Problem, library: &Library, chosen: &Chosen) -> Name {
         which: hypothesis.cause.effect.told(hypothesis.cause.variant),
         physics: page.physics,
         confirm_by: page.confirm_by,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_and_a_calibration_beyond_chance_are_each_enough_to_be_unexplained() {
+        // Of 400 parameters one is beyond 3.8 sigma in one log of twenty: 400 * erfc(3.8 / sqrt(2)) = 0.058, at 3.9 0.038.
+        let calibration = |most: f64| [vec![0.5; 399], vec![-most]].concat();
+        assert!(!is_unexplained(1.0, &calibration(3.8)));
+        assert!(is_unexplained(1.0, &calibration(3.9)));
+        assert!(is_unexplained(1.06, &calibration(1.0)));
+        assert!(!is_unexplained(1.04, &calibration(1.0)));
     }
 }

@@ -25,7 +25,8 @@ pub struct Null {
 /// All of them.
 pub const NULLS: &[Null] = &[
     Null {
-        what: "a delay of all sensors, or of all of one kind, a clock that runs wrong, a packet time that is off: the motion is simply another one",
+        what: "a delay of all sensors, or of all of one kind, a clock that runs wrong, a packet time that is off: \
+            the motion is simply another one",
         effects: &[
             "latency",
             "gyro-latency",
@@ -36,15 +37,18 @@ pub const NULLS: &[Null] = &[
             "clock-rate",
             "packet-loss",
         ],
-        settled_by: "turn the unit on a table whose angle is logged on the unit's clock, or strike it beside a sensor with a clock of its own",
+        settled_by: "turn the unit on a table whose angle is logged on the unit's clock, or strike it beside a sensor \
+            with a clock of its own",
     },
     Null {
-        what: "one rotation of all sensors, or of all of one kind, and one of the frame n: mounting, the table's tilt, the field's direction",
+        what: "one rotation of all sensors, or of all of one kind, and one of the frame n: mounting, the table's \
+            tilt, the field's direction",
         effects: &["mounting", "table-tilt", "field-model"],
         settled_by: "stand the unit on its six faces on a levelled plate, and turn it about each axis of a table",
     },
     Null {
-        what: "a scale or a bias that all sensors of a kind share; gravity against the scale of all accelerometers, the size of the field against that of all magnetometers",
+        what: "a scale or a bias that all sensors of a kind share; gravity against the scale of all accelerometers, \
+            the size of the field against that of all magnetometers",
         effects: &[
             "gravity-value",
             "earth-rate",
@@ -54,7 +58,8 @@ pub const NULLS: &[Null] = &[
             "accel-scale",
             "hard-iron",
         ],
-        settled_by: "rest in two opposite attitudes tells bias and scale of the accelerometers; a full turn of a table, those of the gyros; a site whose field is surveyed, those of the magnetometers",
+        settled_by: "rest in two opposite attitudes tells bias and scale of the accelerometers; a full turn of a table, \
+            those of the gyros; a site whose field is surveyed, those of the magnetometers",
     },
     Null {
         what: "a lever arm that all accelerometers share: it is the origin of the track",

@@ -23,7 +23,7 @@ use crate::{
         space::{Projected, Space},
         visible::may_be_named,
     },
-    search::odds::oversize,
+    search::odds::{itself, oversize},
     thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, TEMPERATURE},
 };
 
@@ -360,7 +360,7 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
             .map_or(0.0, |one| one.snr),
         found_snr: fit.energy.max(0.0).sqrt(),
         // Beyond its largest size it stands for something else, as in the search with a reference.
-        probability: own * doubt / (1.0 + excess.powi(4)),
+        probability: own * doubt * itself(excess),
         rivals: by_effect,
     })
 }

@@ -1,9 +1,9 @@
 //! Inner products of residual and columns with motion and calibration marginalised.
 //!
 //! In: a problem about the smoothed motion, its eliminated [`Motion`], and columns of what can never be told from either. Out:
-//! `<u, v> = u'v - (Q'u)'(Q'v) - c_u'c_v` with `c_u = L^-1 <C, u>` and `L L' = I + <C, C>` (gap from parity and smoothing, level parity), `C` being what the
-//! calibration of every channel leaves open and the known nulls. The motion joins the channels, so the calibration is one
-//! system of some four hundred columns.
+//! `<u, v> = u'v - (Q'u)'(Q'v) - c_u'c_v` with `c_u = L^-1 <C, u>` and `L L' = I + <C, C>`, `C` being what the calibration of
+//! every channel leaves open and the known nulls. The motion joins the channels, so the calibration is one system of some
+//! four hundred columns.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -191,7 +191,7 @@ mod tests {
     use crate::{
         input::{log::Series, reference::Reference, windows::Fit},
         library::hypotheses::Library,
-        parity::{course::Course, packet::slopes_of},
+        parity::{course::Course, nulls, packet::slopes_of},
     };
 
     /// A unit that turns about all axes, in so many packets, without noise; what is asked of its space and its library.
@@ -309,6 +309,24 @@ mod tests {
 
     /// What priors of finite width leave of an exact null, as a part of its ratio.
     const NOTHING: f64 = 0.02;
+
+    #[test]
+    fn what_linearisation_leaves_of_a_null_is_no_evidence_once_its_columns_are_free() {
+        tumbling(30, |space, library, _| {
+            let nulls = nulls::columns(library);
+            let free = Space::new(space.problem, space.motion, nulls.clone());
+            let most = |space: &Space| {
+                let kept = |null: &Entries| {
+                    let column = space.project(vec![null.clone()]).remove(0);
+                    space.inner(&column, &column)
+                };
+                nulls.iter().map(kept).fold(0.0, f64::max)
+            };
+            // A column for one standard deviation keeps at most one once it is free.
+            let (before, after) = (most(space), most(&free));
+            assert!(before > 1.0 && after <= 1.0 + ROUNDING, "{before}, {after}");
+        });
+    }
 
     #[test]
     fn what_all_sensors_share_keeps_nothing() {

@@ -35,8 +35,9 @@ pub fn screen(flight: &Flight, findings: &Findings) -> String {
     };
     let _ = writeln!(
         out,
-        "PARITY  no reference: only what the sensors say against each other, {} packets of the fit windows{thinned}; degrees of freedom a packet: \
-         gyros {gyros:.1}, accelerometers {accelerometers:.1}, magnetometers {magnetometers:.1}, thermometers {thermometers:.1}",
+        "PARITY  no reference: only what the sensors say against each other, {} packets of the fit windows{thinned}; \
+         degrees of freedom a packet: gyros {gyros:.1}, accelerometers {accelerometers:.1}, magnetometers {magnetometers:.1}, \
+         thermometers {thermometers:.1}",
         findings.rows
     );
     out += &seen_and_not(findings);
@@ -127,8 +128,9 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
         }
         Outcome::Named => format!("LEFT    {:.3} sigma once the causes are in", findings.gap[1]),
         _ => format!(
-            "LEFT    {:.3} sigma that nothing named explains: an effect outside the library, one of a kind that is listed under \
-             UNSEEN and is far above its usual size, or a motion too quick for the packets",
+            "LEFT    {:.3} sigma; not explained by what is named: the gap, or a calibration that is off by more than its sigmas \
+             allow. An effect outside the library, one of a kind that is listed under UNSEEN and is far above its usual size, \
+             or a motion too quick for the packets",
             findings.gap[1]
         ),
     };
@@ -158,8 +160,8 @@ pub fn next(findings: &Findings) -> String {
 /// What of each effect can be seen, and what cannot and why.
 pub fn visibility(findings: &Findings) -> String {
     let mut out = format!(
-        "signal-to-noise ratio of an effect of usual size, where it is seen best: with the motion known, by parity, and the share \
-         that remains; from {PARITY_SNR:.0} on it may be named\n{:30} {:8} {:>10} {:>8} {:>6}\n",
+        "signal-to-noise ratio of an effect of usual size, where it is seen best:\nwith the motion known, by parity, and the \
+         share that remains; from {PARITY_SNR:.0} on it may be named\n{:30} {:8} {:>10} {:>8} {:>6}\n",
         "effect", "place", "reference", "parity", "share"
     );
     for row in &findings.visible {

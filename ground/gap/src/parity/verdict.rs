@@ -1,17 +1,20 @@
 //! `verdict.json` of a log without a reference: `gap-verdict/2` with `"from": "parity"`.
 //!
-//! In: [`Findings`]. Out: the keys of the format that parity can fill. There is no `shrink`, for the held-out windows are not asked;
-//! `visible` and `not_visible` say what a silence means.
+//! In: [`Findings`]. Out: the keys of the format that parity can fill. There is no `shrink`, for the held-out windows are not
+//! asked; `visible` and `not_visible` say what a silence means.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::parity::{
-    findings::{Findings, Name},
-    flight::Flight,
-    nulls::NULLS,
-    text,
+use crate::{
+    parity::{
+        findings::{Findings, Name},
+        flight::Flight,
+        nulls::NULLS,
+        text,
+    },
+    report::verdict::{self as report, Alternative, Parameter},
 };
 
 /// The whole file.
@@ -49,19 +52,6 @@ struct Cause {
     parameters: BTreeMap<String, Parameter>,
 }
 
-#[derive(Debug, Serialize)]
-struct Parameter {
-    value: f64,
-    sigma: f64,
-    unit: &'static str,
-}
-
-#[derive(Debug, Serialize)]
-struct Alternative {
-    effect: &'static str,
-    probability: f64,
-}
-
 /// Ratios of an effect of usual size.
 #[derive(Debug, Serialize)]
 struct Visible {
@@ -78,9 +68,9 @@ struct NotVisible {
     settled_by: &'static str,
 }
 
-/// Four decimals: what is beyond is noise.
+/// Four decimals.
 fn rounded(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
+    report::rounded(value, 4)
 }
 
 impl Verdict {

@@ -69,17 +69,19 @@ struct Cause {
     parameters: BTreeMap<String, Parameter>,
 }
 
+/// A parameter of a cause, in `unit`.
 #[derive(Debug, Serialize)]
-struct Parameter {
-    value: f64,
-    sigma: f64,
-    unit: &'static str,
+pub(crate) struct Parameter {
+    pub(crate) value: f64,
+    pub(crate) sigma: f64,
+    pub(crate) unit: &'static str,
 }
 
+/// Another effect that may be the cause.
 #[derive(Debug, Serialize)]
-struct Alternative {
-    effect: &'static str,
-    probability: f64,
+pub(crate) struct Alternative {
+    pub(crate) effect: &'static str,
+    pub(crate) probability: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -92,7 +94,7 @@ struct Shrink {
 }
 
 /// Rounds to so many decimals: what is beyond is noise, and a verdict is read.
-fn rounded(value: f64, decimals: i32) -> f64 {
+pub(crate) fn rounded(value: f64, decimals: i32) -> f64 {
     let factor = 10f64.powi(decimals);
     (value * factor).round() / factor
 }
