@@ -66,6 +66,7 @@ impl Believed {
             &mut causes,
             |cause| if is_scatter(cause) { whole } else { 2.0 * cause.gain },
         );
+        one_name(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.
         let (causes, unnamed) = causes.into_iter().partition(|cause| cause.any() >= SAID);
@@ -100,6 +101,25 @@ impl Believed {
     }
 }
 
+/// Parts of one effect at several places with channels in common, such as what all plates share and what each has of its own, are
+/// fitted together and mean nothing alone: if one of them is likely enough to be said, all have its probability. One effect
+/// twice at one place is two events, of which each is there or not.
+fn one_name(causes: &mut [Cause]) {
+    let said: Vec<Cause> = causes
+        .iter()
+        .filter(|cause| cause.probability >= SAID)
+        .cloned()
+        .collect();
+    for cause in causes {
+        let is_whole = |other: &&Cause| {
+            let shares_channels = other.channels.iter().any(|channel| cause.channels.contains(channel));
+            other.effect == cause.effect && other.locality != cause.locality && shares_channels
+        };
+        let whole = said.iter().filter(is_whole).map(|other| other.probability);
+        cause.probability = whole.fold(cause.probability, f64::max);
+    }
+}
+
 /// Per channel, energy that an explanation leaves standing out in some octave of a flat floor, in squares of noise; none where it says
 /// how the scatter is coloured. Louder noise is as flat as noise.
 fn loud(problem: &Problem, explanation: &Explanation, floor: &[Vec<f64>]) -> Vec<f64> {
@@ -116,4 +136,45 @@ fn loud(problem: &Problem, explanation: &Explanation, floor: &[Vec<f64>]) -> Vec
     };
     let rests = explanation.model.fitted.rest.iter().enumerate();
     rests.map(of_channel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cause(effect: &'static str, locality: &str, channels: &[usize], probability: f64) -> Cause {
+        Cause {
+            effect,
+            locality: locality.to_owned(),
+            channels: channels.to_vec(),
+            probability,
+            of_any: 1.0,
+            gain: 0.0,
+            parameters: Vec::new(),
+            share: 0.0,
+            when: String::new(),
+            which: None,
+            confirm_by: "",
+            physics: "",
+            is_suspicious: false,
+        }
+    }
+
+    #[test]
+    fn parts_of_one_effect_have_one_probability_and_what_stands_for_itself_keeps_its_own() {
+        let mut causes = [
+            cause("hard-iron", "common", &[0, 1, 2, 3], 0.15),
+            cause("hard-iron", "all", &[3, 4], 0.97),
+            cause("hard-iron", "plate 4", &[8, 9], 0.2),
+            cause("soft-iron", "common", &[3, 4], 0.3),
+            // Two events, and two parts of which none is likely.
+            cause("packet-loss", "unit", &[0, 1], 0.9),
+            cause("packet-loss", "unit", &[0, 1], 0.4),
+            cause("gyro-bias", "common", &[5, 6], 0.3),
+            cause("gyro-bias", "all", &[5, 6], 0.4),
+        ];
+        one_name(&mut causes);
+        let probabilities = causes.map(|cause| cause.probability);
+        assert_eq!(probabilities, [0.97, 0.97, 0.2, 0.3, 0.9, 0.4, 0.3, 0.4]);
+    }
 }
