@@ -261,19 +261,29 @@ fn told(answer: &Answer) -> String {
 }
 
 fn found(verdict: &Verdict) -> String {
-    names(
-        verdict
-            .causes
-            .iter()
-            .map(|cause| (cause.effect.clone(), cause.channels.clone())),
-    )
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
+    for cause in &verdict.causes {
+        match found.iter_mut().find(|(name, _)| *name == cause.effect) {
+            Some((_, channels)) => {
+                let others = cause.channels.iter().filter(|own| !channels.contains(own)).cloned();
+                let others: Vec<String> = others.collect();
+                channels.extend(others);
+            }
+            None => found.push((cause.effect.clone(), cause.channels.clone())),
+        }
+    }
+    names(found.into_iter())
 }
 
 /// The outcome in plain words.
 fn sentence(verdict: &Verdict, answer: &Answer, compared: &Against) -> String {
-    let is_right = verdict.causes.len() == answer.effect.len()
-        && (answer.effect.iter())
-            .all(|done| (verdict.causes.iter()).any(|cause| cause.effect == done.name && cause.probability > SURE));
+    let is_found = |done: &Done| {
+        let mut causes = verdict.causes.iter();
+        causes.any(|cause| cause.effect == done.name && cause.probability > SURE)
+    };
+    // An effect may be found in parts, what all plates share and what each has of its own.
+    let is_there = |cause: &Cause| answer.effect.iter().any(|done| done.name == cause.effect);
+    let is_right = answer.effect.iter().all(is_found) && verdict.causes.iter().all(is_there);
     let outcome = match (is_right, verdict.causes.is_empty()) {
         (true, _) => "The diagnosis named it",
         (false, true) => "The diagnosis named nothing",
