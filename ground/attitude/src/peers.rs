@@ -64,6 +64,15 @@ const COLUMNS: [(&str, &str, Mode); 4] = [
     ("motion", "motion", Mode::FromMotion),
 ];
 
+/// Of a filter: the mean over those of `numbers` that ours ran on, where the filter has all of them.
+fn mean(totals: &BTreeMap<(String, String), f64>, script: &str, numbers: &[&str], ours: &[Line]) -> Option<f64> {
+    let ran = |number: &&&str| ours.iter().any(|(name, _)| name == **number);
+    let total = |number: &&str| totals.get(&(script.to_string(), number.to_string())).copied();
+    let found: Option<Vec<f64>> = numbers.iter().filter(ran).map(total).collect();
+    let found = found.filter(|found| !found.is_empty())?;
+    Some(found.iter().sum::<f64>() / found.len() as f64)
+}
+
 /// Mean total errors: each mode over the recordings of tune and of report.
 pub fn format(ours: &[Line], others: &Totals) -> String {
     let mut text = format!("\n{:<14}", "mean [deg]");
@@ -87,11 +96,7 @@ pub fn format(ours: &[Line], others: &Totals) -> String {
     let own = cells().map(|((.., mode), numbers)| mean_of(ours, numbers, *mode).map(|rmse| rmse.total_deg));
     line("this filter", own.collect());
     for (filter, totals) in others {
-        let theirs = cells().map(|((_, script, _), numbers)| {
-            let total = |number: &&str| totals.get(&(script.to_string(), number.to_string())).copied();
-            let found: Option<Vec<f64>> = numbers.iter().map(total).collect();
-            found.map(|found| found.iter().sum::<f64>() / found.len() as f64)
-        });
+        let theirs = cells().map(|((_, script, _), numbers)| mean(totals, script, numbers, ours));
         line(filter, theirs.collect());
     }
     text
@@ -110,11 +115,9 @@ pub fn format_groups(ours: &[Line], others: &Totals) -> String {
             let Some(own) = mean_of(ours, numbers, mode) else {
                 continue;
             };
-            let theirs = others.iter().filter_map(|(filter, totals)| {
-                let total = |number: &&str| totals.get(&(script.to_string(), number.to_string())).copied();
-                let found: Option<Vec<f64>> = numbers.iter().map(total).collect();
-                Some((found?.iter().sum::<f64>() / numbers.len() as f64, filter))
-            });
+            let theirs = others
+                .iter()
+                .filter_map(|(filter, totals)| mean(totals, script, numbers, ours).map(|total| (total, filter)));
             let best = theirs.min_by(|one, other| one.0.total_cmp(&other.0));
             let best = best.map_or(String::new(), |(total, filter)| format!("{total:.2} {filter}"));
             line += &format!("{:>9.2} {best:<16}", own.total_deg);
@@ -154,7 +157,12 @@ mod tests {
             csv += &format!("VQF,{number},full,2.0,1.0,1.0\n");
         }
         csv += "VQF,01,full,7.0,1.0,1.0\nrubbish\n";
-        let text = format(&[], &parse(&csv));
+        let ours: Vec<Line> = TUNE
+            .iter()
+            .chain(&REPORT)
+            .map(|number| (number.to_string(), [None; MODES]))
+            .collect();
+        let text = format(&ours, &parse(&csv));
         let line = text.lines().find(|line| line.starts_with("VQF")).expect("a line");
         assert_eq!(
             line.split_whitespace().collect::<Vec<_>>(),
