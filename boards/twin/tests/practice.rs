@@ -28,23 +28,29 @@ const AT_THE_NOISE: f64 = 0.04;
 /// Of 41 parameters together, one in 40 000 trials is further off.
 const SIGMAS: f64 = 5.0;
 
+fn explained_to_its_noise(name: &str, motion: &str, field_n_ut: [f64; 3]) {
+    let case = case(name, motion, field_n_ut);
+    for channel in 0..case.twin.unit().channels.len() {
+        let fit = fit(&case, &[], &[channel]);
+        let channel = &case.twin.unit().channels[channel].name;
+        assert!(
+            (fit.after - 1.0).abs() < AT_THE_NOISE,
+            "{name} {channel}: {} -> {}",
+            fit.before,
+            fit.after
+        );
+    }
+}
+
 #[test]
 fn a_healthy_log_is_explained_to_its_noise() {
-    for (name, motion, field_n_ut) in [("P06", "flight-b", ALCANTARA), ("P12", "hand-a", OUTDOORS)] {
-        let Some(case) = case(name, motion, field_n_ut) else {
-            return;
-        };
-        for channel in 0..case.twin.unit().channels.len() {
-            let fit = fit(&case, &[], &[channel]);
-            let channel = &case.twin.unit().channels[channel].name;
-            assert!(
-                (fit.after - 1.0).abs() < AT_THE_NOISE,
-                "{name} {channel}: {} -> {}",
-                fit.before,
-                fit.after
-            );
-        }
-    }
+    explained_to_its_noise("P12", "hand-a", OUTDOORS);
+}
+
+#[test]
+#[ignore = "P06 is not in data/: EMEMS_DATA=FOLDER says where the whole set lies"]
+fn a_healthy_log_of_a_flight_is_explained_to_its_noise() {
+    explained_to_its_noise("P06", "flight-b", ALCANTARA);
 }
 
 /// Case, motion, field, effect, place, parameters.
@@ -57,11 +63,68 @@ type PutIn = (
     &'static [f64],
 );
 
+fn as_large_as_put_in(cases: &[PutIn]) {
+    for (name, motion, field_n_ut, effect, locality, expected) in cases {
+        let case = case(name, motion, *field_n_ut);
+        let active = active(&case, effect, locality.clone());
+        let channels = active.cause.channels(case.twin.unit());
+        let fit = fit(&case, &[active], &channels);
+        assert!(
+            (fit.after - 1.0).abs() < AT_THE_NOISE,
+            "{name} {effect}: {} -> {}",
+            fit.before,
+            fit.after
+        );
+        for ((found, sigma), expected) in fit.theta[0].iter().zip(&fit.sigma).zip(*expected) {
+            assert!(
+                (found - expected).abs() < SIGMAS * sigma,
+                "{name} {effect}: {found} +- {sigma}, put in {expected}"
+            );
+        }
+    }
+}
+
 #[test]
 fn an_effect_comes_out_as_large_as_it_was_put_in() {
+    as_large_as_put_in(&[
+        (
+            "P13",
+            "arm-a",
+            INDOORS,
+            "lever-arm",
+            Locality::Common,
+            &[0.00610802, 0.00224395, 0.00340567],
+        ),
+        (
+            "P14",
+            "positions-26",
+            TABLE,
+            "gyro-g-sensitivity",
+            Locality::All,
+            &[
+                2.17613e-06,
+                4.14807e-05,
+                -7.74865e-05,
+                9.87164e-05,
+                -0.000108134,
+                1.08798e-05,
+                0.000162122,
+                0.000203763,
+                -0.0001098,
+                -2.62034e-05,
+                -1.60183e-05,
+                0.000178375,
+            ],
+        ),
+    ]);
+}
+
+#[test]
+#[ignore = "these cases are not in data/: EMEMS_DATA=FOLDER says where the whole set lies"]
+fn each_of_eight_more_effects_comes_out_as_large_as_it_was_put_in() {
     let group = |name: &str| Locality::Group(name.to_owned());
     let one = |name: &str| Locality::Channel(name.to_owned());
-    let cases: [PutIn; 10] = [
+    as_large_as_put_in(&[
         (
             "P01",
             "hand-b",
@@ -113,35 +176,6 @@ fn an_effect_comes_out_as_large_as_it_was_put_in() {
             one("g4"),
             &[7.79906e-05],
         ),
-        (
-            "P13",
-            "arm-a",
-            INDOORS,
-            "lever-arm",
-            Locality::Common,
-            &[0.00610802, 0.00224395, 0.00340567],
-        ),
-        (
-            "P14",
-            "positions-26",
-            TABLE,
-            "gyro-g-sensitivity",
-            Locality::All,
-            &[
-                2.17613e-06,
-                4.14807e-05,
-                -7.74865e-05,
-                9.87164e-05,
-                -0.000108134,
-                1.08798e-05,
-                0.000162122,
-                0.000203763,
-                -0.0001098,
-                -2.62034e-05,
-                -1.60183e-05,
-                0.000178375,
-            ],
-        ),
         ("P16", "hand-a", OUTDOORS, "latency", Locality::Unit, &[0.012]),
         (
             "P15",
@@ -154,27 +188,7 @@ fn an_effect_comes_out_as_large_as_it_was_put_in() {
                 -0.0113824, -0.000578, -0.000486, -0.0181141, 0.00967687, 0.002180,
             ],
         ),
-    ];
-    for (name, motion, field_n_ut, effect, locality, expected) in cases {
-        let Some(case) = case(name, motion, field_n_ut) else {
-            return;
-        };
-        let active = active(&case, effect, locality);
-        let channels = active.cause.channels(case.twin.unit());
-        let fit = fit(&case, &[active], &channels);
-        assert!(
-            (fit.after - 1.0).abs() < AT_THE_NOISE,
-            "{name} {effect}: {} -> {}",
-            fit.before,
-            fit.after
-        );
-        for ((found, sigma), expected) in fit.theta[0].iter().zip(&fit.sigma).zip(expected) {
-            assert!(
-                (found - expected).abs() < SIGMAS * sigma,
-                "{name} {effect}: {found} +- {sigma}, put in {expected}"
-            );
-        }
-    }
+    ]);
 }
 
 /// How much likelier the log of each channel is with this effect, and its best variant and parameters [ln].
@@ -206,17 +220,13 @@ fn scatter(case: &Case, name: &str) -> Vec<(String, f64, f64, Vec<f64>)> {
 fn missing_bits_and_stale_samples_are_seen_where_they_are_and_nowhere_else() {
     // ln of the odds of one channel and variant among some three hundred, with a margin.
     const SEEN: f64 = 12.0;
-    let Some(coarse) = case("P02", "warmup-a", INDOORS) else {
-        return;
-    };
+    let coarse = case("P02", "warmup-a", INDOORS);
     for (channel, gain, variant, _) in scatter(&coarse, "coarse-quantisation") {
         assert_eq!(gain > SEEN, channel.starts_with("a2"), "{channel}: {gain}");
         // Two bits. They were cut off, but the fitted bias takes the offset of that, and it looks like rounding.
         assert!(gain < SEEN || variant.abs() == 2.0, "{channel}: {variant}");
     }
-    let Some(stale) = case("P08", "platform-steps-1", INDOORS) else {
-        return;
-    };
+    let stale = case("P08", "platform-steps-1", INDOORS);
     for (channel, gain, _, theta) in scatter(&stale, "stale-sample") {
         let is_stale = ["m3x", "m3y", "m3z", "g1"].contains(&channel.as_str());
         assert_eq!(gain > SEEN, is_stale, "{channel}: {gain}");
@@ -227,15 +237,13 @@ fn missing_bits_and_stale_samples_are_seen_where_they_are_and_nowhere_else() {
 
 #[test]
 fn a_smoothed_reference_explains_an_optical_log_better() {
-    let gaps = |corners_hz| {
-        let case = support::optical("R06", 9.8127, [17.027, 0.258, 41.016], corners_hz)?;
+    let gaps = |corners_hz| -> Vec<f64> {
+        let case = support::optical("R06", 9.8127, [17.027, 0.258, 41.016], corners_hz);
         let gaps: Vec<f64> = (0..9).map(|channel| fit(&case, &[], &[channel]).after).collect();
         println!("{corners_hz:?}: {gaps:.2?}");
-        Some(gaps)
+        gaps
     };
-    let (Some(raw), Some(smooth)) = (gaps(None), gaps(Some([25.0, 12.0]))) else {
-        return;
-    };
+    let (raw, smooth) = (gaps(None), gaps(Some([25.0, 12.0])));
     // Gyros are left at what the attitude's own error of 0.9 mrad makes at a few hertz.
     assert!((0..3).all(|gyro| smooth[gyro] < 0.8 * raw[gyro]));
     assert!((3..6).all(|accelerometer| smooth[accelerometer] < 0.15 * raw[accelerometer]));

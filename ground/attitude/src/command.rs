@@ -41,7 +41,7 @@ use crate::{
 /// of real recordings with optical truth instead, with --theses it prints the theses' tables beside ours.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --page attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings ../shared/data/broad --peers\n  ground attitude --theses"
+    after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --page attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings data/broad --peers\n  ground attitude --theses"
 )]
 pub struct Arguments {
     /// Packets or CSV, gzip or not

@@ -40,7 +40,7 @@ enum What {
 #[derive(Clone, Debug, clap::Args)]
 pub struct Reproductions {
     /// Folder with the documents' tables
-    #[arg(long, value_name = "FOLDER", default_value = "../shared/golden")]
+    #[arg(long, value_name = "FOLDER", default_value = "data/golden")]
     sources: PathBuf,
     /// The page
     #[arg(

@@ -59,21 +59,19 @@ fn experiment(kind: Kind, channels: &[&str], trials: Vec<Trial>) -> Experiment {
 }
 
 /// The golden runs: twelve positions at both signs, noise-free, from the printed calibration.
-fn runs() -> Option<Experiment> {
-    let golden = seeds::table("golden/002_golden_gyro_ls_ec.csv")?;
+fn runs() -> Experiment {
+    let golden = seeds::table("golden/002_golden_gyro_ls_ec.csv");
     let columns = ["pos", E[0], E[1], E[2], "g1_lsb", "g2_lsb", "g3_lsb", "g4_lsb"];
     let row = |row: &Vec<f64>| trial(format!("{}", row[0]), b_of_e(&row[1..4]), &row[4..]);
     let trials = seeds::numbers(&golden, &columns).iter().map(row).collect();
-    Some(experiment(Kind::Rate, &["g1", "g2", "g3", "g4"], trials))
+    experiment(Kind::Rate, &["g1", "g2", "g3", "g4"], trials)
 }
 
 #[test]
 fn the_golden_gyro_runs_give_the_printed_calibration_back() {
     // Outputs have nine decimals of a count.
     const DIGITS: f64 = 1e-9;
-    let (Some(runs), Some(truth)) = (runs(), seeds::table("golden/002_golden_gyro_ls_ec_truth.csv")) else {
-        return;
-    };
+    let (runs, truth) = (runs(), seeds::table("golden/002_golden_gyro_ls_ec_truth.csv"));
     let found = calibrate(&runs, &Options::default()).expect("fit");
     let columns = ["scale_dps_per_lsb", "nx_e", "ny_e", "nz_e", "bias_lsb", "bias_dps"];
     for (channel, truth) in found.channels.iter().zip(seeds::numbers(&truth, &columns)) {
@@ -86,9 +84,9 @@ fn the_golden_gyro_runs_give_the_printed_calibration_back() {
 }
 
 /// The golden outputs with the excitations Table 4.1 prints for them.
-fn printed() -> Option<Experiment> {
-    let mut printed = runs()?;
-    let table = seeds::table("golden/002_table4_1_gyro_positions.csv")?;
+fn printed() -> Experiment {
+    let mut printed = runs();
+    let table = seeds::table("golden/002_table4_1_gyro_positions.csv");
     let table = seeds::numbers(
         &table,
         &["printed_wx_over_wm", "printed_wy_over_wm", "printed_wz_over_wm"],
@@ -97,12 +95,12 @@ fn printed() -> Option<Experiment> {
         let sign = if k % 2 == 0 { 200.0 } else { -200.0 };
         trial.excitation_b = b_of_e(&table[k / 2]) * sign;
     }
-    Some(printed)
+    printed
 }
 
 #[test]
 fn rows_2_and_10_of_table_4_1_are_found_and_7_and_8_repeat() {
-    let Some(printed) = printed() else { return };
+    let printed = printed();
     let found = calibrate(&printed, &Options::default()).expect("fit");
     let labels =
         |rows: &[usize]| -> Vec<String> { rows.iter().map(|&row| printed.trials[row].label.clone()).collect() };
@@ -138,9 +136,7 @@ fn rows_2_and_10_of_table_4_1_are_found_and_7_and_8_repeat() {
 
 #[test]
 fn the_law_of_the_table_says_which_rows_of_table_4_1_are_wrong() {
-    let Some(table) = seeds::table("golden/002_table4_1_gyro_positions.csv") else {
-        return;
-    };
+    let table = seeds::table("golden/002_table4_1_gyro_positions.csv");
     let columns = [
         "axis1_deg",
         "axis2_deg",
@@ -165,9 +161,7 @@ fn the_law_of_the_table_says_which_rows_of_table_4_1_are_wrong() {
 
 #[test]
 fn the_mean_of_table_4_2_is_what_each_method_makes_of_it() {
-    let Some(table) = seeds::table("golden/002_table4_2_gyro_raw_lsb.csv") else {
-        return;
-    };
+    let table = seeds::table("golden/002_table4_2_gyro_raw_lsb.csv");
     let rows = seeds::numbers(&table, &["gyro1", "gyro2", "gyro3", "gyro4"]);
     let mean = Vector4::from_fn(|k, _| rows.iter().map(|row| row[k]).sum::<f64>() / 10.0);
     let (matrix, bias) = eq_4_23();
@@ -196,9 +190,7 @@ fn error_columns_of_tables_4_3_to_4_5_follow_from_their_values() {
     // Printed with four decimals; four entries are cut instead of rounded.
     const LAST_DIGIT: f64 = 1.1e-4;
     for name in ["4_3", "4_4", "4_5"] {
-        let Some(table) = seeds::table(&format!("golden/002_table{name}_gyro_errors.csv")) else {
-            return;
-        };
+        let table = seeds::table(&format!("golden/002_table{name}_gyro_errors.csv"));
         let unit = table.column("unit").expect("unit");
         let numbers = seeds::numbers(&table, &["real_dps", "calibrated_dps", "printed_error"]);
         for (row, values) in table.rows.iter().zip(numbers) {
@@ -221,8 +213,8 @@ fn error_columns_of_tables_4_3_to_4_5_follow_from_their_values() {
     // The calibrated values themselves need the raw runs, which are not in the thesis.
 }
 
-fn poses() -> Option<(Vec<Pose>, Vec<Vector3<f64>>)> {
-    let table = seeds::table("golden/002_table4_6_78_gravity_vectors.csv")?;
+fn poses() -> (Vec<Pose>, Vec<Vector3<f64>>) {
+    let table = seeds::table("golden/002_table4_6_78_gravity_vectors.csv");
     let columns = ["axis1_deg", "axis2_deg", "gx_e_over_g", "gy_e_over_g", "gz_e_over_g"];
     let pose = |row: &Vec<f64>| {
         (
@@ -233,7 +225,7 @@ fn poses() -> Option<(Vec<Pose>, Vec<Vector3<f64>>)> {
             b_of_e(&row[2..]),
         )
     };
-    Some(seeds::numbers(&table, &columns).iter().map(pose).unzip())
+    seeds::numbers(&table, &columns).iter().map(pose).unzip()
 }
 
 const ACCELEROMETERS: [&str; 12] = [
@@ -242,22 +234,22 @@ const ACCELEROMETERS: [&str; 12] = [
 ];
 
 /// The 78 golden poses; excitation is specific force, so the thesis' gravity with its sign turned.
-fn positions() -> Option<Experiment> {
-    let golden = seeds::table("golden/002_golden_acc_ls_ec.csv")?;
+fn positions() -> Experiment {
+    let golden = seeds::table("golden/002_golden_acc_ls_ec.csv");
     let mut columns = vec!["gx_e_ms2", "gy_e_ms2", "gz_e_ms2"];
     columns.extend(ACCELEROMETERS);
-    let (poses, _) = poses()?;
+    let (poses, _) = poses();
     let row = |(k, row): (usize, &Vec<f64>)| Trial {
         pose: Some((poses[k], None)),
         ..trial((k + 1).to_string(), -b_of_e(&row[..3]), &row[3..])
     };
     let trials = seeds::numbers(&golden, &columns).iter().enumerate().map(row).collect();
-    Some(experiment(Kind::Force, &ACCELEROMETERS, trials))
+    experiment(Kind::Force, &ACCELEROMETERS, trials)
 }
 
 #[test]
 fn the_78_poses_of_table_4_6_follow_from_the_tables_angles() {
-    let Some((poses, gravity_b)) = poses() else { return };
+    let (poses, gravity_b) = poses();
     assert_eq!(poses.len(), 78);
     for (pose, gravity_b) in poses.iter().zip(gravity_b) {
         let force_b = Mount::EMEMS.force_b(
@@ -275,12 +267,10 @@ fn the_78_poses_of_table_4_6_follow_from_the_tables_angles() {
 
 #[test]
 fn the_golden_poses_give_the_printed_accelerometer_calibration_back() {
-    let (Some(positions), Some(truth)) = (
+    let (positions, truth) = (
         positions(),
         seeds::table("golden/002_acc_M_FB_reconstructed_gravity_sign.csv"),
-    ) else {
-        return;
-    };
+    );
     let found = calibrate(&positions, &Options::default()).expect("fit");
     assert_eq!(found.consensus.contradictions, []);
     for (channel, truth) in found
@@ -296,7 +286,7 @@ fn the_golden_poses_give_the_printed_accelerometer_calibration_back() {
 
 #[test]
 fn rows_4_to_6_of_table_4_6_read_from_zero_contradict_the_data() {
-    let Some(mut positions) = positions() else { return };
+    let mut positions = positions();
     for (k, trial) in positions.trials.iter_mut().enumerate().skip(39) {
         let (pose, _) = trial.pose.expect("pose");
         let from_zero = Pose {
@@ -321,9 +311,7 @@ fn rows_4_to_6_of_table_4_6_read_from_zero_contradict_the_data() {
 
 #[test]
 fn the_mean_of_table_4_7_is_predicted_to_five_counts() {
-    let (Some(table), Some(positions)) = (seeds::table("golden/002_table4_7_acc_raw_lsb.csv"), positions()) else {
-        return;
-    };
+    let (table, positions) = (seeds::table("golden/002_table4_7_acc_raw_lsb.csv"), positions());
     let rows = seeds::numbers(&table, &ACCELEROMETERS);
     let found = calibrate(&positions, &Options::default()).expect("fit");
     let rest = Mount::EMEMS.force_b(Pose::default(), &SITE, [0.0; 2]);
@@ -348,7 +336,7 @@ fn the_mean_of_table_4_7_is_predicted_to_five_counts() {
 #[test]
 fn four_exact_runs_determine_a_gyro() {
     // Not in the thesis: the least its own model needs, to show that twelve are no requirement.
-    let Some(mut runs) = runs() else { return };
+    let mut runs = runs();
     let keep = [0, 4, 8, 1];
     runs.trials = keep.iter().map(|&row| runs.trials[row].clone()).collect();
     let system = Matrix4::from_fn(|row, k| if k < 3 { runs.trials[row].excitation_b[k] } else { 1.0 });

@@ -1,24 +1,17 @@
-//! Cases with known answers, read where they are: they are not part of the project.
+//! Cases with known answers, of `data/`.
 
 use std::path::{Path, PathBuf};
 
 use gap::{diagnose::diagnose, input::case::Subject};
 
-/// The folder of a practice case; `None`, with a message, where there is none.
-fn practice(name: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/practice")
-        .join(name);
-    if !folder.join("case.toml").is_file() {
-        println!("skipped: {} is not here", folder.display());
-        return None;
-    }
-    Some(folder)
+/// The folder of a case.
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data").join(name)
 }
 
 fn check(name: &str, effect: Option<&str>) {
-    let Some(folder) = practice(name) else { return };
-    let diagnosis = diagnose(&Subject::open(&folder).expect("opens"), &[], &|_, _| {});
+    let subject = Subject::open(&data("practice").join(name)).expect("opens");
+    let diagnosis = diagnose(&subject, &[], &|_, _| {});
     let named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect).collect();
     assert_eq!(named, effect.into_iter().collect::<Vec<_>>(), "{name}");
     assert!(diagnosis.none_of_these < 0.5, "{name}: {}", diagnosis.none_of_these);
@@ -49,12 +42,7 @@ fn a_healthy_unit_is_given_no_cause() {
 /// Sixteen sequences on a rate table, as printed (thesis 000, tables 7.3 and 7.4).
 #[test]
 fn a_printed_table_yields_its_wrong_commands_its_inverted_gyro_and_the_sagnac_sine() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases/siqueira-table-7-4");
-    if !folder.join("case.toml").is_file() {
-        println!("skipped: {} is not here", folder.display());
-        return;
-    }
-    let subject = Subject::open(&folder).expect("opens");
+    let subject = Subject::open(&data("cases/siqueira-table-7-4")).expect("opens");
     let wrong: Vec<f64> = subject.gross.contradicted.iter().map(|one| one.seq).collect();
     assert_eq!(wrong, [7.0, 8.0, 11.0, 12.0, 15.0]);
     assert_eq!(subject.names(subject.gross.inverted.iter().copied()), ["sd04"]);

@@ -13,17 +13,16 @@ use twin::motion::Recorded;
 use twin::predict::{Column, Scene, Twin, UnitDescription};
 use twin::recording::Table;
 
-/// The practice cases, beside the project; `None`, with a message, where they are not.
-pub fn shared(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(file);
-    if !path.exists() {
-        println!("skipped: no ../shared/{file}");
-        return None;
+/// A file of the cases: in `data/`, or where `EMEMS_DATA` says that the whole set lies.
+pub fn file(name: &str) -> PathBuf {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data").join(name);
+    match std::env::var_os("EMEMS_DATA") {
+        Some(whole) if !own.exists() => Path::new(&whole).join(name),
+        _ => own,
     }
-    Some(path)
 }
 
-/// A log of packets with its twin: `None` where the files are not.
+/// A log of packets with its twin.
 pub struct Case {
     pub twin: Twin,
     /// Readings of each channel [physical unit]; NaN where there is none.
@@ -31,9 +30,9 @@ pub struct Case {
 }
 
 /// One `[case]`: its folder, motion and field; all the rest is the same in all of them.
-pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Option<Case> {
-    let unit = UnitDescription::open(&shared("unit-emems.toml")?).unwrap();
-    let motion = Recorded::open(&shared(&format!("motion/{motion}.csv.gz"))?).unwrap();
+pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Case {
+    let unit = UnitDescription::open(&file("unit-emems.toml")).unwrap();
+    let motion = Recorded::open(&file(&format!("motion/{motion}.csv.gz"))).unwrap();
     let environment = Environment {
         gravity: 9.7864,
         latitude: (-23.2111_f64).to_radians(),
@@ -42,18 +41,18 @@ pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Option<Case> {
     };
     let (from_s, to_s) = motion.span_s();
     let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
-    let (counters, measured) = packets(&shared(&format!("practice/{name}/measured.txt.gz"))?, &unit);
+    let (counters, measured) = packets(&file(&format!("practice/{name}/measured.txt.gz")), &unit);
     let starts_s = counters.iter().map(|&k| 0.2 * f64::from(k)).collect();
-    Some(Case {
+    Case {
         twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
         measured,
-    })
+    }
 }
 
 /// A log of a nine-axis unit with its optical reference smoothed at these corners [Hz], of attitude and position; samples the reference did not see are
 /// left out.
-pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Option<[f64; 2]>) -> Option<Case> {
-    let folder = shared(&format!("practice/{name}"))?;
+pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Option<[f64; 2]>) -> Case {
+    let folder = file(&format!("practice/{name}"));
     let unit = UnitDescription::open(&folder.join("unit.toml")).unwrap();
     let recorded = Recorded::open(&folder.join("motion.csv.gz")).unwrap();
     let motion = corners_hz.map_or(recorded.clone(), |[attitude, position]| {
@@ -84,10 +83,10 @@ pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Optio
     let measured = names.iter().map(channel).collect();
     let (from_s, to_s) = motion.span_s();
     let scene = Scene::new(&motion, &environment, from_s, to_s, motion.step_s());
-    Some(Case {
+    Case {
         twin: Twin::new(unit, environment, scene, starts_s).unwrap(),
         measured,
-    })
+    }
 }
 
 fn packets(path: &Path, unit: &UnitDescription) -> (Vec<u16>, Vec<Vec<f64>>) {

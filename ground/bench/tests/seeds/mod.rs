@@ -1,24 +1,17 @@
-//! The one place that knows where the source documents' tables lie: beside the project.
+//! The one place that knows where the source documents' tables and the practice cases lie: in `data/`.
 
 use std::path::PathBuf;
 
 use bench::table::Table;
 
-/// A file beside the project; `None`, said once, where it is absent.
-pub fn file(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared")
-        .join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    println!("skipped: no {name} beside the project");
-    None
+/// A file of `data/`.
+pub fn file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../data").join(name)
 }
 
-/// A table of the sources.
-pub fn table(name: &str) -> Option<Table> {
-    Some(Table::open(&file(name)?).expect("a table of the sources"))
+/// A table of it.
+pub fn table(name: &str) -> Table {
+    Table::open(&file(name)).expect("a table of data/")
 }
 
 /// Columns of a table as numbers, a row each.
