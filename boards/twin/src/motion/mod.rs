@@ -194,6 +194,6 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_none() {
-        assert!(by_name("stil").is_none());
+        assert!(by_name("still-standing").is_none());
     }
 }
