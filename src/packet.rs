@@ -20,19 +20,31 @@ pub const START: u8 = b'@';
 /// Last byte of a packet.
 pub const END: u8 = b'#';
 
-/// Byte ranges, Tab. A.3. A group's values follow each other, four bytes each.
-mod field {
+/// The field table, Tab. A.3: offsets in bytes. Every value has [`VALUE_BYTES`](field::VALUE_BYTES), and those of a group follow each other.
+pub mod field {
     use super::Range;
 
+    /// Digits of a value.
+    pub const VALUE_BYTES: usize = 4;
+    /// The counter of cycles.
     pub const COUNTER: usize = 1;
+    /// The error identifier; a CRC in streams after Tab. A.2.
     pub const ERRORS: Range<usize> = 5..9;
+    /// Twelve values, a plate's x, y, z.
     pub const ACCELEROMETERS: usize = 9;
+    /// Twelve values, a plate's x, y, z.
     pub const MAGNETOMETERS: usize = 57;
+    /// Four rates.
     pub const GYROS: usize = 105;
+    /// Four temperatures inside the gyros.
     pub const GYRO_TEMPERATURES: usize = 121;
+    /// Four temperatures of the plates.
     pub const TEMPERATURES: usize = 137;
+    /// `1` after lift-off.
     pub const LIFT_OFF: usize = 153;
+    /// `1` in micro-gravity.
     pub const MICRO_G: usize = 154;
+    /// [`END`](super::END).
     pub const END: usize = 155;
 }
 
@@ -151,7 +163,7 @@ pub fn expected_at(at: usize) -> Expected {
 
 fn put(packet: &mut [u8; PACKET_BYTES], at: usize, codes: &[i16]) {
     for (index, code) in codes.iter().enumerate() {
-        put_word(packet, at.wrapping_add(4 * index), *code as u16);
+        put_word(packet, at.wrapping_add(field::VALUE_BYTES * index), *code as u16);
     }
 }
 
@@ -184,7 +196,7 @@ fn word(bytes: &[u8], at: usize) -> u16 {
 }
 
 fn values<const N: usize>(bytes: &[u8], at: usize) -> [i16; N] {
-    core::array::from_fn(|index| word(bytes, at + 4 * index) as i16)
+    core::array::from_fn(|index| word(bytes, at + field::VALUE_BYTES * index) as i16)
 }
 
 fn triads(bytes: &[u8], at: usize) -> [[i16; 3]; 4] {

@@ -49,8 +49,8 @@ pub struct Arguments {
     /// Values in counts instead of SI, with counter, error bits and flags
     #[arg(long, conflicts_with = "out")]
     pub counts: bool,
-    /// Write a folder in DIR instead: counts.csv, si.csv, log.txt, summary.txt, plots in index.html; of an image also
-    /// records.parquet
+    /// Write a folder in DIR instead: counts.csv, si.csv, flight.mcap (Foxglove, PlotJuggler), log.txt, summary.txt, plots in
+    /// index.html; of an image also records.parquet
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print the summary as JSON

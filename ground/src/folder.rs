@@ -1,7 +1,7 @@
 //! The folder a flight or a decoded log ends up in.
 //!
 //! In: bytes as they were, [`Entry`]s, remarks, and at the end the figures. Out: packets.txt and umbilical.txt verbatim,
-//! counts.csv, si.csv, derived.csv if there are derived frames, log.txt, summary.txt, index.html. An existing folder is
+//! counts.csv, si.csv, derived.csv if there are derived frames, flight.mcap, log.txt, summary.txt, index.html. An existing folder is
 //! never touched: a number is added to the name.
 
 use std::{
@@ -13,10 +13,13 @@ use std::{
 use chart::{Block, ChartError};
 use packets::stream::sequence::Step;
 
-use crate::{digest::Entry, envelope::Envelope, plot, summary::Summary, table};
+use crate::{digest::Entry, envelope::Envelope, messages::Messages, plot, summary::Summary, table};
 
 /// Folders of one name that are tried before giving up.
 const MOST_OF_A_NAME: u32 = 10_000;
+
+/// The file of [`Messages`].
+const MESSAGES: &str = "flight.mcap";
 
 /// Why a folder could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +63,7 @@ pub struct Folder {
     si: Text,
     derived: Text,
     log: Text,
+    messages: Messages,
 }
 
 impl Folder {
@@ -82,7 +86,7 @@ impl Folder {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 made => {
                     made.map_err(fail(&path))?;
-                    return Ok(Folder::open(path, cycle_s));
+                    return Folder::open(path, cycle_s);
                 }
             }
         }
@@ -91,13 +95,13 @@ impl Folder {
         })
     }
 
-    fn open(path: PathBuf, cycle_s: f64) -> Self {
+    fn open(path: PathBuf, cycle_s: f64) -> Result<Self, FolderError> {
         let text = |name: &str, header: Option<String>| Text {
             path: path.join(name),
             header,
             file: None,
         };
-        Folder {
+        Ok(Folder {
             cycle_s,
             packets: text("packets.txt", None),
             umbilical: text("umbilical.txt", None),
@@ -105,8 +109,9 @@ impl Folder {
             si: text("si.csv", Some(table::si_header())),
             derived: text("derived.csv", Some(table::derived_header())),
             log: text("log.txt", None),
+            messages: Messages::create(&path.join(MESSAGES)).map_err(|source| failed(&path, source))?,
             path,
-        }
+        })
     }
 
     /// Where it is.
@@ -135,7 +140,10 @@ impl Folder {
     /// # Errors
     /// When a file cannot be written.
     pub fn log(&mut self, at_s: f64, line: &str) -> Result<(), FolderError> {
-        self.log.line(&format!("{at_s:12.6} {line}"))
+        self.log.line(&format!("{at_s:12.6} {line}"))?;
+        self.messages
+            .log(at_s, line)
+            .map_err(|source| failed(&self.path, source))
     }
 
     /// Keeps a remark on all of it.
@@ -161,9 +169,13 @@ impl Folder {
                 Entry::Derived(derived) => self.derived.line(&table::derived_row(derived))?,
                 Entry::Reject(_) => {}
             }
-            if let Some(remark) = remark(entry, self.cycle_s) {
-                self.log.line(&remark)?;
+            let remark = remark(entry, self.cycle_s);
+            if let Some(remark) = &remark {
+                self.log.line(remark)?;
             }
+            self.messages
+                .entry(entry, self.cycle_s, remark.as_deref())
+                .map_err(|source| failed(&self.path, source))?;
         }
         Ok(())
     }
@@ -204,7 +216,15 @@ impl Folder {
         ] {
             text.close()?;
         }
+        self.messages.finish().map_err(|source| failed(&self.path, source))?;
         Ok(self.path)
+    }
+}
+
+fn failed(folder: &Path, source: io::Error) -> FolderError {
+    FolderError::Write {
+        path: folder.join(MESSAGES),
+        source,
     }
 }
 

@@ -32,6 +32,7 @@ enum Command {
     Gap(Gap),
     Size(ground::size::Arguments),
     Sbom(ground::sbom::Arguments),
+    Xtce(ground::xtce::Arguments),
     Attitude(attitude::Arguments),
     Dump(recorder::dump::Arguments),
     Recover(recorder::recover::Arguments),
@@ -76,7 +77,7 @@ fn main() -> ExitCode {
 fn prints_what_was_asked_for(command: &Command) -> bool {
     match command {
         // A flight has its own word for it.
-        Command::Fly(_) | Command::Sources | Command::Completions(_) => true,
+        Command::Fly(_) | Command::Sources | Command::Sbom(_) | Command::Xtce(_) | Command::Completions(_) => true,
         Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
         Command::Recover(arguments) => arguments.table.is_none(),
         Command::Design(arguments) => arguments.prints_the_plan(),
@@ -102,6 +103,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Gap(arguments) => gap(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,
         Command::Sbom(arguments) => ground::sbom::sbom(&arguments)?,
+        Command::Xtce(_) => print!("{}", ground::xtce::definition()),
         Command::Attitude(arguments) => attitude::run(&arguments)?,
         Command::Dump(arguments) => recorder::dump::run(&arguments)?,
         Command::Recover(arguments) => recorder::recover::run(&arguments)?,

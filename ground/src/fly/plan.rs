@@ -24,7 +24,7 @@ const ENDLESS_S: f64 = 60.0;
 /// Flies the unit: its release image on the emulated board, or with --host the same code on this computer
 ///
 /// Sensors, buses and lines are modelled at register level; what they measure comes from a motion or a recording. The
-/// telemetry is decoded as it comes and everything kept in a new folder: packets.txt, counts.csv, si.csv, log.txt,
+/// telemetry is decoded as it comes and everything kept in a new folder: packets.txt, counts.csv, si.csv, flight.mcap, log.txt,
 /// umbilical.txt, summary.txt, and plots of every sensor in index.html. The folder is a gap case too, for `ground gap`:
 /// motion.csv is the motion as a reference instrument saw it, unit.toml the unit as described, case.toml the windows. The
 /// same arguments give the same packets. Ctrl-C ends the flight; what was flown is kept.
