@@ -7,7 +7,7 @@ use crate::channel::Kind;
 pub enum Nature {
     /// The readings are smooth in its parameters.
     Smooth,
-    /// It has no parameters, only variants to try.
+    /// It is there or not, whatever its parameters: its variants are tried.
     Discrete,
     /// It changes how readings scatter, not what they are.
     Spread,

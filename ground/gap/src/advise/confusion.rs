@@ -87,12 +87,12 @@ pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
 }
 
 fn nats_apart(library: &Library, chosen: &crate::search::readings::Chosen, rival: usize) -> Option<f64> {
-    let own = &library.hypotheses[chosen.hypothesis].places;
-    let others = &library.hypotheses[rival].places;
+    let own = library.hypotheses[chosen.hypothesis].small();
+    let others = library.hypotheses[rival].small();
     if own.is_empty() || others.is_empty() {
         return None;
     }
-    let mut places = own.clone();
+    let mut places = own.to_vec();
     places.extend(others);
     let scores = vec![0.0; library.products.len()];
     let screen = library.screen(&places, &scores);
@@ -114,7 +114,7 @@ pub fn limits(library: &Library) -> Vec<Limit> {
     };
     for hypothesis in &library.hypotheses {
         let name = hypothesis.effect();
-        for (place, parameter) in hypothesis.places.iter().zip(&hypothesis.parameters) {
+        for (place, parameter) in hypothesis.small().iter().zip(&hypothesis.parameters) {
             let size = seen(*place);
             let limit = Limit {
                 effect: name,

@@ -32,7 +32,7 @@ pub fn imitation(library: &Library, found: &Attribution) -> Imitation {
     for index in chosen.chain(order) {
         let name = library.hypotheses[index].effect();
         let is_new = compared.iter().all(|known| library.hypotheses[*known].effect() != name);
-        if is_new && !library.hypotheses[index].places.is_empty() && compared.len() < MOST {
+        if is_new && !library.hypotheses[index].small().is_empty() && compared.len() < MOST {
             compared.push(index);
         }
     }
@@ -40,7 +40,7 @@ pub fn imitation(library: &Library, found: &Attribution) -> Imitation {
         if row == column {
             return 1.0;
         }
-        let (own, other) = (&library.hypotheses[row].places, &library.hypotheses[column].places);
+        let (own, other) = (library.hypotheses[row].small(), library.hypotheses[column].small());
         let places: Vec<usize> = own.iter().chain(other).copied().collect();
         let screen = library.screen(&places, &found.scores);
         let (first, second): (Vec<usize>, Vec<usize>) = ((0..own.len()).collect(), (own.len()..places.len()).collect());

@@ -41,6 +41,15 @@ impl Hypothesis {
         self.cause.effect.page().name
     }
 
+    /// The columns of which it is the sum where it is small: none of an effect that is there or not, whose columns are about its
+    /// being there.
+    pub fn small(&self) -> &[usize] {
+        match self.cause.effect.page().nature {
+            Nature::Discrete => &[],
+            Nature::Smooth | Nature::Spread => &self.places,
+        }
+    }
+
     /// It, with these parameters.
     pub fn active(&self, theta: &DVector<f64>) -> Active {
         Active {
@@ -193,7 +202,7 @@ impl Library {
         self.products.screen(places, scores, &self.prior_sigmas)
     }
 
-    /// Whether a hypothesis has no parameters to fit.
+    /// Whether a hypothesis is there or not, whatever its parameters.
     pub fn is_discrete(&self, hypothesis: usize) -> bool {
         self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
     }

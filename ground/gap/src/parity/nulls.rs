@@ -89,7 +89,7 @@ pub fn columns(library: &Library) -> Vec<Entries> {
     };
     let mut places: Vec<usize> = (library.hypotheses.iter())
         .filter(is_whole)
-        .flat_map(|hypothesis| hypothesis.places.clone())
+        .flat_map(|hypothesis| hypothesis.small().to_vec())
         .collect();
     places.sort_unstable();
     places.dedup();

@@ -88,7 +88,7 @@ fn seen_as(
     let information = DMatrix::from_fn(width, width, |row, column| space.inner(columns[row], columns[column]));
     let sigma = |index: usize| {
         hypothesis
-            .places
+            .small()
             .get(index)
             .map_or(1.0, |place| library.prior_sigmas[*place])
     };
@@ -99,7 +99,7 @@ fn seen_as(
             .max(0.0)
             .sqrt()
     };
-    let alone = |index: usize| match hypothesis.places.get(index) {
+    let alone = |index: usize| match hypothesis.small().get(index) {
         Some(place) => library.products.product(*place, *place),
         None => columns[index]
             .column
@@ -127,7 +127,7 @@ fn each(space: &Space, library: &Library, wanted: &[usize], with: &mut dyn FnMut
         }
         let mut places: Vec<usize> = own
             .iter()
-            .flat_map(|at| library.hypotheses[*at].places.clone())
+            .flat_map(|at| library.hypotheses[*at].small().to_vec())
             .collect();
         places.sort_unstable();
         places.dedup();
@@ -139,13 +139,13 @@ fn each(space: &Space, library: &Library, wanted: &[usize], with: &mut dyn FnMut
         );
         for at in own {
             let hypothesis = &library.hypotheses[at];
-            if hypothesis.places.is_empty() {
+            if hypothesis.small().is_empty() {
                 let whole = space.project(vec![on_the_whole(space, hypothesis)]);
                 with(at, &whole.iter().collect::<Vec<_>>());
                 continue;
             }
             let find = |place: &usize| places.binary_search(place).ok().map(|at| &projected[at]);
-            let columns: Vec<&Projected> = hypothesis.places.iter().filter_map(find).collect();
+            let columns: Vec<&Projected> = hypothesis.small().iter().filter_map(find).collect();
             with(at, &columns);
         }
     }
@@ -154,7 +154,7 @@ fn each(space: &Space, library: &Library, wanted: &[usize], with: &mut dyn FnMut
 /// What an effect without parameters does to the readings.
 fn on_the_whole(space: &Space, hypothesis: &Hypothesis) -> Entries {
     let model = [Component {
-        active: hypothesis.active(&DVector::zeros(0)),
+        active: hypothesis.active(&DVector::zeros(hypothesis.parameters.len())),
         span: None,
     }];
     space.problem.contribution(&model, 0)
@@ -195,7 +195,7 @@ pub fn choose(
                 .collect();
             each(space, library, &others, &mut |at, columns| {
                 let sigmas: Vec<f64> = library.hypotheses[at]
-                    .places
+                    .small()
                     .iter()
                     .map(|place| library.prior_sigmas[*place])
                     .collect();
@@ -212,12 +212,12 @@ pub fn choose(
         }
         let hypothesis = &library.hypotheses[next.hypothesis];
         let columns = hypothesis
-            .places
+            .small()
             .iter()
             .map(|place| library.products.column(*place).clone())
             .collect();
         let sigmas = hypothesis
-            .places
+            .small()
             .iter()
             .map(|place| library.prior_sigmas[*place])
             .collect();
@@ -236,24 +236,25 @@ struct Fit {
 
 fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
     let hypothesis = &library.hypotheses[seen.hypothesis];
-    if hypothesis.places.is_empty() {
+    if hypothesis.small().is_empty() {
+        let width = hypothesis.parameters.len();
         return Some(Fit {
             gain: seen.score.sum() - 0.5 * seen.information.sum(),
-            theta: DVector::zeros(0),
-            covariance: DMatrix::zeros(0, 0),
+            theta: DVector::zeros(width),
+            covariance: DMatrix::zeros(width, width),
             energy: seen.information.sum(),
         });
     }
     let mut screen = Screen::zeros(
         hypothesis
-            .places
+            .small()
             .iter()
             .map(|place| library.prior_sigmas[*place])
             .collect(),
     );
     screen.information.copy_from(&seen.information);
     screen.score.copy_from(&seen.score);
-    let width = hypothesis.places.len();
+    let width = hypothesis.small().len();
     let gain = screen.of_any_size(once(0..width))?;
     screen.settle(once(0..width));
     let estimate = screen.estimate(&(0..width).collect::<Vec<_>>())?;

@@ -71,9 +71,9 @@ pub fn largest_residual(problem: &Problem, library: &Library) -> Vec<Named> {
     let own = library
         .hypotheses
         .iter()
-        .filter(|hypothesis| !hypothesis.places.is_empty() && hypothesis.cause.channels(unit) == [channel]);
+        .filter(|hypothesis| !hypothesis.small().is_empty() && hypothesis.cause.channels(unit) == [channel]);
     let best = own
-        .filter_map(|hypothesis| Some((fall(library, &hypothesis.places, &residuals)?.0, hypothesis)))
+        .filter_map(|hypothesis| Some((fall(library, hypothesis.small(), &residuals)?.0, hypothesis)))
         .max_by(|one, other| one.0.total_cmp(&other.0));
     let named = |(_, hypothesis): (f64, &crate::library::hypotheses::Hypothesis)| Named {
         effect: hypothesis.effect(),
@@ -96,11 +96,11 @@ pub fn lasso(problem: &Problem, library: &Library) -> Vec<Named> {
     let sizes = descend(&columns, &mut left, penalty);
     let mut energies: Vec<Named> = Vec::new();
     for hypothesis in &library.hypotheses {
-        for (index, place) in hypothesis.places.iter().enumerate() {
+        for (index, place) in hypothesis.small().iter().enumerate() {
             let at = place - library.reference;
             let energy = sizes[at].powi(2) * columns[at].1;
             // A column is shared by places of one effect: it counts where it stands alone.
-            if energy == 0.0 || hypothesis.places.len() != hypothesis.cause.effect.page().parameters.len() {
+            if energy == 0.0 || hypothesis.small().len() != hypothesis.cause.effect.page().parameters.len() {
                 continue;
             }
             let channels = hypothesis.cause.touched_by(index, problem.twin.unit());
@@ -167,18 +167,18 @@ pub fn best_subset(problem: &Problem, library: &Library) -> Vec<Named> {
     while found.len() < MOST {
         let candidates = library.hypotheses.iter().filter(|hypothesis| {
             let is_new = found.iter().all(|named| named.effect != hypothesis.effect());
-            is_new && !hypothesis.places.is_empty() && hypothesis.places.len() <= WIDEST
+            is_new && !hypothesis.small().is_empty() && hypothesis.small().len() <= WIDEST
         });
         let best = candidates
             .filter_map(|hypothesis| {
-                let (fall, theta) = fall(library, &hypothesis.places, &left)?;
+                let (fall, theta) = fall(library, hypothesis.small(), &left)?;
                 Some((0.5 * fall - price * theta.len() as f64, hypothesis, theta))
             })
             .max_by(|one, other| one.0.total_cmp(&other.0));
         let Some((gain, hypothesis, theta)) = best.filter(|(gain, ..)| *gain > 0.0) else {
             break;
         };
-        for (place, size) in hypothesis.places.iter().zip(theta.iter()) {
+        for (place, size) in hypothesis.small().iter().zip(theta.iter()) {
             for (channel, values) in library.products.column(*place) {
                 left[*channel].axpy(-size, values, 1.0);
             }

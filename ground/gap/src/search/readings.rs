@@ -141,7 +141,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     Attribution { chosen, scores, alone }
 }
 
-/// Exact gains of the effects without parameters, into a screen's.
+/// Exact gains of the effects that are there or not, into a screen's; a little less than a fit of their parameters gives.
 fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refined, gains: &mut [f64]) {
     let model = model_of(library, set, &best.thetas);
     let unit = problem.twin.unit();
@@ -159,7 +159,7 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
             continue;
         }
         let mut with = model.clone();
-        with.push(hypothesis.component(&DVector::zeros(0)));
+        with.push(hypothesis.component(&DVector::zeros(hypothesis.parameters.len())));
         let touched = hypothesis.cause.channels(unit);
         // No effect takes off more than there is above the noise: of a gross one that is not there the first channel says so.
         let above = |channel: usize| before[channel] - problem.frames[channel].series.rows.len() as f64;

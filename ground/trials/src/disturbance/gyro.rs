@@ -234,9 +234,19 @@ fn bias_walk(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<usize> {
 fn saturation(scene: &mut Scene, draw: &mut Draw, _strength: f64) -> Vec<usize> {
     let plates = plates(draw);
     let most = draw.uniform(0.6, 1.0);
+    // A register clips at once, an amplifier bends before: a parabola from most - bend to most + bend.
+    let bend = most * draw.uniform(0.0, 0.15);
     scene.magnitude.get_or_insert(most);
     for &plate in &plates {
-        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| rate.clamp(-most, most));
+        scene.views.rate[plate] = changed(&scene.views.rate[plate], move |_, rate| {
+            let within = rate.abs() - (most - bend);
+            let short = match within {
+                _ if within <= 0.0 => 0.0,
+                _ if within < 2.0 * bend => within * within / (4.0 * bend),
+                _ => within - bend,
+            };
+            rate.signum() * (rate.abs() - short)
+        });
     }
     channels(Rate, &plates)
 }

@@ -46,11 +46,12 @@ pub(super) fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &
     base.settle(parts);
     let before = base.log_evidence().unwrap_or(f64::NEG_INFINITY);
     let gain = |(index, hypothesis): (usize, &Hypothesis)| {
-        let is_new = !hypothesis.places.is_empty() && hypothesis.places.iter().all(|place| !known.contains(place));
+        let own = hypothesis.small();
+        let is_new = !own.is_empty() && own.iter().all(|place| !known.contains(place));
         if !is_new || set.contains(&index) || is_any_same(problem, library, set, index) {
             return f64::NEG_INFINITY;
         }
-        let all: Vec<usize> = known.iter().chain(&hypothesis.places).copied().collect();
+        let all: Vec<usize> = known.iter().chain(own).copied().collect();
         let mut larger = library.screen(&all, scores);
         larger.prior_sigmas[..known.len()].copy_from_slice(&base.prior_sigmas);
         let of_other_sizes = larger.settle(once(known.len()..all.len()));
