@@ -10,7 +10,7 @@ pub struct PacketCorruption;
 
 const PAGE: Page = Page {
     name: "packet-corruption",
-    physics: "Bytes of a packet are damaged and nobody notices: now and then a value is anything within the range.",
+    physics: "Bytes of a packet are damaged and nobody notices: now and then a value is anything within the range, near or far.",
     equation: "y uniform over the range with probability p",
     source: "A line without a check sum",
     excited_by: "any",
@@ -24,6 +24,25 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
+/// Part of the range beyond which damage goes at least one time in [`LEAST_FAR`]: of a flipped bit of twelve, the four that turn 256
+/// codes and more of 4096; of another hexadecimal digit or of any value at all more than half.
+const FAR: f64 = 1.0 / 16.0;
+/// A quarter instead of a third: the gyro's 14 bits reach twice as far as twelve.
+const LEAST_FAR: f64 = 0.25;
+/// [nats] one damaged log in a thousand is refused.
+const REFUSED: f64 = 6.9;
+
+/// Whether samples off their prediction lie too near to it for damage, which knows nothing of it. By Chernoff's bound of the
+/// binomial law: `ln P(far <= k of n) <= -n KL(k/n, LEAST_FAR)`.
+fn is_too_near(hits: f64, far: f64) -> bool {
+    let part = far / hits;
+    // Of no hits the part is no number, and nothing is refused.
+    part < LEAST_FAR && {
+        let of = |own: f64, least: f64| if own > 0.0 { own * (own / least).ln() } else { 0.0 };
+        hits * (of(part, LEAST_FAR) + of(1.0 - part, 1.0 - LEAST_FAR)) > REFUSED
+    }
+}
+
 impl Effect for PacketCorruption {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -31,15 +50,24 @@ impl Effect for PacketCorruption {
 
     fn log_likelihood(&self, theta: &[f64], variant: f64, views: &[View]) -> f64 {
         let _ = variant;
-        let mixed = mixture(theta[0].clamp(0.0, 0.999));
-        let of = |view: &View| -> f64 {
-            let anything = (view.resolution() / view.span()).ln();
-            let law = view.normal_law(view.channel.sigma());
-            view.residuals()
-                .map(|(_, residual)| mixed(law(residual), anything))
-                .sum()
-        };
-        views.iter().map(of).sum()
+        let p = theta[0].clamp(0.0, 0.999);
+        let (mixed, odds) = (mixture(p), p.ln() - (-p).ln_1p());
+        let (mut likelihood, mut usual, mut hits, mut far) = (0.0, 0.0, 0.0, 0.0);
+        for view in views {
+            let (span, law) = (view.span(), view.normal_law(view.channel.sigma()));
+            let anything = (view.resolution() / span).ln();
+            for (_, residual) in view.residuals() {
+                let whole = law(residual);
+                (likelihood, usual) = (likelihood + mixed(whole, anything), usual + whole);
+                if odds + anything > whole {
+                    (hits, far) = (hits + 1.0, far + f64::from(residual.abs() > FAR * span));
+                }
+            }
+        }
+        match is_too_near(hits, far) {
+            true => usual,
+            false => likelihood,
+        }
     }
 
     fn beneath(&self, theta: &[f64], _variant: f64, views: &[View]) -> Vec<Vec<Beneath>> {
@@ -63,5 +91,18 @@ impl Effect for PacketCorruption {
             view.measured.iter().enumerate().map(sample).collect()
         };
         views.iter().enumerate().map(corrupted).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damage_goes_far_and_what_stays_near_is_none() {
+        // All of 24 near: 24 ln(4/3) = 6.904.
+        assert!(is_too_near(24.0, 0.0) && !is_too_near(23.0, 0.0));
+        assert!(!is_too_near(0.0, 0.0) && !is_too_near(1000.0, 250.0) && !is_too_near(1000.0, 900.0));
+        assert!(is_too_near(1000.0, 150.0));
     }
 }
