@@ -29,11 +29,11 @@ use nalgebra::{ComplexField, Matrix3, Quaternion, RealField, UnitQuaternion, Vec
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Euler {
-    /// [rad] about b's forward axis, right side down; -pi to pi.
+    /// \[rad\] about b's forward axis, right side down; -pi to pi.
     pub roll: f32,
-    /// [rad] about the right axis, nose up; -pi/2 to pi/2.
+    /// \[rad\] about the right axis, nose up; -pi/2 to pi/2.
     pub pitch: f32,
-    /// [rad] about down, nose right; -pi to pi. Zero is north.
+    /// \[rad\] about down, nose right; -pi to pi. Zero is north.
     pub yaw: f32,
 }
 
@@ -45,7 +45,7 @@ const ORTHONORMAL: f32 = 1e-3;
 /// 0.06 deg from the vertical, where f32 rounding of the matrix reaches a degree in either.
 const GIMBAL_LOCK: f32 = 1e-3;
 
-/// Up to this angle [rad] the series below are exact in f32: what they leave out is less than 3e-9.
+/// Up to this angle \[rad\] the series below are exact in f32: what they leave out is less than 3e-9.
 const SERIES: f32 = 1.0;
 
 /// Below this square of an angle both are one to the last digit of f32.
@@ -74,7 +74,7 @@ fn series(square: f32) -> (f32, f32) {
     (sum(SINE), sum(COSINE))
 }
 
-/// Sine and cosine of an angle [rad]; up to four times that of [`SERIES`] by doubling a quarter of it twice.
+/// Sine and cosine of an angle \[rad\]; up to four times that of [`SERIES`] by doubling a quarter of it twice.
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
     let square = angle * angle;
     if square < SERIES * SERIES {
@@ -105,7 +105,7 @@ pub fn from_rotation_vector(angle: Vector3<f32>) -> UnitQuaternion<f32> {
     UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, half * sinc))
 }
 
-/// The shorter rotation vector of a quaternion [rad].
+/// The shorter rotation vector of a quaternion \[rad\].
 pub fn rotation_vector(q: &UnitQuaternion<f32>) -> Vector3<f32> {
     let (scalar, vector) = (q.w, q.imag());
     let norm = vector.norm();
@@ -201,7 +201,7 @@ pub fn euler(q_nb: &UnitQuaternion<f32>) -> Euler {
     }
 }
 
-/// [rad] angle of the smallest turn between two attitudes; keeps its digits where an arc cosine has none.
+/// \[rad\] angle of the smallest turn between two attitudes; keeps its digits where an arc cosine has none.
 pub fn angle_between(a: &UnitQuaternion<f32>, b: &UnitQuaternion<f32>) -> f32 {
     let between = a.conjugate() * b;
     2.0 * RealField::atan2(between.imag().norm(), ComplexField::abs(between.w))

@@ -152,9 +152,9 @@ impl Oscillator {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct BrownOut {
-    /// [mV] set, at least; 0 is off.
+    /// \[mV\] set, at least; 0 is off.
     pub set_mv: u16,
-    /// [mV] asked for.
+    /// \[mV\] asked for.
     pub asked_mv: u16,
 }
 

@@ -4,25 +4,25 @@
 //! the thesis' unit then never closes a packet again. So every sensor that still waits for its turn keeps a reserve, and
 //! the packet closes at the deadline whatever happened.
 
-/// [us] the longest a read may take.
+/// \[us\] the longest a read may take.
 pub const READ_LIMIT_US: u64 = 16_000;
 
-/// [us] the longest a sensor that failed may take until it answers again.
+/// \[us\] the longest a sensor that failed may take until it answers again.
 pub const PROBE_LIMIT_US: u64 = 2_000;
 
-/// [us] the longest freeing the bus takes after a sensor that used all its time.
+/// \[us\] the longest freeing the bus takes after a sensor that used all its time.
 const RECOVERY_US: u64 = 1_000;
 
-/// [us] kept for each waiting sensor in a long cycle: half for its read, which takes 0.3 ms, half for freeing the bus.
+/// \[us\] kept for each waiting sensor in a long cycle: half for its read, which takes 0.3 ms, half for freeing the bus.
 const RESERVE_US: u64 = 2 * RECOVERY_US;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Budget {
-    /// [us] after its start the packet closes at the latest: 190 ms of 200.
+    /// \[us\] after its start the packet closes at the latest: 190 ms of 200.
     pub deadline_us: u64,
-    /// [us] after its start the packet is sent if every sensor has had its turn by then: 10 ms of 200. Without it the
+    /// \[us\] after its start the packet is sent if every sensor has had its turn by then: 10 ms of 200. Without it the
     /// packets of a cycle with a silent sensor, which is shorter, would come early.
     pub close_us: u64,
 }
@@ -36,7 +36,7 @@ impl Budget {
         }
     }
 
-    /// [us] the next sensor may take, `elapsed_us` into the cycle, while `waiting` more come after it. Zero when its
+    /// \[us\] the next sensor may take, `elapsed_us` into the cycle, while `waiting` more come after it. Zero when its
     /// time is up.
     pub fn limit_us(&self, elapsed_us: u64, waiting: u64, failed: bool) -> u64 {
         // In a short cycle the reserves must leave something to whoever is first.

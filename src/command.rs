@@ -14,7 +14,7 @@ use crate::packet::hex_value;
 /// Letters of a word.
 pub const WORD_BYTES: usize = 4;
 
-/// [us] pause after which a half word is forgotten.
+/// \[us\] pause after which a half word is forgotten.
 pub const HALF_WORD_TIMEOUT_US: u64 = 2_000_000;
 
 /// Digits after [`Command::DumpRange`]'s word, six for the first record, six for how many; and after

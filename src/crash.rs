@@ -2,7 +2,7 @@
 //!
 //! In: what the handler knows. Out: 64 bytes, which the retained memory keeps twice, with a CRC-32 (ISO-HDLC) over the first 60, little endian:
 //! `0-3` magic, `4` cause, `5` length of the place, `6-7` spare, `8-11` pc or line, `12-15` lr, `16-19` CFSR,
-//! `20-27` uptime [us], `28-59` last characters of the place (source file). Anything whose checksum is wrong is refused.
+//! `20-27` uptime \[us\], `28-59` last characters of the place (source file). Anything whose checksum is wrong is refused.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use heapless::String;
@@ -64,7 +64,7 @@ pub struct CrashRecord {
     pub lr: u32,
     /// Configurable fault status register of a fault (ARMv7-M ARM, B3.2.15).
     pub cfsr: u32,
-    /// [us] since the unit's clock started.
+    /// \[us\] since the unit's clock started.
     pub uptime_us: u64,
     /// Tail of the source file's name of a panic.
     pub place: String<PLACE_BYTES>,

@@ -81,7 +81,7 @@ pub struct Start {
 pub struct Derived {
     /// Counter of the packet it belongs to.
     pub counter: u16,
-    /// [us] start of the cycle, since the unit's clock started.
+    /// \[us\] start of the cycle, since the unit's clock started.
     pub start_us: u64,
     /// Mode of the unit.
     pub mode: Mode,
@@ -89,13 +89,13 @@ pub struct Derived {
     pub health: Health,
     /// How the unit started; `None` in frames of version 4.
     pub start: Option<Start>,
-    /// [us] from the start of the cycle to the closing of its packet.
+    /// \[us\] from the start of the cycle to the closing of its packet.
     pub cycle_us: u32,
-    /// [us] when each sensor was sampled after `start_us`, reading order; [`NO_SLOT`] if it was not.
+    /// \[us\] when each sensor was sampled after `start_us`, reading order; [`NO_SLOT`] if it was not.
     pub slots_us: [u32; SENSOR_COUNT],
     /// The gyros since the packet before.
     pub increments: Increments,
-    /// [us] the estimation took on the unit's clock.
+    /// \[us\] the estimation took on the unit's clock.
     pub estimate_us: u32,
     /// What it all says of the attitude.
     pub estimate: Estimate,

@@ -3,7 +3,7 @@
 //! In: a line's level, polled every [`POLL_US`]. Out: its debounced level: asserted while at least three of the newest
 //! five polls are. A glitch shorter than 60 ms never passes, a real edge passes within 100 ms (fault U11).
 
-/// [us] between polls.
+/// \[us\] between polls.
 pub const POLL_US: u64 = 20_000;
 
 const NEWEST: u8 = 0b1_1111;

@@ -52,7 +52,7 @@ use crate::{
 pub struct Estimate {
     /// [m/s2] calibrated specific force at the centre of rotation, in b.
     pub force_b: [f32; 3],
-    /// [uT] calibrated field, in b.
+    /// \[uT\] calibrated field, in b.
     pub field_b_ut: [f32; 3],
     /// [rad/s] calibrated inertial rate, in b; the filter's bias is not taken off.
     pub rate_b: [f32; 3],
@@ -62,7 +62,7 @@ pub struct Estimate {
     pub triad_nb: Option<[f32; 4]>,
     /// The filter's q_nb at [`Increments::end_us`], scalar first; `None` until it has aligned itself.
     pub q_nb: Option<[f32; 4]>,
-    /// [rad2] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD. As of the latest window of the
+    /// \[rad2\] covariance of its error as a rotation vector in n: NN, NE, ND, EE, ED, DD. As of the latest window of the
     /// filter whose work on it is done, which is some cycles after its measurements have corrected the attitude.
     pub covariance_n: [f32; 6],
     /// [rad/s] gyro bias in b.
@@ -106,7 +106,7 @@ impl Estimate {
 /// Force within this part of one g is taken for the vertical by TRIAD: 0.9 to 1.1 g, as by the filter after lift-off.
 const NEAR_ONE_G: f32 = 0.1;
 
-/// [s] a cycle whose increment covers less of it by this much has a gap: more than two fast samples.
+/// \[s\] a cycle whose increment covers less of it by this much has a gap: more than two fast samples.
 const LARGEST_GAP_S: f32 = 0.03;
 
 /// Everything the step remembers.

@@ -47,13 +47,13 @@ use root::{reciprocal_root, root};
 use triads::{Apart, Triads};
 use vector_rate::{Direction, RateError, VectorRate};
 
-/// [s] standard deviation of an accelerometer's conversion within its 20 ms at 50 Hz: it has its own clock.
+/// \[s\] standard deviation of an accelerometer's conversion within its 20 ms at 50 Hz: it has its own clock.
 const ACC_TIMING_S: f32 = 0.0058;
-/// [s] of a magnetometer's within 13.3 ms.
+/// \[s\] of a magnetometer's within 13.3 ms.
 const MAG_TIMING_S: f32 = 0.0039;
-/// [s] of a gyro's within 3.9 ms.
+/// \[s\] of a gyro's within 3.9 ms.
 const GYRO_TIMING_S: f32 = 0.0012;
-/// [s] an interval longer than this is a gap.
+/// \[s\] an interval longer than this is a gap.
 const LONGEST_S: f32 = 1.0;
 /// [m/s2] within which the force is gravity's, for all this module needs: 0.9 to 1.1 g.
 const GRAVITY: core::ops::RangeInclusive<f32> = 8.8..=10.8;
@@ -66,7 +66,7 @@ const UNKNOWN_RATE: f32 = 25.0;
 pub struct Vectors {
     /// [m/s2] specific force at the centre of rotation.
     pub force_b: Solution,
-    /// [uT] magnetic field.
+    /// \[uT\] magnetic field.
     pub field_b_ut: Solution,
     /// [rad/s] inertial rate.
     pub rate_b: Solution,
@@ -82,7 +82,7 @@ struct Cycle<'a, const N: usize> {
     present: u16,
     /// Axes that repeat themselves.
     frozen: u16,
-    /// [s] since the cycle before; `None` after a gap.
+    /// \[s\] since the cycle before; `None` after a gap.
     dt_s: Option<f32>,
     /// Its disagreements are looked at in the next cycle.
     watched_later: bool,
@@ -98,7 +98,7 @@ pub struct Monitor {
     acc_repeats: [Repeats<3>; PLATES],
     mag_repeats: [Repeats<3>; PLATES],
     gyro_repeats: [Repeats<1>; PLATES],
-    /// [m] of the longest lever arm.
+    /// \[m\] of the longest lever arm.
     arm: f32,
     last: Option<Turning>,
     /// [rad/s] known bias of the rate.
@@ -160,7 +160,7 @@ impl Monitor {
         }
     }
 
-    /// Takes a cycle: `measured` is what `set` made of `reading`, `dt_s` [s] the time since the one before.
+    /// Takes a cycle: `measured` is what `set` made of `reading`, `dt_s` \[s\] the time since the one before.
     pub fn step(&mut self, set: &Set, reading: &Reading, measured: &Measured, dt_s: f32) -> Vectors {
         self.take(set, reading, measured, dt_s, false)
     }
@@ -278,7 +278,7 @@ impl Monitor {
     }
 }
 
-/// A solution as a direction, with the angle [rad] it turns by within its sampling instant's uncertainty.
+/// A solution as a direction, with the angle \[rad\] it turns by within its sampling instant's uncertainty.
 fn direction(solution: &Solution, turned: f32) -> Option<Direction> {
     let per_length = reciprocal_root(solution.vector_b.norm_squared());
     let variance = solution.covariance_b.trace() * (per_length * per_length / 3.0) + turned * turned;

@@ -41,7 +41,7 @@ pub fn triad_axes_b() -> [Vector3<f32>; TRIAD_AXES] {
     core::array::from_fn(|k| dcm_bp(k / 3).column(k % 3).into_owned())
 }
 
-/// [m] place of a plate's accelerometer in b, from the unit's centre of rotation.
+/// \[m\] place of a plate's accelerometer in b, from the unit's centre of rotation.
 ///
 /// Reference design: 16 mm and -9 mm along the plate's axes from its middle, which is 42 mm (sides) or 38 mm (base) from
 /// the centre, against `z_p`. A calibration says where they are on a unit.

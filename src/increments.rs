@@ -25,18 +25,18 @@ use slices::Slicer;
 pub use forces::{Force, Forces};
 pub use slices::{SLICES, Slice};
 
-/// [s] an interval longer than this is a gap: rates between its ends are not known.
+/// \[s\] an interval longer than this is a gap: rates between its ends are not known.
 pub const LONGEST_INTERVAL_S: f32 = 0.1;
 
 /// What came between one cycle and the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Increments {
-    /// [rad] rotation vector of b over the cycle, in b.
+    /// \[rad\] rotation vector of b over the cycle, in b.
     pub angle_b: [f32; 3],
-    /// [us] time the increment covers; shorter than the cycle by its gaps.
+    /// \[us\] time the increment covers; shorter than the cycle by its gaps.
     pub covered_us: u32,
-    /// [us] instant of the newest fast sample, since the unit's clock started: the increment's end. 0 before the first.
+    /// \[us\] instant of the newest fast sample, since the unit's clock started: the increment's end. 0 before the first.
     pub end_us: u64,
     /// Each gyro.
     pub gyro: [Channel; 4],
@@ -52,9 +52,9 @@ pub struct Increments {
 pub struct Channel {
     /// [counts s] integral of the rate.
     pub integral_counts_s: f32,
-    /// [counts] smallest sample; [`NOT_READ`] without samples.
+    /// \[counts\] smallest sample; [`NOT_READ`] without samples.
     pub least: i16,
-    /// [counts] largest sample; [`NOT_READ`] without samples.
+    /// \[counts\] largest sample; [`NOT_READ`] without samples.
     pub most: i16,
     /// Samples.
     pub count: u8,
@@ -91,9 +91,9 @@ pub struct Integrator {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Fast {
-    /// [us] when.
+    /// \[us\] when.
     pub at_us: u64,
-    /// [counts] each gyro; [`NOT_READ`] where it was not read.
+    /// \[counts\] each gyro; [`NOT_READ`] where it was not read.
     pub counts: [i16; 4],
 }
 
@@ -150,7 +150,7 @@ impl Integrator {
         self.sum.angle_b = (before_b + angle_b).into();
     }
 
-    /// Takes a reading of the accelerometers, `at_us` [us] in the mean, and says what it is in the increments; `None` for
+    /// Takes a reading of the accelerometers, `at_us` \[us\] in the mean, and says what it is in the increments; `None` for
     /// one too many, which is left out.
     pub fn force(&mut self, at_us: u64, acc_p: [[i16; 3]; 4]) -> Option<Force> {
         let angle_b = (Vector3::from(self.sum.angle_b) + self.coning_b).into();

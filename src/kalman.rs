@@ -96,7 +96,7 @@ pub struct Filter {
     pub q_nb: UnitQuaternion<f32>,
     /// [rad/s] gyro bias in b.
     pub bias_b: Vector3<f32>,
-    /// [1] gyro matrix error: `rate = (1 - matrix) gyro - bias`.
+    /// \[1\] gyro matrix error: `rate = (1 - matrix) gyro - bias`.
     pub gyro_matrix: Matrix3<f32>,
     /// [m/s] velocity north and east, as far as it is bounded.
     pub velocity_n: Vector2<f32>,
@@ -125,11 +125,11 @@ pub struct Filter {
     /// [rad/s] as the gyros had it at the end of the step before.
     gyro_b: Option<Vector3<f32>>,
     last_us: Option<u64>,
-    /// [s] since the gyros were last heard.
+    /// \[s\] since the gyros were last heard.
     silent_s: f32,
-    /// [s] for how long each kind of measurement has been rejected without a break: velocity, field.
+    /// \[s\] for how long each kind of measurement has been rejected without a break: velocity, field.
     rejected_s: [f32; 2],
-    /// [s] for how long the field has been disturbed without a break.
+    /// \[s\] for how long the field has been disturbed without a break.
     disturbed_s: f32,
     /// The window before was one of rest.
     rested: bool,
@@ -337,7 +337,7 @@ impl Filter {
     }
 }
 
-/// [s] steps of this length or more have the correction with the window, and take large stages of what else is pending.
+/// \[s\] steps of this length or more have the correction with the window, and take large stages of what else is pending.
 const LONG_STEP_S: f32 = 0.05;
 
 /// Steps need not add up to a window to the microsecond.

@@ -10,7 +10,7 @@
 //! umbilical bytes --command--> Command --mode--> Mode, Task
 //! ```
 //!
-//! Everything outside [`sensor`], [`nand`], [`flight_log`] and [`unit`] is a function of its arguments: no clock, no I/O,
+//! Everything outside [`sensor`], [`nand`], [`flight_log`] and [`mod@unit`] is a function of its arguments: no clock, no I/O,
 //! no allocation.
 #![no_std]
 #![forbid(unsafe_code)]

@@ -16,7 +16,7 @@
 
 use crate::{command::Command, flight_log::Resumed, resume::Resume};
 
-/// [us] time within which a confirmation counts.
+/// \[us\] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
 
 /// The unit's mode (thesis: ESPERA, VOO; App. A.2).
@@ -67,7 +67,7 @@ impl Cause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Change {
-    /// [us] when, since the unit's clock started.
+    /// \[us\] when, since the unit's clock started.
     pub at_us: u64,
     /// The mode from then on.
     pub mode: Mode,
@@ -159,7 +159,7 @@ struct Pending {
     armed: Command,
     /// The command that confirms it.
     with: Command,
-    /// [us] until when.
+    /// \[us\] until when.
     until_us: u64,
 }
 

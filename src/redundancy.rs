@@ -31,7 +31,7 @@ const AXES: usize = 16;
 pub struct Seen {
     /// [unit] along itself.
     pub value: f32,
-    /// [unit2] variance of that.
+    /// \[unit2\] variance of that.
     pub variance: f32,
     /// How far it is from what a vector expects of it, and the variance of what is expected, for who holds it against one.
     pub off: (f32, f32),

@@ -122,9 +122,9 @@ impl Starts {
 /// When the unit was last alive: a reset struck after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pulse {
-    /// [us] the latest fast sample of the gyros, since that run's clock started.
+    /// \[us\] the latest fast sample of the gyros, since that run's clock started.
     pub at_us: u64,
-    /// [us] the latest feeding of the watchdog.
+    /// \[us\] the latest feeding of the watchdog.
     pub fed_us: u64,
 }
 
@@ -148,13 +148,13 @@ impl Pulse {
     }
 }
 
-/// [us] from a reset to the start of the unit's clock, as the image on the emulated board shows it.
+/// \[us\] from a reset to the start of the unit's clock, as the image on the emulated board shows it.
 const START_US: u64 = 510;
-/// [us] between two pulses, at most half of which passed on average before a reset struck.
+/// \[us\] between two pulses, at most half of which passed on average before a reset struck.
 const PULSE_US: u64 = 10_000;
-/// [us] from the last feeding of the watchdog to its reset if the LSI runs at 32 kHz.
+/// \[us\] from the last feeding of the watchdog to its reset if the LSI runs at 32 kHz.
 const WATCHDOG_US: u64 = 1_000_000;
-/// [s] how far that may be off: 0.68 to 1.88 s (17 to 47 kHz, STM32F407 data sheet), all equally likely, about 1 s.
+/// \[s\] how far that may be off: 0.68 to 1.88 s (17 to 47 kHz, STM32F407 data sheet), all equally likely, about 1 s.
 const WATCHDOG_SD_S: f32 = 0.45;
 /// A cut of the supply that is over in 50 ms to 2 s, all equally likely: longer ones nobody knows of, there is no clock in them.
 pub const POWER_CUT: Outage = Outage {

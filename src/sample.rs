@@ -138,14 +138,14 @@ pub const NO_SLOT: u32 = u32::MAX;
 pub struct Sample {
     /// What was measured.
     pub reading: Reading,
-    /// [us] start of the cycle, since the unit's clock started.
+    /// \[us\] start of the cycle, since the unit's clock started.
     pub start_us: u64,
-    /// [us] instant at which each sensor was sampled, after `start_us`, in reading order; [`NO_SLOT`] if it was not.
+    /// \[us\] instant at which each sensor was sampled, after `start_us`, in reading order; [`NO_SLOT`] if it was not.
     pub slots_us: [u32; SENSOR_COUNT],
 }
 
 impl Sample {
-    /// [us] slot times of the sensors of a kind, plate 1 to 4.
+    /// \[us\] slot times of the sensors of a kind, plate 1 to 4.
     pub fn slots_of(&self, kind: Kind) -> &[u32] {
         // The kinds come one after another in the reading order.
         let first = match kind {

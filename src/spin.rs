@@ -62,7 +62,7 @@ use crate::{
 
 /// Squared gates.
 const GATE: f32 = 25.0;
-/// [rad/s] and [1] what noise of the gyros and usual residual of the force equations it begins with: a lift-off shakes before it
+/// [rad/s] and \[1\] what noise of the gyros and usual residual of the force equations it begins with: a lift-off shakes before it
 /// can have shown by how much.
 const BEGINS_ROUGH: f32 = 0.01;
 const BEGINS_USUAL: f32 = 10.0;
@@ -70,11 +70,11 @@ const BEGINS_USUAL: f32 = 10.0;
 /// What it begins with.
 #[derive(Clone, Debug)]
 pub struct Start<'a> {
-    /// [us] instant of the attitude and the rate.
+    /// \[us\] instant of the attitude and the rate.
     pub at_us: u64,
     /// Attitude.
     pub q_nb: UnitQuaternion<f32>,
-    /// [rad2] its covariance, in n.
+    /// \[rad2\] its covariance, in n.
     pub covariance_n: Matrix3<f32>,
     /// [rad/s] rate in b.
     pub rate_b: Vector3<f32>,
@@ -86,9 +86,9 @@ pub struct Start<'a> {
     pub bias_variance: f32,
     /// What each sensor had on the pad.
     pub pad: &'a Pad,
-    /// [uT] hard iron and its covariance, in b.
+    /// \[uT\] hard iron and its covariance, in b.
     pub iron_b: Vector3<f32>,
-    /// [uT2]
+    /// \[uT2\]
     pub iron_covariance: Matrix3<f32>,
     /// What does not change in the spin.
     pub place: Place,
@@ -97,9 +97,9 @@ pub struct Start<'a> {
 /// What does not change in the spin.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// [uT] field, in n.
+    /// \[uT\] field, in n.
     pub field_n_ut: Vector3<f32>,
-    /// [rad] how far its direction is not known.
+    /// \[rad\] how far its direction is not known.
     pub field_sd: f32,
     /// [rad/s] rate of the Earth, in n.
     pub earth_rate_n: Vector3<f32>,
@@ -113,7 +113,7 @@ pub struct Place {
 #[derive(Clone, Debug)]
 pub struct Spin {
     place: Place,
-    /// [us] instant of the state.
+    /// \[us\] instant of the state.
     at_us: u64,
     q_nb: UnitQuaternion<f32>,
     spin: f32,
@@ -130,11 +130,11 @@ pub struct Spin {
     force_rest: [f32; TRIAD_AXES],
     /// [rad2/s2] noise that the gyros show.
     rough: f32,
-    /// [1] what the force equations' squares usually are over what they should be.
+    /// \[1\] what the force equations' squares usually are over what they should be.
     usual: f32,
     /// Three gyros saw the latest slice.
     seen: bool,
-    /// [s] for which a surprise still lasts.
+    /// \[s\] for which a surprise still lasts.
     surprised_s: f32,
     /// Packets in a row whose field was refused.
     refused: u8,
@@ -144,7 +144,7 @@ pub struct Spin {
     by_load: [f32; PLATES],
     /// [m/s2] ... more along x_b than on the pad.
     pad_force: f32,
-    /// [us] instant of the latest slice.
+    /// \[us\] instant of the latest slice.
     slice_us: u64,
 }
 
@@ -251,7 +251,7 @@ impl Spin {
         }
     }
 
-    /// [rad2] covariance of the attitude in n, with what the field's model may be off by.
+    /// \[rad2\] covariance of the attitude in n, with what the field's model may be off by.
     pub fn covariance_n(&self) -> Matrix3<f32> {
         let along_n = self.place.field_n_ut.normalize();
         let across = Matrix3::identity() - along_n * along_n.transpose();
@@ -315,7 +315,7 @@ fn square(x: f32) -> f32 {
     x * x
 }
 
-/// [s] from one instant to another.
+/// \[s\] from one instant to another.
 fn seconds_between(from_us: u64, to_us: u64) -> f32 {
     let us = to_us.wrapping_sub(from_us) as i64;
     us as i32 as f32 * 1e-6

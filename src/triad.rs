@@ -20,7 +20,7 @@ use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 
 use crate::attitude;
 
-/// [deg] least angle between the two directions, or between one and the other's opposite. At 5 deg the error about them
+/// \[deg\] least angle between the two directions, or between one and the other's opposite. At 5 deg the error about them
 /// is eleven times that of the directions.
 pub const LEAST_ANGLE_DEG: f32 = 5.0;
 
@@ -34,9 +34,9 @@ pub struct Sighting {
     pub seen_b: Vector3<f32>,
     /// As known, in n; any length and unit.
     pub known_n: Vector3<f32>,
-    /// [rad] standard deviation of the direction seen, about each axis across it.
+    /// \[rad\] standard deviation of the direction seen, about each axis across it.
     pub seen_sd: f32,
-    /// [rad] the same of the direction known.
+    /// \[rad\] the same of the direction known.
     pub known_sd: f32,
 }
 
@@ -81,7 +81,7 @@ pub fn triad(first: &Sighting, second: &Sighting) -> Result<Observation, Unobser
     Ok(Observation { q_nb, covariance_b })
 }
 
-/// The axes that two known directions span, for [`attitude`]: they need not be found anew for every sighting of them.
+/// The axes that two known directions span, for [`attitude()`]: they need not be found anew for every sighting of them.
 pub fn known_axes(first_n: Vector3<f32>, second_n: Vector3<f32>) -> Result<Matrix3<f32>, Unobservable> {
     axes(direction(first_n)?, direction(second_n)?)
 }

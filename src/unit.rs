@@ -42,9 +42,9 @@ use shared::{Shared, Start};
 /// What a laboratory may choose without touching the code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// [ms] from packet to packet, 20 to 1000. Short: more packets, less idle time. The thesis has 200.
+    /// \[ms\] from packet to packet, 20 to 1000. Short: more packets, less idle time. The thesis has 200.
     pub period_ms: u64,
-    /// [Hz] fast samples of the gyros, 1 to 250. High: less aliasing and coning error, more work.
+    /// \[Hz\] fast samples of the gyros, 1 to 250. High: less aliasing and coning error, more work.
     pub gyro_hz: u64,
     /// Full scale of the accelerometers. Large: survives the boost unclipped. Small: finer counts.
     pub acceleration: lis331hh::FullScale,

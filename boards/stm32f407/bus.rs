@@ -37,7 +37,7 @@ const US: u32 = 168;
 /// Half a clock period by hand: 100 kHz, which every part of the bus follows.
 const HALF_PERIOD: u32 = 5 * US;
 
-/// [us] a part may hold SCL low at each edge during recovery.
+/// \[us\] a part may hold SCL low at each edge during recovery.
 const STRETCH_US: u32 = 20;
 
 /// Clock pulses after which a part that held SDA has let go: eight bits and the acknowledge (UM10204 section 3.1.16).

@@ -20,7 +20,7 @@ use emems::board::{BrownOut, Oscillator};
 /// long as ST's own start-up code waits. A healthy crystal needs 2 ms (STM32F407 datasheet, tSU(HSE)).
 const HSE_READS: u32 = 400_000;
 
-/// [mV] what every board with this chip asks of the brown-out reset: level 3, the highest, because at 168 MHz with five wait
+/// \[mV\] what every board with this chip asks of the brown-out reset: level 3, the highest, because at 168 MHz with five wait
 /// states the chip needs 2.7 V (RM0090 table 10). The factory leaves it off; a programmer sets it (BOR_LEV = 00).
 const BROWN_OUT_MV: u16 = 2700;
 

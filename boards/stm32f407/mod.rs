@@ -73,7 +73,7 @@ impl Watchdog for Iwdg {
     }
 }
 
-/// [us] between the last feeding and the reset if the LSI runs at its nominal 32 kHz. It runs anywhere between 17 and
+/// \[us\] between the last feeding and the reset if the LSI runs at its nominal 32 kHz. It runs anywhere between 17 and
 /// 47 kHz (STM32F407 datasheet, table "LSI oscillator characteristics"), so a hung unit restarts after 0.68 to 1.88 s,
 /// and whoever feeds must do so every 0.6 s.
 const WATCHDOG_US: u32 = 1_000_000;

@@ -41,7 +41,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// [px] places on the page of points in b [m], seen from above the forward and right axes; b's z points down.
+/// \[px\] places on the page of points in b \[m\], seen from above the forward and right axes; b's z points down.
 fn seen(point_b: Vector3<f32>) -> (f64, f64) {
     let (turn, tilt) = (0.45_f64, 0.42_f64);
     let [x, y, z] = [point_b.x, point_b.y, point_b.z].map(f64::from);

@@ -79,9 +79,9 @@ pub struct Text<'a> {
     pub measured: &'a str,
     /// The place.
     pub environment: &'a Environment,
-    /// [uT] how well the field is known; 0 for exactly.
+    /// \[uT\] how well the field is known; 0 for exactly.
     pub field_sigma_ut: f64,
-    /// [rad] and [m] of the reference; zeros for an exact one.
+    /// \[rad\] and \[m\] of the reference; zeros for an exact one.
     pub reference: [f64; 2],
     /// What is fitted and what judges.
     pub windows: &'a Parted,

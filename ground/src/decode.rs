@@ -29,7 +29,7 @@ use crate::{
     table,
 };
 
-/// [bytes] 62 blocks of an image, four of them the superblock's.
+/// \[bytes\] 62 blocks of an image, four of them the superblock's.
 const HEAD: u64 = 1 << 20;
 
 /// Decodes packets to CSV and lists gaps and bytes that are no packet

@@ -18,7 +18,7 @@ use twin::{
 /// Columns of a screen.
 const WIDTH: usize = 110;
 
-/// [s] of the scene that is struck to learn what a disturbance acts on.
+/// \[s\] of the scene that is struck to learn what a disturbance acts on.
 const SCENE_S: f64 = 60.0;
 
 /// Lists the effects that a unit may have: what, sizes, how each shows, how to confirm it

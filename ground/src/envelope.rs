@@ -62,7 +62,7 @@ pub struct Bin {
     pub failed: u16,
     /// Sensors that stood at the end of their range in any of them, one bit each.
     pub clipped: u16,
-    /// [s] time from the packet before to each of them, where no packet was missed between.
+    /// \[s\] time from the packet before to each of them, where no packet was missed between.
     pub interval_s: Option<Range<f64>>,
     /// Lift-off was asserted in any of them.
     pub lift_off: bool,

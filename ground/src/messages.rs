@@ -192,7 +192,7 @@ impl Messages {
     }
 }
 
-/// [us] when the filter's attitude is meant, after the cycle's start.
+/// \[us\] when the filter's attitude is meant, after the cycle's start.
 fn since_start_us(start_us: u64, increments: &Increments) -> f64 {
     increments.end_us as f64 - start_us as f64
 }

@@ -24,10 +24,10 @@ use panel::{Bar, Panel, Times, Trace};
 /// Colours of x, y, z: distinguishable also without red or green (Okabe and Ito, "Color universal design", 2008).
 const XYZ: [RGBColor; 3] = [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115)];
 
-/// [px] size of a figure of four panels; shown at half of it or less, so that lines are finer than a pixel.
+/// \[px\] size of a figure of four panels; shown at half of it or less, so that lines are finer than a pixel.
 const FOUR_PANELS: (u32, u32) = (2600, 1240);
 
-/// [px] size of a figure of one panel.
+/// \[px\] size of a figure of one panel.
 const ONE_PANEL: (u32, u32) = (2600, 640);
 
 /// All figures of a flight; none for a flight without packets.
@@ -121,7 +121,7 @@ fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'stati
 
 /// Deviation of the packet period from its mean.
 fn period(times: &Times, summary: &Summary) -> Result<Figure, ChartError> {
-    /// [us] span shown at least: a resolution of the line's instants, not of rounding errors.
+    /// \[us\] span shown at least: a resolution of the line's instants, not of rounding errors.
     const LEAST_SPAN_US: f64 = 10.0;
     let mean_s = summary.period_s.mean;
     let title = format!("Packet period minus its mean of {:.3} ms [µs]", 1e3 * mean_s);

@@ -88,13 +88,13 @@ pub struct Summary {
     pub failed: [u64; SENSOR_COUNT],
     /// Packets in which sensors stood at the end of their range or gave impossible codes.
     pub reach: Tally,
-    /// [s] period between packets that follow each other.
+    /// \[s\] period between packets that follow each other.
     pub period_s: Spread,
-    /// [s] from the start of a cycle to the closing of its packet.
+    /// \[s\] from the start of a cycle to the closing of its packet.
     pub cycle_s: Spread,
-    /// [s] from the first to the last sensor sampled in a cycle.
+    /// \[s\] from the first to the last sensor sampled in a cycle.
     pub span_s: Spread,
-    /// [s] when each sensor is sampled after the start of the cycle, reading order.
+    /// \[s\] when each sensor is sampled after the start of the cycle, reading order.
     pub slot_s: [Spread; SENSOR_COUNT],
 }
 

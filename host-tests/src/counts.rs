@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 pub use twin::fault::ill::Ill;
 use twin::{geometry, part::signal::Noise, truth::TruthSource};
 
-/// [s] from cycle to cycle.
+/// \[s\] from cycle to cycle.
 pub const PERIOD_S: f64 = 0.2;
 /// Standard deviation of the noise of an axis: m/s2, uT, rad/s, as the twin's parts have it.
 pub const NOISE: [f64; 3] = [0.045, 0.2, 0.00344];
@@ -22,9 +22,9 @@ pub const NOISE: [f64; 3] = [0.045, 0.2, 0.00344];
 pub const BIAS: [f64; 3] = [0.02, 0.1, 0.0015];
 /// SI of a count at the unit's nominal ranges.
 pub const PER_COUNT: [f64; 3] = [3e-3 * 9.80665, 100.0 / 1090.0, 0.07326 * std::f64::consts::PI / 180.0];
-/// [s] between conversions: 50 Hz, 75 Hz, 256 Hz.
+/// \[s\] between conversions: 50 Hz, 75 Hz, 256 Hz.
 const CONVERSION_S: [f64; 3] = [0.02, 1.0 / 75.0, 1.0 / 256.0];
-/// [counts] ends of the range.
+/// \[counts\] ends of the range.
 const ENDS: [(f64, f64); 3] = [(-2048.0, 2047.0), (-2048.0, 2047.0), (-4368.0, 4368.0)];
 
 /// A unit in a world.
@@ -34,9 +34,9 @@ pub struct Unit {
     noise: Noise,
     bias: [f64; CHANNELS],
     phase_s: [f64; 12],
-    /// What befalls it, and from when to when [s].
+    /// What befalls it, and from when to when \[s\].
     pub ills: Vec<(f64, f64, Ill)>,
-    /// [s] of the world in which the first cycle falls.
+    /// \[s\] of the world in which the first cycle falls.
     pub begins_s: f64,
     cycle: u64,
     last: Option<Reading>,
@@ -79,7 +79,7 @@ impl Unit {
         self
     }
 
-    /// [s] of the cycle that comes next.
+    /// \[s\] of the cycle that comes next.
     pub fn now_s(&self) -> f64 {
         self.begins_s + self.cycle as f64 * PERIOD_S
     }
@@ -89,7 +89,7 @@ impl Unit {
         self.world.at(self.now_s()).rate_b.norm() < 1e-4
     }
 
-    /// [SI] what each axis is exposed to in a cycle, without bias and noise.
+    /// \[SI\] what each axis is exposed to in a cycle, without bias and noise.
     fn exposed(&self, now_s: f64) -> [f64; CHANNELS] {
         let seen = |part: usize| {
             let conversion_s = CONVERSION_S[part / 4];

@@ -25,9 +25,9 @@ use twin::{
     truth::{Truth, TruthSource},
 };
 
-/// [ns] a millisecond.
+/// \[ns\] a millisecond.
 pub const MS: Nanos = 1_000_000;
-/// [ns] a second.
+/// \[ns\] a second.
 pub const S: Nanos = 1_000 * MS;
 
 /// A flight to be made on the host board.
@@ -129,7 +129,7 @@ impl Flown {
         self.replies().iter().any(|line| line.contains(text))
     }
 
-    /// [ns] times between packets.
+    /// \[ns\] times between packets.
     pub fn periods(&self) -> Vec<Nanos> {
         self.packets.windows(2).map(|pair| pair[1].0 - pair[0].0).collect()
     }
@@ -197,7 +197,7 @@ impl TruthSource for Changed {
     }
 }
 
-/// A motion of the twin in which `change` alters what is true at a time [s].
+/// A motion of the twin in which `change` alters what is true at a time \[s\].
 pub fn changed(name: &str, change: fn(f64, &mut Truth)) -> Arc<dyn TruthSource> {
     Arc::new(Changed {
         world: world(name),

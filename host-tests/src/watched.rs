@@ -95,17 +95,17 @@ pub fn false_alarms(unit: Unit, cycles: u64, set: Set) -> (u32, u32) {
 /// How a fault on an axis went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outcome {
-    /// [s] from the first faulty cycle to the alarm.
+    /// \[s\] from the first faulty cycle to the alarm.
     pub delay_s: Option<f64>,
     /// Axes accused at the end.
     pub accused: Channels,
     /// Somebody said "not isolable".
     pub undecided: bool,
-    /// [rad] largest difference of the direction of force or field from what the same unit finds when healthy.
+    /// \[rad\] largest difference of the direction of force or field from what the same unit finds when healthy.
     pub jump: f64,
 }
 
-/// [s] the tumble begins.
+/// \[s\] the tumble begins.
 const REST_S: f64 = 10.0;
 
 /// A unit that learns for `learns_s`, falls ill, and is watched for `watched_s`.
@@ -162,9 +162,9 @@ pub struct Tally {
     pub named: u32,
     /// A sensor on a healthy plate was accused.
     pub wrong: u32,
-    /// [rad] largest jump of any.
+    /// \[rad\] largest jump of any.
     pub jump: f64,
-    /// [s] longest delay of any.
+    /// \[s\] longest delay of any.
     pub delay_s: f64,
 }
 

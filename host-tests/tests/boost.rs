@@ -13,7 +13,7 @@ use twin::{
     truth::{Truth, TruthSource},
 };
 
-/// [s] lift-off.
+/// \[s\] lift-off.
 const PAD_S: f64 = 30.0;
 
 fn rocket(course: Course) -> World<SoundingRocket> {
@@ -31,13 +31,13 @@ fn flight(world: impl TruthSource + 'static) -> Flight {
 /// Over a stretch of a flight.
 #[derive(Debug)]
 struct Met {
-    /// [deg] largest error.
+    /// \[deg\] largest error.
     worst_deg: f64,
-    /// [deg] root mean square of the error.
+    /// \[deg\] root mean square of the error.
     rms_deg: f64,
-    /// [deg] the same of what was said.
+    /// \[deg\] the same of what was said.
     said_deg: f64,
-    /// [1] mean of the squared error in its own covariance, a degree of freedom.
+    /// \[1\] mean of the squared error in its own covariance, a degree of freedom.
     nees: f64,
 }
 
@@ -73,7 +73,7 @@ fn met(frames: &[Derived], motion: &SoundingRocket, from_s: f64, to_s: f64) -> M
 /// degrees of freedom; 3.8 is chi-squared's 99 % of one.
 const HONEST: f64 = 3.8;
 
-/// [deg] what the attitude through the spin may be off by.
+/// \[deg\] what the attitude through the spin may be off by.
 const SPINNING_DEG: f64 = 3.0;
 
 fn is_right(name: &str, met: &Met, within_deg: f64) {

@@ -8,7 +8,7 @@ use host_tests::world;
 use host_tests::{Flight, MS, S};
 use twin::run::Fault;
 
-/// [ns] the clock's microsecond, twice.
+/// \[ns\] the clock's microsecond, twice.
 const JITTER: u64 = 2_000;
 
 fn still() -> Flight {
@@ -111,11 +111,11 @@ fn a_part_that_holds_sda_is_freed_by_clock_pulses() {
     assert!(flown.second(5).iter().all(|reading| reading.errors.0 == 0));
 }
 
-/// [ns] longer than any read may take.
+/// \[ns\] longer than any read may take.
 const TOO_LONG: u64 = 20 * MS;
-/// [ns] shorter than any.
+/// \[ns\] shorter than any.
 const A_WHILE: u64 = MS / 5;
-/// [ns] by how much the packet of a cycle with such a part may come later than 10 ms after the cycle's start.
+/// \[ns\] by how much the packet of a cycle with such a part may come later than 10 ms after the cycle's start.
 const LATER: u64 = 15 * MS;
 /// Slots of the gyros, which are on another bus.
 const GYROS: std::ops::Range<usize> = 8..12;

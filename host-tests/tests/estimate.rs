@@ -106,7 +106,7 @@ fn at_fifty_hertz_no_packet_is_lost_and_frames_come_as_the_line_has_room() {
     );
 }
 
-/// [deg] of the whole attitude after ten seconds of tumbling: the clocks of the parts are worth milliseconds, and that at
+/// \[deg\] of the whole attitude after ten seconds of tumbling: the clocks of the parts are worth milliseconds, and that at
 /// 130 deg/s.
 const TUMBLING_DEG: f64 = 2.0;
 
@@ -140,7 +140,7 @@ impl Errors {
     }
 }
 
-/// [deg] what no component of the filter's error may reach on average, or scatter by: half a degree of magnetometer bias
+/// \[deg\] what no component of the filter's error may reach on average, or scatter by: half a degree of magnetometer bias
 /// (0.1 uT of 18 over four plates is 0.2), accelerometer bias and the filter's own noise.
 const ATTITUDE_DEG: f64 = 0.5;
 /// [deg/s] the same of the rate: biases of 0.0015 rad/s on four gyros, and 12.5 ms of lag in turns of 28 deg/s2.

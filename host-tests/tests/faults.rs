@@ -52,9 +52,9 @@ fn nominal_parameters_on_a_badly_built_unit_raise_no_alarm() {
     }
 }
 
-/// [s] at rest before a fault: what is learned by then is learned.
+/// \[s\] at rest before a fault: what is learned by then is learned.
 const LEARNS_S: f64 = 200.0;
-/// [s] a second, and the cycle in which it ends.
+/// \[s\] a second, and the cycle in which it ends.
 const ONE_SECOND: f64 = 1.1;
 const FIVE_SECONDS: f64 = 5.1;
 
@@ -73,7 +73,7 @@ fn steps(sigmas: f64, watched_s: f64, rounds: u64) -> Tally {
     tally
 }
 
-/// [rad] a fault of one axis may turn force or field by, until it is out and when it goes.
+/// \[rad\] a fault of one axis may turn force or field by, until it is out and when it goes.
 const JUMP: f64 = 1.0 / 57.3;
 
 #[test]

@@ -9,7 +9,7 @@ fn rocket() -> Flight {
     Flight::ideal(world("rocket"))
 }
 
-/// [ns] lift-off of the rocket motion.
+/// \[ns\] lift-off of the rocket motion.
 const LIFT_OFF: u64 = 30 * S;
 
 #[test]
@@ -58,7 +58,7 @@ fn a_reset_in_flight_resumes_flight_within_400_ms() {
     );
 }
 
-/// [ns] the independent watchdog's second, the 0.2 s in which it may last have been fed before the hang, and those in which the
+/// \[ns\] the independent watchdog's second, the 0.2 s in which it may last have been fed before the hang, and those in which the
 /// part that hangs was next used.
 const WATCHDOG: std::ops::Range<u64> = S - 200 * MS..S + 250 * MS;
 

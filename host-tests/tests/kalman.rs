@@ -41,11 +41,11 @@ fn params() -> Params {
     }
 }
 
-/// [rad/sqrt(s)] of the gyros, [m/s2] and [uT] of a sample.
+/// [rad/sqrt(s)] of the gyros, [m/s2] and \[uT\] of a sample.
 const ANGLE_NOISE: f64 = 1e-3;
 const ACC_NOISE: f64 = 0.045;
 const MAG_NOISE: f64 = 0.2;
-/// [rad] of the attitude at the start, about each axis.
+/// \[rad\] of the attitude at the start, about each axis.
 const START_SD: f64 = 0.03;
 
 #[derive(Clone, Copy, Debug)]

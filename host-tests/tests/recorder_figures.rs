@@ -8,10 +8,10 @@ use emems::{
 use host_tests::recorder::{Flown, entry, log};
 use twin::part::nand::Cells;
 
-/// [ns] what a mount may take of the chip's time after a clean end, and at worst.
+/// \[ns\] what a mount may take of the chip's time after a clean end, and at worst.
 const MOUNT_CLEAN: u64 = 2_000_000;
 const MOUNT_WORST: u64 = 100_000_000;
-/// [ns] what an append may take.
+/// \[ns\] what an append may take.
 const APPEND: u64 = 1_500_000;
 /// Records of a chip with as many bad blocks as its data sheet allows, all 80 of them in the log's part: four blocks are the
 /// superblock's, four the kept calibration set's.
@@ -45,7 +45,7 @@ fn the_chips_time_stays_within_its_figures() {
     assert!(rate >= 200, "{rate}");
 }
 
-/// [ns] appends after the first of a boot, with or without free time between them: the slowest, and all.
+/// \[ns\] appends after the first of a boot, with or without free time between them: the slowest, and all.
 fn appends(chip: &mut Cells, count: u32, free_time: bool) -> (u64, u64) {
     let clock = std::cell::Cell::new(0);
     let mut log = FlightLog::new(Clocked { chip, clock: &clock }, BootHeader::default());

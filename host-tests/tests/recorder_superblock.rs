@@ -14,7 +14,7 @@ use twin::part::nand::Cells;
 
 const BLOCKS: u16 = 24;
 
-/// [ns] what a mount may take of the time of a chip of full size; these are smaller.
+/// \[ns\] what a mount may take of the time of a chip of full size; these are smaller.
 const MOUNT_WORST: u64 = 100_000_000;
 
 /// F17: superblocks of all kinds.

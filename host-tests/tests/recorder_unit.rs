@@ -15,10 +15,10 @@ use emems::{
 use host_tests::{Flight, Flown, MS, S, recorder::logged, world};
 use twin::{part::Nanos, run::Fault};
 
-/// [ns] lift-off of the rocket motion.
+/// \[ns\] lift-off of the rocket motion.
 const LIFT_OFF: Nanos = 30 * S;
 
-/// [ns] from a reset to the first record that is durable: two packets may be missing.
+/// \[ns\] from a reset to the first record that is durable: two packets may be missing.
 const BACK: Nanos = 400 * MS;
 
 fn rocket() -> Flight {

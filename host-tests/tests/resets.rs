@@ -351,7 +351,7 @@ fn weightless(rate_deg_s: f64, seed: u64) -> Flight {
     .say(2 * S, b"G_MG")
 }
 
-/// The error of a frame's attitude as a rotation vector in n [rad], and its covariance.
+/// The error of a frame's attitude as a rotation vector in n \[rad\], and its covariance.
 fn error(frame: &Derived, clock_started: Nanos, rate_deg_s: f64) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let [w, x, y, z] = frame.estimate.q_nb?.map(f64::from);
     let found = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));

@@ -16,7 +16,7 @@ use rand_xoshiro::{
     rand_core::{Rng, SeedableRng},
 };
 
-/// [us] a byte takes at 115200 8N1.
+/// \[us\] a byte takes at 115200 8N1.
 const BYTE_US: u64 = 87;
 
 /// Each word and what it reads of the unit, and writes to it, on the page of threats. None names an address.

@@ -6,7 +6,7 @@ use host_tests::{Coasting, Flight, Flown, S};
 use nalgebra::Vector3;
 use twin::environment::{Environment, World};
 
-/// [s] from when on there is no weight, and for how long it flies.
+/// \[s\] from when on there is no weight, and for how long it flies.
 const WEIGHTLESS_S: f64 = 40.0;
 const FLOWN_S: u64 = 120;
 

@@ -10,26 +10,26 @@ use crate::{
     sensor::hmc5883l::OVERFLOW,
 };
 
-/// [counts] what a part says at the ends of its range, and beyond it if it has a word for that.
+/// \[counts\] what a part says at the ends of its range, and beyond it if it has a word for that.
 struct Ends {
     least: i16,
     most: i16,
     overflow: i16,
 }
 
-/// [counts] ends of the LIS331HH's 12 bits.
+/// \[counts\] ends of the LIS331HH's 12 bits.
 const ACC_ENDS: Ends = Ends {
     least: -2048,
     most: 2047,
     overflow: -2048,
 };
-/// [counts] just beyond the HMC5883L's 12 bits, where it says [`OVERFLOW`].
+/// \[counts\] just beyond the HMC5883L's 12 bits, where it says [`OVERFLOW`].
 const MAG_ENDS: Ends = Ends {
     least: -2049,
     most: 2048,
     overflow: OVERFLOW,
 };
-/// [counts] where the ADIS16265 ends: 320 deg/s of 0.07326, and the same counts in its other ranges.
+/// \[counts\] where the ADIS16265 ends: 320 deg/s of 0.07326, and the same counts in its other ranges.
 const GYRO_ENDS: Ends = Ends {
     least: -4368,
     most: 4368,
@@ -41,7 +41,7 @@ const GYRO_ENDS: Ends = Ends {
 pub struct Measured {
     /// [m/s2] specific force along each axis of [`Set::acc`]; 0 where there is none.
     pub acc: [f32; TRIAD_AXES],
-    /// [uT] field along each axis of [`Set::mag`]; 0 where there is none.
+    /// \[uT\] field along each axis of [`Set::mag`]; 0 where there is none.
     pub mag: [f32; TRIAD_AXES],
     /// [rad/s] rate about each axis of [`Set::gyro`]; 0 where there is none.
     pub gyro: [f32; PLATES],
@@ -49,7 +49,7 @@ pub struct Measured {
     pub present: Channels,
     /// Axes at the end of their range, which have none.
     pub saturated: Channels,
-    /// [degC] each gyro's temperature above the reference, within what the set holds for.
+    /// \[degC\] each gyro's temperature above the reference, within what the set holds for.
     pub gyros_above_c: [f32; PLATES],
     /// A temperature is not of this cycle or was never read.
     pub temperature_held: bool,

@@ -9,7 +9,7 @@ pub struct Axis {
     pub axis_b: Vector3<f32>,
     /// [unit/count] at the reference temperature.
     pub scale: f32,
-    /// [counts] output without input, at the reference temperature.
+    /// \[counts\] output without input, at the reference temperature.
     pub bias_counts: f32,
     /// [counts/degC] change of the bias.
     pub bias_per_c: f32,
@@ -39,12 +39,12 @@ impl Axis {
         }
     }
 
-    /// [counts] without input, `above_c` [degC] above the reference.
+    /// \[counts\] without input, `above_c` \[degC\] above the reference.
     pub fn bias_counts_at(&self, above_c: f32) -> f32 {
         self.bias_counts + above_c * (self.bias_per_c + above_c * self.bias_per_c2)
     }
 
-    /// [unit/count] `above_c` [degC] above the reference.
+    /// [unit/count] `above_c` \[degC\] above the reference.
     pub fn scale_at(&self, above_c: f32) -> f32 {
         self.scale * (1.0 + self.scale_per_c * above_c)
     }
@@ -91,9 +91,9 @@ impl Axis {
 pub struct Uncertainty {
     /// [unit] of the biases.
     pub bias: f32,
-    /// [1] of the scales.
+    /// \[1\] of the scales.
     pub scale: f32,
-    /// [rad] of the directions of the axes.
+    /// \[rad\] of the directions of the axes.
     pub direction: f32,
 }
 

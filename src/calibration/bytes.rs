@@ -11,9 +11,9 @@
 //! | 16..19 | method of accelerometers, magnetometers, gyros: 0 MT, 1 LMS EC, 2 MV SEC |
 //! | 19..22 | full scale FS (0, 1, 3), gain GN (0 to 7), range (1, 2, 4) as the parts' registers have them |
 //! | 22..24 | 0 |
-//! | 24..36 | reference, lowest, highest temperature [degC] |
-//! | 36..72 | bias [unit], scale [1], direction [rad] uncertainty of accelerometers, magnetometers, gyros |
-//! | 72..124 | four places x, y, z [m], their standard deviation [m] |
+//! | 24..36 | reference, lowest, highest temperature \[degC\] |
+//! | 36..72 | bias [unit], scale \[1\], direction \[rad\] uncertainty of accelerometers, magnetometers, gyros |
+//! | 72..124 | four places x, y, z \[m\], their standard deviation \[m\] |
 //! | 124..1132 | 28 axes of nine numbers: direction x, y, z, scale, bias, its two temperature terms, the scale's, noise |
 //! | 1132..1136 | CRC-32 (ISO-HDLC) over everything before |
 //!

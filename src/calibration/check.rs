@@ -20,13 +20,13 @@ const MOST_CONDITION: f32 = 1e3;
 const LEAST_COSINE: f32 = 0.984_8;
 /// A scale outside half to twice the datasheet's is in another unit or of another range.
 const SCALES: core::ops::RangeInclusive<f32> = 0.5..=2.0;
-/// [counts] half the codes of a 12-bit part: what is left is no range.
+/// \[counts\] half the codes of a 12-bit part: what is left is no range.
 const MOST_BIAS_COUNTS: f32 = 1024.0;
-/// [counts] noise beyond this is not that of a working part.
+/// \[counts\] noise beyond this is not that of a working part.
 const MOST_NOISE_COUNTS: f32 = 200.0;
-/// [degC] what the parts survive.
+/// \[degC\] what the parts survive.
 const TEMPERATURES: core::ops::RangeInclusive<f32> = -60.0..=130.0;
-/// [m] a place farther from the centre than this is not on the unit.
+/// \[m\] a place farther from the centre than this is not on the unit.
 const MOST_PLACE: f32 = 0.5;
 /// How far from 1 the length of an axis may be.
 const UNIT_LENGTH: f32 = 1e-3;

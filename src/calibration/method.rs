@@ -34,7 +34,7 @@ pub enum Angles {
     Common,
 }
 
-/// The lower triangle of an ellipsoid given by semi-axes `[a, b, c]` and angles `[rho, phi, lambda]` [rad].
+/// The lower triangle of an ellipsoid given by semi-axes `[a, b, c]` and angles `[rho, phi, lambda]` \[rad\].
 pub fn ellipsoid([a, b, c]: [f32; 3], [rho, phi, lambda]: [f32; 3], angles: Angles) -> Matrix3<f32> {
     let (sin, cos) = (ComplexField::sin, ComplexField::cos);
     let (along, across) = (sin(phi) * cos(lambda), sin(lambda));

@@ -12,7 +12,7 @@ use crate::{
 
 /// [m/s2] of one g in the datasheet's mg; Eq 3.30 is reproduced with it to its last digit.
 const STANDARD_GRAVITY: f32 = 9.80665;
-/// [uT] of one gauss.
+/// \[uT\] of one gauss.
 const GAUSS_UT: f32 = 100.0;
 
 /// Which method found the parameters of a kind of sensor.
@@ -75,21 +75,21 @@ pub struct Set {
     pub identity: Identity,
     /// What the counts belong to.
     pub ranges: Ranges,
-    /// [degC] temperature the parameters are for.
+    /// \[degC\] temperature the parameters are for.
     pub reference_c: f32,
-    /// [degC] lowest temperature they hold at; below it they are applied as at it, and marked.
+    /// \[degC\] lowest temperature they hold at; below it they are applied as at it, and marked.
     pub lowest_c: f32,
-    /// [degC] highest temperature they hold at.
+    /// \[degC\] highest temperature they hold at.
     pub highest_c: f32,
     /// How far they may be off: accelerometers, magnetometers, gyros.
     pub uncertainty: [Uncertainty; 3],
-    /// [m] places of the accelerometers, in b, from the unit's centre of rotation.
+    /// \[m\] places of the accelerometers, in b, from the unit's centre of rotation.
     pub place_b: [Vector3<f32>; PLATES],
-    /// [m] standard deviation of a component of a place.
+    /// \[m\] standard deviation of a component of a place.
     pub place_sigma: f32,
     /// [m/s2] accelerometers, x, y, z of each plate.
     pub acc: [Axis; TRIAD_AXES],
-    /// [uT] magnetometers, x, y, z of each plate.
+    /// \[uT\] magnetometers, x, y, z of each plate.
     pub mag: [Axis; TRIAD_AXES],
     /// [rad/s] gyros.
     pub gyro: [Axis; PLATES],

@@ -10,11 +10,11 @@ use crate::{
     sensor::{adis16265, tmp102},
 };
 
-/// [degC] from one cycle to the next.
+/// \[degC\] from one cycle to the next.
 const JUMP_C: f32 = 5.0;
 /// Cycles; 5 s at the unit's 5 Hz.
 const JUMP_CYCLES: u8 = 25;
-/// [degC] of a gyro's temperature at 0 counts (data sheet, TEMP_OUT).
+/// \[degC\] of a gyro's temperature at 0 counts (data sheet, TEMP_OUT).
 const GYRO_ZERO_C: f32 = 25.0;
 
 /// One thermometer.
@@ -70,12 +70,12 @@ impl Temperatures {
         }
     }
 
-    /// [degC] of the accelerometer and magnetometer of a plate; `None` before it was first read.
+    /// \[degC\] of the accelerometer and magnetometer of a plate; `None` before it was first read.
     pub fn plate_c(&self, plate: usize) -> Option<f32> {
         self.plates[plate].believed_c
     }
 
-    /// [degC] of a plate's gyro.
+    /// \[degC\] of a plate's gyro.
     pub fn gyro_c(&self, plate: usize) -> Option<f32> {
         self.gyros[plate].believed_c
     }

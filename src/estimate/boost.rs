@@ -24,7 +24,7 @@ use crate::{
 /// [rad/s] the spin at which it begins: 77 % of what the first gyro to stop can see of it, so that a second of spin-up at half a
 /// turn a second in a second leaves some packets before; faster than the tables of a laboratory (200 deg/s).
 const BEGINS: f32 = 4.5;
-/// [1] and by so much the spin must exceed the rate across it: a hand turns a unit about any axis.
+/// \[1\] and by so much the spin must exceed the rate across it: a hand turns a unit about any axis.
 const MOSTLY: f32 = 5.0;
 /// [rad/s] the spin below which it may end.
 const ENDS: f32 = 1.0;
@@ -34,7 +34,7 @@ const QUIET: u8 = 25;
 const RATE_SD: f32 = 0.05;
 /// [rad/s] spin that is taken for a start where the gyros say no more than that it is beyond them, and how far it may be off.
 const UNSEEN: [f32; 2] = [12.0, 6.0];
-/// [us] longest period whose slices have all a place.
+/// \[us\] longest period whose slices have all a place.
 const LONGEST_US: u32 = 250_000;
 
 /// The spin's filter, while it is on.

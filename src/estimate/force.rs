@@ -41,23 +41,23 @@ pub(super) struct Averager {
     /// Sum of those that were not left out, in b as it was at the cycle before, and how many.
     sum_b: Vector3<f32>,
     kept: f32,
-    /// [s] sum of what the rotations up to them cover.
+    /// \[s\] sum of what the rotations up to them cover.
     covered_s: f32,
 }
 
 /// How far b turned in a period.
 pub(super) struct Turn {
-    /// [rad] over the increment, calibrated and without bias; a rotation vector in b.
+    /// \[rad\] over the increment, calibrated and without bias; a rotation vector in b.
     pub calibrated_b: Vector3<f32>,
-    /// [rad] over the increment, as its readings have it.
+    /// \[rad\] over the increment, as its readings have it.
     pub nominal_b: [f32; 3],
-    /// [rad] from the end of the increment to the cycle's reading of force.
+    /// \[rad\] from the end of the increment to the cycle's reading of force.
     pub since_b: Vector3<f32>,
-    /// [s] of the increment.
+    /// \[s\] of the increment.
     pub covered_s: f32,
 }
 
-/// [counts] beyond these an accelerometer's 12 bits end.
+/// \[counts\] beyond these an accelerometer's 12 bits end.
 const RANGE: core::ops::Range<i16> = -2047..2047;
 
 /// So many times its variance may be left over of a difference that a vector does not explain: nine degrees of freedom

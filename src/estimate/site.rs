@@ -23,9 +23,9 @@ const EARTH_RATE: f32 = 7.292_115e-5;
 pub struct Site {
     /// [m/s2] gravity. Wrong by a part: the velocity that bounds the tilt is wrong by that part.
     pub gravity: f32,
-    /// [deg] latitude, north positive. Wrong by a radian: 15 deg/h of drift that the gyro bias takes up.
+    /// \[deg\] latitude, north positive. Wrong by a radian: 15 deg/h of drift that the gyro bias takes up.
     pub latitude_deg: f32,
-    /// [deg] declination of the field, east positive. Wrong by an angle: heading is wrong by it. 0: north is magnetic.
+    /// \[deg\] declination of the field, east positive. Wrong by an angle: heading is wrong by it. 0: north is magnetic.
     pub declination_deg: f32,
     /// What a launch crew knows beside; `None` in a room.
     pub launch: Option<Launch>,
@@ -34,14 +34,14 @@ pub struct Site {
 /// What a launch crew knows: norm and dip of a field that a model gives and nothing disturbs, and the unit in its vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Launch {
-    /// [uT] norm. Wrong by a part: the field shows a disturbance of that part for ever.
+    /// \[uT\] norm. Wrong by a part: the field shows a disturbance of that part for ever.
     pub norm_ut: f32,
-    /// [deg] below the horizontal.
+    /// \[deg\] below the horizontal.
     pub dip_deg: f32,
-    /// [deg] error of its direction about each axis across it, standard deviation: the model's (IGRF-13 leaves
+    /// \[deg\] error of its direction about each axis across it, standard deviation: the model's (IGRF-13 leaves
     /// some 0.1 uT of 25, P. Alken et al., Earth Planets Space 73:49, 2021) and the rail's iron.
     pub sd_deg: f32,
-    /// [uT] the vehicle's hard iron on each axis after it was swung, standard deviation.
+    /// \[uT\] the vehicle's hard iron on each axis after it was swung, standard deviation.
     pub iron_sd_ut: f32,
     /// [deg/s] by how much the bias of a gyro changes with each g, standard deviation: what a bench leaves of the data sheet's
     /// 0.2 (ADIS16265, Table 1). 0: it is known.

@@ -9,7 +9,7 @@ use crate::{
     sample::{NO_SLOT, NOT_READ, Reading, SENSOR_COUNT},
 };
 
-/// [us] from cycle to cycle.
+/// \[us\] from cycle to cycle.
 const PERIOD_US: u64 = 200_000;
 
 /// Level and at rest in the laboratory, facing magnetic north: counts of the nominal unit, which flicker by one as what
@@ -56,10 +56,10 @@ fn resting(counter: u16) -> (Sample, Increments) {
     (sample, increments)
 }
 
-/// [rad] a magnetometer's count and a half of 0.09 uT on each of twelve axes, of 18 uT.
+/// \[rad\] a magnetometer's count and a half of 0.09 uT on each of twelve axes, of 18 uT.
 const FLICKER: f32 = 0.01;
 
-/// [rad] heading of a magnetic compass needle east of north, from an estimate level to half a degree.
+/// \[rad\] heading of a magnetic compass needle east of north, from an estimate level to half a degree.
 fn heading(q: [f32; 4]) -> f32 {
     2.0 * nalgebra::RealField::atan2(q[3], q[0])
 }
@@ -112,7 +112,7 @@ fn in_free_fall_triad_has_no_vertical() {
     assert_eq!(estimator.step(&sample, &increments).triad_nb, None);
 }
 
-/// Roll and pitch may be off by this of what readings in between say where those are not to count [rad].
+/// Roll and pitch may be off by this of what readings in between say where those are not to count \[rad\].
 const NOT_COUNTED: f32 = 1e-6;
 
 #[test]

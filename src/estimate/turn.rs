@@ -25,17 +25,17 @@ use crate::{
     sample::Kind,
 };
 
-/// [counts] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
+/// \[counts\] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
 const RANGE_COUNTS: u16 = 4368;
 
 /// What b turned by in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Turn {
-    /// [rad] rotation vector in b.
+    /// \[rad\] rotation vector in b.
     pub angle_b: Vector3<f32>,
-    /// [rad2] white variance of a component.
+    /// \[rad2\] white variance of a component.
     pub variance: f32,
-    /// [s] time it covers; 0 if nothing is known.
+    /// \[s\] time it covers; 0 if nothing is known.
     pub covered_s: f32,
     /// It is a lower bound.
     pub saturated: bool,
@@ -58,7 +58,7 @@ impl Solver {
     }
 }
 
-/// The rotation of a cycle by the gyros whose bit in `believed` is set, each so far above the reference temperature [degC].
+/// The rotation of a cycle by the gyros whose bit in `believed` is set, each so far above the reference temperature \[degC\].
 pub(super) fn turn(
     set: &Set,
     above_c: &[f32; PLATES],
@@ -107,7 +107,7 @@ pub(super) fn turn(
     }
 }
 
-/// [rad] each gyro about its own axis.
+/// \[rad\] each gyro about its own axis.
 fn calibrated(set: &Set, above_c: &[f32; PLATES], increments: &Increments, covered_s: f32) -> [f32; PLATES] {
     core::array::from_fn(|k| {
         let (axis, above_c) = (&set.gyro[k], above_c[k]);
@@ -137,7 +137,7 @@ mod tests {
     };
 
     const ALL: u16 = 0b1111;
-    /// [rad] half a count on each gyro for 0.2 s.
+    /// \[rad\] half a count on each gyro for 0.2 s.
     const ROUNDING: f32 = 0.07326 * core::f32::consts::PI / 180.0 * 0.2;
 
     fn nominal() -> Set {

@@ -21,7 +21,7 @@ const UNCHECKED: f32 = 0.05;
 pub(super) struct Disagreement {
     /// [unit] measured less expected.
     pub(super) by: f32,
-    /// [1] its variance, in those of the axis.
+    /// \[1\] its variance, in those of the axis.
     pub(super) share: f32,
 }
 

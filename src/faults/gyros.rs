@@ -60,7 +60,7 @@ pub(super) struct Gyros {
     /// By how much a parity of one moves the rate when each gyro is left out.
     without: [Vector3<f32>; PLATES],
     uncertainty: Uncertainty,
-    /// [s] by how much the sampling instants are unsure.
+    /// \[s\] by how much the sampling instants are unsure.
     timing_s: f32,
     parity: Watch,
     watches: [Watch; PLATES],

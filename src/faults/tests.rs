@@ -8,7 +8,7 @@ use crate::{
     unit::Settings,
 };
 
-/// [s] from cycle to cycle.
+/// \[s\] from cycle to cycle.
 const DT_S: f32 = 0.2;
 /// [m/s2] specific force at the centre.
 const FORCE_B: Vector3<f32> = Vector3::new(0.5, -0.3, -9.8);

@@ -55,14 +55,14 @@ pub(super) struct Apart {
 pub(super) struct Triads {
     axes_b: [Vector3<f32>; TRIAD_AXES],
     uncertainty: Uncertainty,
-    /// [s] by how much the sensors' sampling instants are unsure.
+    /// \[s\] by how much the sensors' sampling instants are unsure.
     timing_s: f32,
     watches: [Watch; TRIAD_AXES],
     /// What is systematic of all of them, counted in the noise of the least noisy.
     of_all: Systematic,
     /// [1/unit2] one over the variance of that.
     per_noise: f32,
-    /// [1] that variance in the noise of the noisiest.
+    /// \[1\] that variance in the noise of the noisiest.
     least_relative: f32,
     /// Squared differences from what it should be, its negative, the next and the one after next axis of its sensor.
     likeness: [[f32; 4]; TRIAD_AXES],
@@ -163,7 +163,7 @@ impl Triads {
         self.undecided
     }
 
-    /// [unit2] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
+    /// \[unit2\] what does not average out: scale and direction as far as the vector is not where the offsets were learned,
     /// motion within the uncertainty of the sampling instants, and what differs by place.
     fn systematic(&self, dt_s: Option<f32>, apart: &Apart, seen: &[Seen; TRIAD_AXES], candidates: u16) -> f32 {
         let rough_b = self.rough(seen, candidates);

@@ -14,9 +14,9 @@ use nalgebra::Vector3;
 
 use crate::{attitude::from_rotation_vector, geometry::PLATES};
 
-/// [s] after which the directions of now are the new start.
+/// \[s\] after which the directions of now are the new start.
 const STRETCH_S: f32 = 10.0;
-/// [s] before which noise says little.
+/// \[s\] before which noise says little.
 const SHORTEST_S: f32 = 2.0;
 /// Between the costs of the best and the second hypothesis.
 const MARGIN: f32 = 8.0;
@@ -30,7 +30,7 @@ const FITS: f32 = 12.0;
 pub(super) struct Direction {
     /// Unit vector.
     pub(super) along_b: Vector3<f32>,
-    /// [rad2] variance of either angle.
+    /// \[rad2\] variance of either angle.
     pub(super) variance: f32,
 }
 

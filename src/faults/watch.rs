@@ -36,15 +36,15 @@ const NOISY: f32 = 4.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watch {
     trace: Trace,
-    /// [unit2] variance of its noise.
+    /// \[unit2\] variance of its noise.
     pub(super) noise: f32,
     /// Of the noise that is counted in what is systematic, in its own.
     relative: f32,
     /// [unit] learned disagreement.
     pub(super) offset: f32,
-    /// [unit2] of the offset.
+    /// \[unit2\] of the offset.
     pub(super) offset_variance: f32,
-    /// [unit2] what the calibration allows the offset to be.
+    /// \[unit2\] what the calibration allows the offset to be.
     allowed: f32,
     strikes: u8,
     sound_for: u16,

@@ -8,12 +8,12 @@
 //! | 2, 3 | version, type | the same |
 //! | 4-7, 8-11, 12-13 | number within the boot, boot, epoch: the key | the same |
 //! | 14-15 | flags: 1 FLIGHT, 2 with an attitude | flags: 4 with how it started |
-//! | 16-23 | [us] start of the cycle, since the unit's clock started | [us] when the log was opened |
+//! | 16-23 | \[us\] start of the cycle, since the unit's clock started | \[us\] when the log was opened |
 //! | 24-179 | the packet, verbatim | firmware (16, text), unit (16, text), calibration set (16, text), 156-byte |
-//! | 180-211 | 16 x u16: when each sensor was sampled after the start [4 us], FFFF not sampled | packet's period [us] u32, |
+//! | 180-211 | 16 x u16: when each sensor was sampled after the start [4 us], FFFF not sampled | packet's period \[us\] u32, |
 //! | 212-219 | 4 x i16: attitude q_nb, 1/32767 | then what the fields of a packet record are, in |
 //! | 220-231 | 3 x f32: gyro bias in b [rad/s] | words, so that a log is read without this page |
-//! | 232-243 | 6 x upper half of an f32: deviation of attitude [rad] and bias [rad/s] | |
+//! | 232-243 | 6 x upper half of an f32: deviation of attitude \[rad\] and bias [rad/s] | |
 //! | 244-247 | health | |
 //! | 248-251 | health of the sensors; zero without an attitude | zero |
 //! | 252-255 | CRC-32 (ISO-HDLC) of bytes 0 to 251 | the same |
@@ -116,7 +116,7 @@ pub struct Estimate {
     pub q_nb: [f32; 4],
     /// [rad/s] gyro bias in b.
     pub bias_b: [f32; 3],
-    /// Standard deviations: attitude about b's axes [rad], then bias [rad/s]; kept to 8 bits.
+    /// Standard deviations: attitude about b's axes \[rad\], then bias [rad/s]; kept to 8 bits.
     pub sigma: [f32; 6],
     /// Which axes were not used, and what is not isolable.
     pub sensors: SensorHealth,
@@ -126,11 +126,11 @@ pub struct Estimate {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Entry {
-    /// [us] start of the cycle, since the unit's clock started.
+    /// \[us\] start of the cycle, since the unit's clock started.
     pub start_us: u64,
     /// The packet, verbatim.
     pub packet: [u8; PACKET_BYTES],
-    /// [us] when each sensor was sampled after `start_us`, reading order; kept to 4 us; [`NO_SLOT`] if it was not.
+    /// \[us\] when each sensor was sampled after `start_us`, reading order; kept to 4 us; [`NO_SLOT`] if it was not.
     pub slots_us: [u32; SENSOR_COUNT],
     /// The unit was in FLIGHT.
     pub flight: bool,
@@ -146,7 +146,7 @@ pub type Name = heapless::String<16>;
 /// What every boot says of itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BootHeader {
-    /// [us] when the log was opened, since the unit's clock started.
+    /// \[us\] when the log was opened, since the unit's clock started.
     pub opened_us: u64,
     /// Version of the firmware.
     pub firmware: Name,
@@ -154,7 +154,7 @@ pub struct BootHeader {
     pub unit: Name,
     /// Which set of calibration parameters; empty for none.
     pub calibration: Name,
-    /// [us] from packet to packet.
+    /// \[us\] from packet to packet.
     pub period_us: u32,
     /// How the unit started; `None` in logs of older firmware.
     pub start: Option<Start>,
@@ -334,7 +334,7 @@ pub fn packet(bytes: &RecordBytes) -> Option<&[u8; PACKET_BYTES]> {
     is_packet(bytes).then_some(packet)
 }
 
-/// Whether the record was made in FLIGHT, and when its cycle began [us].
+/// Whether the record was made in FLIGHT, and when its cycle began \[us\].
 pub fn mode_and_time(bytes: &RecordBytes) -> (bool, u64) {
     (flags(bytes) & FLIGHT != 0, u64::from_le_bytes(take(bytes, at::TIME)))
 }

@@ -22,12 +22,12 @@ pub struct Status {
     pub astray: bool,
     /// Blocks that are still to be erased in free time.
     pub erasing: Option<u32>,
-    /// The newest record, and when its cycle began [us].
+    /// The newest record, and when its cycle began \[us\].
     pub last: Option<(Key, u64)>,
 }
 
 impl Status {
-    /// [min] until the log is full, at a record each `period_ms`.
+    /// \[min\] until the log is full, at a record each `period_ms`.
     pub fn minutes_left(&self, period_ms: u64) -> u64 {
         u64::from(self.capacity.saturating_sub(self.used)).saturating_mul(period_ms) / 60_000
     }

@@ -25,7 +25,7 @@ mod tests {
 
     /// [m/s2] f32 rounding of a force of 9.8 turned twice.
     const ROUNDING: f32 = 5e-6;
-    /// [s]
+    /// \[s\]
     const DURATION: f32 = 2.0;
 
     /// Force in a right-handed frame that turned at `rate` [rad/s] for [`DURATION`]; what is fixed in n turns backwards.

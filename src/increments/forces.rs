@@ -9,7 +9,7 @@ use crate::{geometry::PLATES, sample::NOT_READ};
 /// Readings between two cycles.
 pub const READINGS: usize = 2;
 
-/// [ms] a shorter period has none: its packets are fast enough, and the bus has other things to do.
+/// \[ms\] a shorter period has none: its packets are fast enough, and the bus has other things to do.
 pub const SHORTEST_PERIOD_MS: u64 = 100;
 
 /// The readings between two cycles, oldest first.
@@ -21,12 +21,12 @@ pub type Forces = [Force; READINGS];
 pub struct Force {
     /// [LIS331HH counts] x, y, z of each plate, plate frame `p`; [`NOT_READ`] where it was not read.
     pub acc_p: [[i16; 3]; PLATES],
-    /// [rad] rotation vector in b: what b had turned by since the increment began when the newest fast sample before the
+    /// \[rad\] rotation vector in b: what b had turned by since the increment began when the newest fast sample before the
     /// reading was taken.
     pub angle_b: [f32; 3],
-    /// [us] how much of the increment's time that covers.
+    /// \[us\] how much of the increment's time that covers.
     pub covered_us: u32,
-    /// [us] from that fast sample to the reading, in the mean of its sensors; 0 if it came while they were read.
+    /// \[us\] from that fast sample to the reading, in the mean of its sensors; 0 if it came while they were read.
     pub after_us: u32,
 }
 

@@ -13,10 +13,10 @@ use crate::{geometry::PLATES, sample::NOT_READ};
 /// Slices between two packets at most: at 5 Hz there are ten. Of a longer period the latest have no place.
 pub const SLICES: usize = 10;
 
-/// [us] a slice ends with the first fast sample that makes it as long: two intervals at 100 Hz.
+/// \[us\] a slice ends with the first fast sample that makes it as long: two intervals at 100 Hz.
 const SHORTEST_US: u64 = 15_000;
 
-/// [counts] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
+/// \[counts\] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
 const RANGE_COUNTS: i16 = 4368;
 
 /// [counts/4] said of a gyro that touched the end of its range, with the sign of that end.
@@ -26,9 +26,9 @@ pub const BEYOND: i16 = i16::MAX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Slice {
-    /// [us] from its end to the end of the increment that it is sent with.
+    /// \[us\] from its end to the end of the increment that it is sent with.
     pub before_us: u32,
-    /// [us] how long it is; 0 for none.
+    /// \[us\] how long it is; 0 for none.
     pub lasts_us: u16,
     /// [counts/4] mean rate of each gyro; plus or minus [`BEYOND`], or [`NOT_READ`] where it missed a sample.
     pub quarters: [i16; PLATES],
@@ -52,7 +52,7 @@ impl Slice {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slicer {
     done: [Slice; SLICES],
-    /// [us] end of each of them.
+    /// \[us\] end of each of them.
     ends_us: [u64; SLICES],
     count: usize,
     began_us: u64,

@@ -24,18 +24,18 @@ use crate::attitude::sin_cos;
 /// The expected field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// [uT] norm.
+    /// \[uT\] norm.
     pub norm_ut: f32,
-    /// [rad] below the horizontal.
+    /// \[rad\] below the horizontal.
     pub dip: f32,
-    /// [rad] magnetic north, east of north.
+    /// \[rad\] magnetic north, east of north.
     pub declination: f32,
     /// North is where the field was found.
     found: bool,
-    /// [rad] it was found in n.
+    /// \[rad\] it was found in n.
     found_at: f32,
     learnt_s: f32,
-    /// [uT] mean in n while it was learnt, hard iron included.
+    /// \[uT\] mean in n while it was learnt, hard iron included.
     raw_n: Vector3<f32>,
     /// Mean attitude meanwhile.
     turned: Matrix3<f32>,
@@ -55,7 +55,7 @@ pub struct Scalar {
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
     pub scalars: [Scalar; 2],
-    /// [1] square of what norm and dip show of a disturbance.
+    /// \[1\] square of what norm and dip show of a disturbance.
     pub disturbance: f32,
 }
 
@@ -83,7 +83,7 @@ impl Reference {
         }
     }
 
-    /// One to be learnt at a site whose declination [rad] is known.
+    /// One to be learnt at a site whose declination \[rad\] is known.
     pub const fn at_site(declination: f32) -> Self {
         Reference {
             learnt_s: 0.0,
@@ -91,7 +91,7 @@ impl Reference {
         }
     }
 
-    /// [uT] the field in n; `None` before it is known.
+    /// \[uT\] the field in n; `None` before it is known.
     pub fn field_n_ut(&self) -> Option<Vector3<f32>> {
         let ((sin, cos), (sin_d, cos_d)) = (sin_cos(self.dip), sin_cos(self.declination));
         let known = self.norm_ut > 0.0;
@@ -153,7 +153,7 @@ impl Reference {
         Vector3::new(cos, sin, 0.0)
     }
 
-    /// [1] square of what norm and dip of a mean field show of a disturbance, the vertical being where mean specific
+    /// \[1\] square of what norm and dip of a mean field show of a disturbance, the vertical being where mean specific
     /// force has it; zero before anything is known of the field.
     pub(super) fn disturbance(&self, mag_n: &Vector3<f32>, acc_n: &Vector3<f32>) -> f32 {
         if self.learnt_s == 0.0 {
@@ -168,7 +168,7 @@ impl Reference {
         square(norm_ut / self.norm_ut - 1.0) + square(dip - self.dip)
     }
 
-    /// The iron is another from now on; until now it was `iron_b` [uT]. A reference that was complete stands, a younger one
+    /// The iron is another from now on; until now it was `iron_b` \[uT\]. A reference that was complete stands, a younger one
     /// is learnt afresh.
     pub(super) fn have_other_iron(&mut self, params: &Params, iron_b: &Vector3<f32>) {
         if self.learnt_s < params.learn_s {

@@ -9,9 +9,9 @@ use super::{Params, at_least, square, window::START_SPREAD};
 pub struct FieldSums {
     /// Samples.
     pub count: f32,
-    /// [uT] in n.
+    /// \[uT\] in n.
     pub total_n: Vector3<f32>,
-    /// [uT] in b.
+    /// \[uT\] in b.
     pub total_b: Vector3<f32>,
     /// Attitude matrices that took b to n.
     pub turned: Matrix3<f32>,
@@ -22,7 +22,7 @@ pub struct FieldSums {
 /// The mean field of a window without hard iron.
 #[derive(Clone, Copy, Debug)]
 pub struct MeanField {
-    /// [uT] in n.
+    /// \[uT\] in n.
     pub mag_n: Vector3<f32>,
     /// [uT^2] mean square distance of the samples from it.
     pub spread: f32,
@@ -83,7 +83,7 @@ impl MeanField {
         square(params.field_spread) * self.spread + self.white
     }
 
-    /// [rad] of its direction at the start, `disturbance` being the square of what is seen of one.
+    /// \[rad\] of its direction at the start, `disturbance` being the square of what is seen of one.
     pub fn direction_sd(&self, params: &Params, disturbance: f32) -> f32 {
         let unrest = (START_SPREAD * self.spread + self.white) / self.mag_n.norm_squared().max(f32::MIN_POSITIVE);
         let disturbed = square(params.disturbance) * disturbance;

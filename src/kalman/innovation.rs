@@ -20,9 +20,9 @@ pub enum Quantity {
     Bias,
     /// [m/s] velocity, north then east.
     Velocity,
-    /// [1] field east, in parts of the reference's norm.
+    /// \[1\] field east, in parts of the reference's norm.
     FieldEast,
-    /// [1] field across itself in the meridian, north and up, in parts of the reference's norm.
+    /// \[1\] field across itself in the meridian, north and up, in parts of the reference's norm.
     FieldMeridian,
 }
 

@@ -29,7 +29,7 @@ const QUIETER: f32 = 2.0;
 /// What has been learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HardIron {
-    /// [uT] in b.
+    /// \[uT\] in b.
     pub iron_b: Vector3<f32>,
     /// [uT^2] its covariance.
     pub covariance: Matrix3<f32>,
@@ -42,9 +42,9 @@ pub struct HardIron {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Equations {
     windows: f32,
-    /// [1] left side.
+    /// \[1\] left side.
     parted: Matrix3<f32>,
-    /// [uT] right side.
+    /// \[uT\] right side.
     seen: Vector3<f32>,
     /// [uT^2] mean square distance of the field in n from its mean.
     squares: f32,

@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::{Filter, passage::walks, seconds, square, step::Step};
 use crate::attitude::{from_rotation_vector, renormalised};
 
-/// [1] part of a rate that may have come and gone between two looks at it: a nutation cone of 6 deg.
+/// \[1\] part of a rate that may have come and gone between two looks at it: a nutation cone of 6 deg.
 const SWING: f32 = 0.1;
 
 /// Numbers of the state: quaternion, bias, gyro matrix, rate, field, iron.
@@ -32,9 +32,9 @@ pub const KEPT_BYTES: usize = 8 + 4 * (STATE_NUMBERS + COVARIANCE_NUMBERS);
 /// What a reset missed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outage {
-    /// [s] from the time of what was kept to the start of the new clock.
+    /// \[s\] from the time of what was kept to the start of the new clock.
     pub lasted_s: f32,
-    /// [s] standard deviation of that.
+    /// \[s\] standard deviation of that.
     pub sd_s: f32,
 }
 
@@ -74,7 +74,7 @@ impl Filter {
         true
     }
 
-    /// [us] when the state was kept, in its own clock.
+    /// \[us\] when the state was kept, in its own clock.
     pub fn kept_at_us(bytes: &[u8; KEPT_BYTES]) -> u64 {
         u64::from_le_bytes(core::array::from_fn(|k| bytes[k]))
     }

@@ -7,7 +7,7 @@ use super::Reference;
 /// Parameters of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Params {
-    /// [s] between updates. Small: more work, and disturbances that last are counted as many witnesses; large: errors
+    /// \[s\] between updates. Small: more work, and disturbances that last are counted as many witnesses; large: errors
     /// grow unseen for longer.
     pub window_s: f32,
     /// [rad/sqrt(s)] angle noise that no model explains, beside the increments' own variance. Small: the gyros are
@@ -21,53 +21,53 @@ pub struct Params {
     pub bias_walk: f32,
     /// [rad/s for each g] by how much force moves a gyro's bias: for who carries on through a boost.
     pub bias_per_g: f32,
-    /// [1] scale and misalignment of the gyros at the start, standard deviation. Zero keeps them out of the filter.
+    /// \[1\] scale and misalignment of the gyros at the start, standard deviation. Zero keeps them out of the filter.
     pub gyro_matrix_sd: f32,
     /// [1/sqrt(s)] random walk of scale and misalignment.
     pub gyro_matrix_walk: f32,
     /// [m/s] velocity that is found of a moving unit in one window, its own and what accelerometers add, standard
     /// deviation. Small: quick acceleration is mistaken for tilt; large: tilt is learnt slowly.
     pub velocity_sd: f32,
-    /// [s] how much of the spread of specific force within a window adds to it.
+    /// \[s\] how much of the spread of specific force within a window adds to it.
     pub velocity_per_spread_s: f32,
     /// [m/s] the same at rest.
     pub velocity_rest_sd: f32,
-    /// [s] for how long it stays the same: so many windows are one witness. Zero: each window is one.
+    /// \[s\] for how long it stays the same: so many windows are one witness. Zero: each window is one.
     pub velocity_lasts_s: f32,
     /// [m/s2] error of the mean specific force of a window beside the samples' own: bias and scale of accelerometers.
     pub acc_error: f32,
-    /// [1] error of specific force in parts of how far it spreads: scale, misalignment, instants of the samples.
+    /// \[1\] error of specific force in parts of how far it spreads: scale, misalignment, instants of the samples.
     pub acc_scale_error: f32,
-    /// [1] how far specific force is believed to be off across the vertical, in parts of what it is off one g for seconds.
+    /// \[1\] how far specific force is believed to be off across the vertical, in parts of what it is off one g for seconds.
     /// Small: vibration that slow samples fold down is taken for tilt; large: climbing and sinking cost tilt.
     pub acc_excess: f32,
-    /// [rad] error of the reference's heading in one window. Small: heading follows every piece of iron; large: it follows
+    /// \[rad\] error of the reference's heading in one window. Small: heading follows every piece of iron; large: it follows
     /// the gyros.
     pub heading_sd: f32,
-    /// [rad] error of the field's direction at the start; the heading's is this over the cosine of the dip.
+    /// \[rad\] error of the field's direction at the start; the heading's is this over the cosine of the dip.
     pub start_field_sd: f32,
-    /// [rad] error of the reference's dip in one window.
+    /// \[rad\] error of the reference's dip in one window.
     pub dip_sd: f32,
-    /// [s] for how long both stay the same: so many windows are one witness. Zero: each window is one.
+    /// \[s\] for how long both stay the same: so many windows are one witness. Zero: each window is one.
     pub field_lasts_s: f32,
-    /// [1] how far a disturbance is believed to reach across the field, in parts of what norm and dip show of it.
+    /// \[1\] how far a disturbance is believed to reach across the field, in parts of what norm and dip show of it.
     pub disturbance: f32,
-    /// [1] a field whose norm and dip are off by more (in parts of the norm, and radians) is not used. Small: coasts on
+    /// \[1\] a field whose norm and dip are off by more (in parts of the norm, and radians) is not used. Small: coasts on
     /// the gyros often; large: follows iron.
     pub field_gate: f32,
-    /// [s] but for no longer than this without a break: after it the field is used with its variance, for what it is.
+    /// \[s\] but for no longer than this without a break: after it the field is used with its variance, for what it is.
     pub coast_s: f32,
-    /// [1] how much of the field's spread within a window adds to its uncertainty.
+    /// \[1\] how much of the field's spread within a window adds to its uncertainty.
     pub field_spread: f32,
-    /// [1] gate in standard deviations of the innovation. Small: good data are lost; large: bad data get in.
+    /// \[1\] gate in standard deviations of the innovation. Small: good data are lost; large: bad data get in.
     pub gate: f32,
-    /// [s] a kind of measurement rejected for so long starts the attitude afresh.
+    /// \[s\] a kind of measurement rejected for so long starts the attitude afresh.
     pub recovery_s: f32,
-    /// [rad] an attitude known no better starts afresh.
+    /// \[rad\] an attitude known no better starts afresh.
     pub lost_sd: f32,
     /// [rad/s] by how much the rate may have changed in a gap of the increments.
     pub gap_rate_sd: f32,
-    /// [s] longest gap that is bridged.
+    /// \[s\] longest gap that is bridged.
     pub longest_gap_s: f32,
     /// [rad/s] error of the rate while a gyro is saturated.
     pub saturated_rate_sd: f32,
@@ -79,21 +79,21 @@ pub struct Params {
     pub gravity: f32,
     /// [rad/s] the Earth's rate in n; zero where it is not known.
     pub earth_rate_n: Vector3<f32>,
-    /// [uT] hard iron on each axis that may have come with the unit, standard deviation. Zero: none is looked for.
+    /// \[uT\] hard iron on each axis that may have come with the unit, standard deviation. Zero: none is looked for.
     /// Large: gradients of a room are taken for iron sooner.
     pub iron_sd_ut: f32,
-    /// [uT] what else moves the field within a window.
+    /// \[uT\] what else moves the field within a window.
     pub iron_noise_ut: f32,
-    /// [1] by how much more a window counts less whose field moves.
+    /// \[1\] by how much more a window counts less whose field moves.
     pub iron_per_spread: f32,
-    /// [s] iron that comes or goes is looked for in the windows of so long. Small: what passes is taken for iron of the unit;
+    /// \[s\] iron that comes or goes is looked for in the windows of so long. Small: what passes is taken for iron of the unit;
     /// large: a magnet is noticed late.
     pub iron_change_s: f32,
-    /// [uT] such iron on each axis, standard deviation.
+    /// \[uT\] such iron on each axis, standard deviation.
     pub iron_change_sd_ut: f32,
     /// The field at the site, or one to be learnt in the first [`Params::learn_s`].
     pub field: Reference,
-    /// [s] how long the field is learnt.
+    /// \[s\] how long the field is learnt.
     pub learn_s: f32,
 }
 
@@ -110,18 +110,18 @@ pub struct Rest {
     pub bias_sd: f32,
 }
 
-/// [s] how long before its stamp each sensor saw what it gave.
+/// \[s\] how long before its stamp each sensor saw what it gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delays {
-    /// [s] gyros.
+    /// \[s\] gyros.
     pub gyro_s: f32,
-    /// [s] accelerometers.
+    /// \[s\] accelerometers.
     pub acc_s: f32,
-    /// [s] magnetometers.
+    /// \[s\] magnetometers.
     pub mag_s: f32,
 }
 
-/// [rad] a degree.
+/// \[rad\] a degree.
 const DEG: f32 = core::f32::consts::PI / 180.0;
 
 impl Params {

@@ -46,7 +46,7 @@ pub(super) struct Passage {
     pub velocity_sd: f32,
 }
 
-/// Variances that bias and gyro matrix gain by walking for so long [s].
+/// Variances that bias and gyro matrix gain by walking for so long \[s\].
 pub(super) fn walks(params: &Params, duration_s: f32) -> [f32; 2] {
     [params.bias_walk, params.gyro_matrix_walk].map(|walk| square(walk) * duration_s)
 }

@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::square;
 use crate::attitude::{dcm_nb, from_rotation_vector};
 
-/// [rad] up to this turn both ends tell enough: the third order that they miss is below a thousandth.
+/// \[rad\] up to this turn both ends tell enough: the third order that they miss is below a thousandth.
 const SHORT: f32 = 0.1;
 
 /// Attitude at the end of a step, and the mean of `dcm_nb` over it. `rates_b` [rad/s] at its beginning and its end,
@@ -48,7 +48,7 @@ mod tests {
 
     use super::*;
 
-    /// [s] as long as the unit's cycle.
+    /// \[s\] as long as the unit's cycle.
     const STEP_S: f32 = 0.2;
 
     /// [rad/s] 6 rad/s about an axis that swings by half a radian at 1 Hz, as a hand turns a box.

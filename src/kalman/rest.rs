@@ -29,13 +29,13 @@ use super::{
     state::Row,
 };
 
-/// [rad] a turn that force or field shows: five times what 0.05 m/s2 of an accelerometer's mean or 0.2 uT of the field move them.
+/// \[rad\] a turn that force or field shows: five times what 0.05 m/s2 of an accelerometer's mean or 0.2 uT of the field move them.
 const TELLS: f32 = 0.035;
 
 /// Rest that contradicts the bias.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contradicted {
-    /// [s] since the window in which it began.
+    /// \[s\] since the window in which it began.
     lasted_s: f32,
     /// Where force and field lay in b then.
     seen_b: [Vector3<f32>; 2],

@@ -11,18 +11,18 @@ pub struct Sampled {
     pub value_b: Vector3<f32>,
     /// White variance of each component, in the square of that unit.
     pub variance: f32,
-    /// [us] when it was sampled, as stamped; `Params::delays` are taken off.
+    /// \[us\] when it was sampled, as stamped; `Params::delays` are taken off.
     pub at_us: u64,
 }
 
 /// What came since the step before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// [us] end of the increment.
+    /// \[us\] end of the increment.
     pub at_us: u64,
-    /// [s] time the increment covers; what is missing to the step before is a gap.
+    /// \[s\] time the increment covers; what is missing to the step before is a gap.
     pub covered_s: f32,
-    /// [rad] rotation vector that the gyros saw over it, in b.
+    /// \[rad\] rotation vector that the gyros saw over it, in b.
     pub angle_b: Vector3<f32>,
     /// [rad^2] white variance of each component of it.
     pub angle_variance: f32,
@@ -62,7 +62,7 @@ pub struct Outcome {
     pub aligned: bool,
 }
 
-/// [rad] longest increment that is believed: the rotation vector of more than a turn has lost count.
+/// \[rad\] longest increment that is believed: the rotation vector of more than a turn has lost count.
 const LONGEST_TURN: f32 = core::f32::consts::TAU;
 
 impl Step {

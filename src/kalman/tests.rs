@@ -14,13 +14,13 @@ struct World {
     q_nb: UnitQuaternion<f32>,
     at_us: u64,
     filter: Filter,
-    /// Most that an update has turned the attitude away from what the gyros said [rad].
+    /// Most that an update has turned the attitude away from what the gyros said \[rad\].
     jump: f32,
 }
 
 const STEP_US: u64 = 20_000;
 const STEP_S: f32 = 0.02;
-/// [s] after the end of a window the state has its correction: four steps, and half of one for rounding.
+/// \[s\] after the end of a window the state has its correction: four steps, and half of one for rounding.
 const CORRECTED_S: f32 = 4.5 * STEP_S;
 
 impl World {
@@ -76,7 +76,7 @@ impl World {
         last
     }
 
-    /// [rad] error of the attitude.
+    /// \[rad\] error of the attitude.
     fn off(&self) -> f32 {
         angle_between(&self.filter.attitude(), &self.q_nb)
     }
@@ -86,7 +86,7 @@ impl World {
         assert!(self.off() < most_deg * DEG, "{} deg", self.off() / DEG);
     }
 
-    /// [deg] standard deviation about the axis it knows least.
+    /// \[deg\] standard deviation about the axis it knows least.
     fn worst_sd_deg(&self) -> f32 {
         ComplexField::sqrt(self.filter.attitude_covariance_n().diagonal().max()) / DEG
     }

@@ -10,7 +10,7 @@ use super::{Params, at_least, field_sums::FieldSums, innovation::Noise, square, 
 /// Running sums.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// [s] so far, gaps included.
+    /// \[s\] so far, gaps included.
     pub duration_s: f32,
     /// Attitude error by bias \[s\] and matrix \[rad\]: `-integral dcm_nb (1, gyro)`.
     pub drive: [[f32; DRIVERS]; 3],
@@ -104,7 +104,7 @@ impl Sum {
 /// What a window measured.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Means {
-    /// [s] it lasted.
+    /// \[s\] it lasted.
     pub duration_s: f32,
     /// [rad/s] mean of the gyros, in b.
     pub rate_b: Vector3<f32>,
@@ -118,7 +118,7 @@ pub struct Means {
     pub near_one_g: bool,
     /// Specific force may be used for the vertical.
     pub vertical: bool,
-    /// [s] for which it tells velocity: zero unless `vertical`.
+    /// \[s\] for which it tells velocity: zero unless `vertical`.
     pub vertical_s: f32,
     /// [m/s] velocity gained, north and east.
     pub velocity_change_n: Vector2<f32>,
@@ -126,9 +126,9 @@ pub struct Means {
     pub velocity_change_variance: f32,
     /// [m2/s2] how far from zero the velocity itself may be.
     pub velocity_variance: f32,
-    /// [rad2] white variance of the attitude about each axis.
+    /// \[rad2\] white variance of the attitude about each axis.
     pub angle_variance: f32,
-    /// [rad2] of the direction of mean specific force as the vertical.
+    /// \[rad2\] of the direction of mean specific force as the vertical.
     pub tilt_variance: f32,
     acc_spread: f32,
     /// [m/s2] by how much specific force exceeded one g for seconds.
@@ -142,14 +142,14 @@ const MEAN_NEAR_ONE_G: f32 = 0.2;
 /// What may be left of shaking in that mean: so much of its root mean square.
 const SHAKEN: f32 = 0.2;
 
-/// [s] over which specific force that goes on exceeding one g is no motion: nothing that is bounded gains height for so long.
+/// \[s\] over which specific force that goes on exceeding one g is no motion: nothing that is bounded gains height for so long.
 /// It is vibration that the samples fold down, and folds down across the vertical as well.
 const EXCESS_S: f32 = 3.0;
 
 /// After lift-off every sample must be within this part of one g.
 const SAMPLE_NEAR_ONE_G: f32 = 0.1;
 
-/// [rad] error of the first vertical found: half a degree of accelerometer bias and as much of everything else.
+/// \[rad\] error of the first vertical found: half a degree of accelerometer bias and as much of everything else.
 const START_TILT_SD: f32 = 0.0175;
 
 /// Part of the spread of specific force that its mean over the first window may still hold.

@@ -64,7 +64,7 @@ const KNOWN: [[u8; 2]; 2] = [[0xEC, 0x76], [0x20, 0x76]];
 /// Status reads that are waited for in place: each takes two latch cycles of some 60 ns, and tR is 15 us.
 const READ_POLLS: u32 = 1000;
 
-/// How the end of an operation is waited for: so many looks, so far apart [us].
+/// How the end of an operation is waited for: so many looks, so far apart \[us\].
 struct Wait {
     looks: u32,
     apart_us: u32,

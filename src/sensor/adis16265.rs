@@ -17,11 +17,11 @@ use super::{Error, Register};
 
 pub mod diagnosis;
 
-/// [us] least time between two frames to one part. The data sheet asks for less; this is what Linux leaves
+/// \[us\] least time between two frames to one part. The data sheet asks for less; this is what Linux leaves
 /// (`read_delay`, `write_delay`), known to work at every sample rate.
 pub const STALL_US: u32 = 30;
 
-/// [ms] from power-on or reset until the part answers (data sheet, specifications, start-up time).
+/// \[ms\] from power-on or reset until the part answers (data sheet, specifications, start-up time).
 pub const START_UP_MS: u32 = 220;
 
 /// [degC/count]; 0 counts is 25 degC (data sheet, TEMP_OUT).
@@ -102,7 +102,7 @@ impl Config {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Output {
-    /// [counts] of the register read: [`Range::deg_s_per_count`], or [`CELSIUS_PER_COUNT`] above 25 degC.
+    /// \[counts\] of the register read: [`Range::deg_s_per_count`], or [`CELSIUS_PER_COUNT`] above 25 degC.
     pub counts: i16,
     /// The register had not been read since it was written (ND).
     pub fresh: bool,

@@ -29,7 +29,7 @@ const ZYXDA: u8 = 0x08;
 /// datasheet's; its lower limit of x and y is taken from the sister part LIS331DLH (120 of at most 550 mg), whose upper
 /// limit is this one's too.
 const SELF_TEST_COUNTS: [(i16, i16); 3] = [(40, 180), (40, 180), (220, 370)];
-/// [ms] five samples at the slowest rate: the new state has passed the filter (datasheet, turn-on time: 1/ODR + 1 ms).
+/// \[ms\] five samples at the slowest rate: the new state has passed the filter (datasheet, turn-on time: 1/ODR + 1 ms).
 const SETTLING_MS: u32 = 100;
 
 const fn register(name: &'static str, address: u8) -> Register {

@@ -74,9 +74,9 @@ pub enum Error<E> {
     SelfTest {
         /// Which output.
         register: Register,
-        /// [counts] how far it moved.
+        /// \[counts\] how far it moved.
         change: i16,
-        /// [counts] how far it must, and may, move.
+        /// \[counts\] how far it must, and may, move.
         limits: (i16, i16),
     },
 }

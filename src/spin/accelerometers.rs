@@ -14,9 +14,9 @@ use super::{
 };
 use crate::{calibration::Set, geometry::PLATES};
 
-/// [s] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
+/// \[s\] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
 const FORCE_AGE_S: f32 = 0.006;
-/// [s] how long a surprise lasts.
+/// \[s\] how long a surprise lasts.
 const SURPRISED_S: f32 = 0.6;
 /// Mean square of the force equations' residuals, over what they should be, that is a surprise.
 const SURPRISE: f32 = 4.0;
@@ -24,7 +24,7 @@ const SURPRISE: f32 = 4.0;
 const USUAL: f32 = 20.0;
 /// [m/s2] of the data sheet's g.
 const STANDARD_GRAVITY: f32 = 9.806_65;
-/// [counts] an accelerometer that has a value.
+/// \[counts\] an accelerometer that has a value.
 const WITHIN: core::ops::Range<i16> = -2047..2047;
 
 impl Spin {
@@ -105,7 +105,7 @@ impl Spin {
         }
     }
 
-    /// [g] force along x_b beyond that of the pad.
+    /// \[g\] force along x_b beyond that of the pad.
     pub(super) fn load(&self) -> f32 {
         self.force.map_or(0.0, |(_, force_b)| {
             (force_b.x - self.pad_force) * (1.0 / STANDARD_GRAVITY)

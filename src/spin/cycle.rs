@@ -28,9 +28,9 @@ enum Event {
 
 /// Most events of a cycle.
 const EVENTS: usize = SLICES + READINGS + 1 + PLATES;
-/// [us] what is stamped later is not of this flight.
+/// \[us\] what is stamped later is not of this flight.
 const FAR_US: u64 = 2_000_000;
-/// [s] longest time without a slice.
+/// \[s\] longest time without a slice.
 const LONGEST_GAP_S: f32 = 1.0;
 
 impl Spin {

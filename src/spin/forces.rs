@@ -43,7 +43,7 @@ pub struct Believed {
     pub rate_dot_b: Vector3<f32>,
     /// Axes across the spin that do not spin, in b.
     pub across_b: [Vector3<f32>; 2],
-    /// [1] levers are longer by.
+    /// \[1\] levers are longer by.
     pub lever: f32,
 }
 

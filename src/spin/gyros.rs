@@ -17,7 +17,7 @@ use crate::{
     sample::NOT_READ,
 };
 
-/// [s] time constant of the gyros' low-pass (12.7 Hz).
+/// \[s\] time constant of the gyros' low-pass (12.7 Hz).
 const GYRO_TAU_S: f32 = 0.0125;
 /// Parts of a slice's noise that its neighbours do not have: trapezoids over two intervals share their ends.
 const SLICE_NOISE: f32 = 0.5;
@@ -25,7 +25,7 @@ const SLICE_NOISE: f32 = 0.5;
 const FAR: f32 = 9.0;
 /// Of how many gyro residuals their noise is the mean: a second of three.
 const ROUGH: f32 = 150.0;
-/// [counts] the end of a gyro's range, 320 deg/s.
+/// \[counts\] the end of a gyro's range, 320 deg/s.
 const STOP_COUNTS: f32 = 4368.0;
 /// [rad/s] how near its stop a gyro may be said to be beyond it: noise and the slice's own change.
 const STOP_SD: f32 = 0.2;

@@ -16,9 +16,9 @@ use crate::{
     sample::Kind,
 };
 
-/// [s] by how much a magnetometer's age is not known: uniform over 13.3 ms.
+/// \[s\] by how much a magnetometer's age is not known: uniform over 13.3 ms.
 const FIELD_AGE_S: f32 = 0.003_85;
-/// [uT] what is left of a magnetometer's own bias, beside its noise.
+/// \[uT\] what is left of a magnetometer's own bias, beside its noise.
 const FIELD_REST_UT: f32 = 0.12;
 /// Packets whose field is refused before the angle about the spin is opened, and before all is.
 const SHUT: [u8; 2] = [3, 10];

@@ -12,10 +12,10 @@ use crate::{
     increments::Increments,
 };
 
-/// [counts] a gyro at rest stays within so much of a packet's period: 20 samples of 2.7 counts leave ten once in a day.
+/// \[counts\] a gyro at rest stays within so much of a packet's period: 20 samples of 2.7 counts leave ten once in a day.
 const LARGEST_SPREAD: i16 = 40;
 
-/// [counts] by how much a period's mean may be off the mean of all: 2.7/sqrt(20) is 0.6.
+/// \[counts\] by how much a period's mean may be off the mean of all: 2.7/sqrt(20) is 0.6.
 const LARGEST_CHANGE: f32 = 5.0;
 
 /// Cycles after which the means forget: a quarter of an hour at 5 Hz; slower changes of a bias are followed.

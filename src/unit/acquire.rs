@@ -32,7 +32,7 @@ use crate::{
     sensor::tca9548a::Switch,
 };
 
-/// [ms] after power-on until the gyros answer (ADIS16265 data sheet, Table 1: 220 ms).
+/// \[ms\] after power-on until the gyros answer (ADIS16265 data sheet, Table 1: 220 ms).
 const GYRO_START_MS: u64 = 250;
 
 /// Cycles closed until then make a start a healthy one: the count of those that were not begins anew.

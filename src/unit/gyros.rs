@@ -28,16 +28,16 @@ use crate::{
     },
 };
 
-/// [ms] the longest all four may take.
+/// \[ms\] the longest all four may take.
 const FAST_LIMIT_MS: u64 = 2;
 
-/// [ms] between looks at a running self-test.
+/// \[ms\] between looks at a running self-test.
 const TEST_POLL_MS: u64 = 10;
 
 /// Pause between two frames of one part.
 const STALL: Duration = Duration::from_micros(STALL_US as u64);
 
-/// [counts] a rate beyond the range; 320 deg/s are 4368 counts (ADIS16265 data sheet, Table 1: initial range).
+/// \[counts\] a rate beyond the range; 320 deg/s are 4368 counts (ADIS16265 data sheet, Table 1: initial range).
 const SATURATED_COUNTS: u16 = 4368;
 
 /// The gyros of plates 1 to 4.
@@ -89,7 +89,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         }
     }
 
-    /// [counts] rate and temperature of a plate's gyro.
+    /// \[counts\] rate and temperature of a plate's gyro.
     pub async fn read(&self, plate: usize) -> Result<(i16, i16), Error<SPI::Error>> {
         let read = self.parts.lock().await[plate].read_rate_and_temperature().await;
         let (rate, temperature) = self.rest(plate, read)?;
@@ -102,7 +102,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         self.health.take()
     }
 
-    /// [counts] rates of all four, and when they were asked for.
+    /// \[counts\] rates of all four, and when they were asked for.
     async fn fast(&self) -> (Instant, [i16; 4]) {
         let mut parts = self.parts.lock().await;
         let answering = self.answering.get();

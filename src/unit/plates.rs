@@ -20,7 +20,7 @@ pub type PlateError<I2C> = Error<tca9548a::Error<<I2C as embedded_hal_async::i2c
 /// What a part gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Taken {
-    /// [counts] x, y, z, or the temperature in x.
+    /// \[counts\] x, y, z, or the temperature in x.
     pub counts: [i16; 3],
     /// The part had not given it before.
     pub fresh: bool,

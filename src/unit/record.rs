@@ -32,16 +32,16 @@ use crate::{
     retained::{CRASH, SET},
 };
 
-/// [ms] while a dump waits for the line, how long until the next look.
+/// \[ms\] while a dump waits for the line, how long until the next look.
 const STEP_MS: u64 = 1;
 
-/// [ms] otherwise, how long an order to erase or dump may wait.
+/// \[ms\] otherwise, how long an order to erase or dump may wait.
 const IDLE_MS: u64 = 100;
 
-/// [ms] until a chip that failed is tried again.
+/// \[ms\] until a chip that failed is tried again.
 const RETRY_MS: u64 = 2_000;
 
-/// [ms] until it is tried again after the supply failed, at first.
+/// \[ms\] until it is tried again after the supply failed, at first.
 const DIP_MS: u64 = 10;
 
 /// Serves the recorder for ever.
@@ -102,7 +102,7 @@ struct Recorder<'a, N, R> {
     calibration: Name,
     /// When to mount; `None` while mounted.
     retry: Option<Instant>,
-    /// [ms] the next wait for the supply.
+    /// \[ms\] the next wait for the supply.
     dip_ms: u64,
     /// What the log was about to take when the supply failed.
     missed: Option<Entry>,
@@ -281,7 +281,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
         }
     }
 
-    /// A bounded piece of erasing, dumping or preparing; how long to wait for a cycle then [ms].
+    /// A bounded piece of erasing, dumping or preparing; how long to wait for a cycle then \[ms\].
     async fn step(&mut self) -> u64 {
         if self.shared.erase_ordered.take() {
             match self.log.start_erase().await {

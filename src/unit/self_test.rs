@@ -21,7 +21,7 @@ use crate::{
     },
 };
 
-/// [ms] the longest test of one sensor.
+/// \[ms\] the longest test of one sensor.
 const LIMIT_MS: u64 = 600;
 
 /// How a test ended.

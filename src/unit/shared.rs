@@ -41,7 +41,7 @@ pub struct Cycle {
     pub increments: Increments,
     /// What the packet has no bits for.
     pub health: Health,
-    /// [us] from the start of the cycle to the closing of its packet.
+    /// \[us\] from the start of the cycle to the closing of its packet.
     pub cycle_us: u32,
 }
 
@@ -162,7 +162,7 @@ pub struct Shared {
     pub set_to_keep: Cell<bool>,
     /// The attitude that the log was left with before a power cut in flight, for the estimation.
     pub attitude_found: Cell<Option<record::Estimate>>,
-    /// [us] when the watchdog was last fed.
+    /// \[us\] when the watchdog was last fed.
     pub fed_us: Cell<u64>,
     /// Changes of mode that are not in the log yet.
     pub changes: RefCell<Deque<Change, CHANGES>>,

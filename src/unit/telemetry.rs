@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{board::Board, derived};
 
-/// [ms] a packet takes 13.5 ms at 115200 baud; a line that takes longer than this is stuck and loses the packet.
+/// \[ms\] a packet takes 13.5 ms at 115200 baud; a line that takes longer than this is stuck and loses the packet.
 const WRITE_MS: u64 = 100;
 
 /// Sends for ever.

@@ -32,7 +32,7 @@ pub enum Voter {
 
 const ALL: u8 = u8::MAX;
 
-/// [ms] between questions, as long as all answer. A part may be busy for 190 ms; the watchdog bites after 1 s.
+/// \[ms\] between questions, as long as all answer. A part may be busy for 190 ms; the watchdog bites after 1 s.
 const ASK_MS: u64 = 100;
 
 /// Between two fast samples of the gyros.

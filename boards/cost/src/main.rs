@@ -4,7 +4,7 @@
 //! as well, where it compares more. Out: the static `COSTS`, ticks of the processor's clock for every update of every filter, which the emulated board reads when
 //! `DONE` is one. On that board a tick is an instruction.
 //!
-//! Every filter has its own defaults. Ours gathers samples and updates once a second ([`emems::kalman`]), so most of its
+//! Every filter has its own defaults. Ours gathers samples and updates once a second (`emems::kalman`), so most of its
 //! steps are cheap and the eight or ten after that are not; the others do the same at every sample.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -30,9 +30,9 @@ mod counted {
     /// Updates of each: twelve seconds, after eight in which they find the attitude.
     const UPDATES: usize = 600;
     const SETTLING: usize = 400;
-    /// [s] between them.
+    /// \[s\] between them.
     const DT_S: f32 = 0.02;
-    /// [m/s2] specific force at rest, and [uT] field, north, east, down.
+    /// [m/s2] specific force at rest, and \[uT\] field, north, east, down.
     pub const FORCE_N: Vector3<f32> = Vector3::new(0.0, 0.0, -9.806_65);
     pub const FIELD_N_UT: Vector3<f32> = Vector3::new(20.0, 0.0, 40.0);
     /// SysTick counts down through so many bits.

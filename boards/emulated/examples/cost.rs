@@ -52,7 +52,7 @@ const CYCLES: usize = 150;
 /// Says, to cargo, what the image is optimised for.
 const OPT_LEVEL: &str = "CARGO_PROFILE_RELEASE_OPT_LEVEL";
 
-/// [ns] far longer than it takes.
+/// \[ns\] far longer than it takes.
 const LONGEST: Nanos = 4_000_000_000;
 
 /// Hears nothing.

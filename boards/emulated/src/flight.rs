@@ -39,7 +39,7 @@ use crate::{
     stand::Stand,
 };
 
-/// [ns] between two meetings of the core and the bench.
+/// \[ns\] between two meetings of the core and the bench.
 pub const STEP: Nanos = 20_000_000;
 const MILLISECOND: Nanos = 1_000_000;
 
@@ -61,7 +61,7 @@ pub struct Options {
 /// What a run leaves behind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// [ns] virtual time flown.
+    /// \[ns\] virtual time flown.
     pub flown: Nanos,
     /// Instructions executed.
     pub instructions: u64,

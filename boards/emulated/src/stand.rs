@@ -37,7 +37,7 @@ use crate::{
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 /// The crystal of the reference design.
 const HSE_HZ: u64 = 8_000_000;
-/// [mV] the supply, and where it sags to: below the voltage detector's 2.9 V, above the reset's 1.8 V.
+/// \[mV\] the supply, and where it sags to: below the voltage detector's 2.9 V, above the reset's 1.8 V.
 const SUPPLY_MV: u32 = 3300;
 const SAGGING_MV: u32 = 2800;
 /// EXTI line of the voltage detector (RM0090 section 12.2.5).

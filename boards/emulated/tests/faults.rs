@@ -8,7 +8,7 @@ use emems::{board::ResetCause, derived::Health};
 use emulated::Options;
 use twin::run::{Fault, Scheduled};
 
-/// [us] instants through a read cycle at which a bus may get stuck.
+/// \[us\] instants through a read cycle at which a bus may get stuck.
 const THROUGH_A_CYCLE_US: [u64; 4] = [300, 1_100, 2_300, 3_700];
 
 fn at_us(us: u64, fault: Fault) -> Scheduled {
@@ -19,7 +19,7 @@ fn at(ms: u64, fault: Fault) -> Scheduled {
     at_us(ms * 1_000, fault)
 }
 
-/// [us] when the fourth cycle begins: its packet is sent 10 ms later, which takes 13.5 ms.
+/// \[us\] when the fourth cycle begins: its packet is sent 10 ms later, which takes 13.5 ms.
 fn cycle_us() -> u64 {
     let mut undisturbed = Tape::default();
     flown(&Options::default(), &[], 1_000, &mut undisturbed);
@@ -115,7 +115,7 @@ fn without_the_multiplexer_the_gyros_are_still_read() {
     assert_eq!(errors.last(), Some(&0), "{errors:x?}");
 }
 
-/// [ns] from the hang to the reset: the watchdog's second, and the 0.2 s in which it may last have been fed before.
+/// \[ns\] from the hang to the reset: the watchdog's second, and the 0.2 s in which it may last have been fed before.
 const BITES: std::ops::Range<u64> = 800 * MS..1_250 * MS;
 
 #[test]

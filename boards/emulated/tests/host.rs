@@ -9,10 +9,10 @@ use bench::{MS, Tape, image};
 use emems::{packet::PACKET_BYTES, sample::NO_SLOT, unit::Settings};
 use twin::{host, part::Nanos, plant::Plant};
 
-/// [us] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant, and both
+/// \[us\] how far apart the two boards may take the same sensor: the host's timing is that of a line and a constant, and both
 /// wait for whole microseconds, sixteen sensors one after another.
 const SLOT_TOLERANCE_US: u32 = 8;
-/// [ns] how far apart a gyro may be asked, and a packet sent.
+/// \[ns\] how far apart a gyro may be asked, and a packet sent.
 const CLOCK_TOLERANCE_NS: Nanos = 5_000;
 
 fn plant(motion: &str) -> Plant {
@@ -56,7 +56,7 @@ fn host_run_and_image_emit_the_same_packets() {
     }
 }
 
-/// [ns] when each gyro's latest frame ended, in the image and on the host, flown for `duration`.
+/// \[ns\] when each gyro's latest frame ended, in the image and on the host, flown for `duration`.
 fn latest_frames(duration: Nanos) -> [(Nanos, Nanos); 4] {
     let options = emulated::Options::default();
     let flown = emulated::flight::fly_keeping(&options, image(), plant("still"), &[], duration, &mut Tape::default());

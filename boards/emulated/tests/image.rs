@@ -13,9 +13,9 @@ use twin::{
     run::{Fault, Scheduled},
 };
 
-/// [ns] between packets.
+/// \[ns\] between packets.
 const PERIOD: Nanos = 200 * MS;
-/// [ns] what the unit's period may jitter: 0.1 ms is allowed, microseconds are seen.
+/// \[ns\] what the unit's period may jitter: 0.1 ms is allowed, microseconds are seen.
 const JITTER: Nanos = MS / 10;
 /// All I2C sensors: accelerometers, magnetometers, thermometers.
 const I2C_SENSORS: u16 = 0xF0FF;
@@ -216,7 +216,7 @@ fn a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said() {
     }
 }
 
-/// [bytes] what the stack may have grown to: 60 % of its place. Most is the estimator's, while it is being built.
+/// \[bytes\] what the stack may have grown to: 60 % of its place. Most is the estimator's, while it is being built.
 const STACK_CEILING: usize = 64 * 1024 * 6 / 10;
 
 #[test]

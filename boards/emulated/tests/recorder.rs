@@ -26,9 +26,9 @@ use twin::{
 /// Cuts per change, over runs of [`CUTS_A_RUN`]: a run for each of two cores.
 const CUTS: u64 = 40;
 const CUTS_A_RUN: u64 = 20;
-/// [ns] from reset to the first durable record. A cut of the supply takes 250 ms of it: the gyros' start.
+/// \[ns\] from reset to the first durable record. A cut of the supply takes 250 ms of it: the gyros' start.
 const BACK: Nanos = 400 * MS;
-/// [ns] from one cut to the next at most. One in three comes when the unit has to be back, and not later.
+/// \[ns\] from one cut to the next at most. One in three comes when the unit has to be back, and not later.
 const LONGEST: Nanos = 1_300 * MS;
 
 fn logged(chip: &K9f1208) -> BTreeMap<Key, Entry> {

@@ -22,7 +22,7 @@ fn active(name: &str, theta: &[f64]) -> Active {
     }
 }
 
-/// [ms] the least of some runs.
+/// \[ms\] the least of some runs.
 fn least_ms<T>(runs: u32, mut run: impl FnMut() -> T) -> f64 {
     let once = |_| {
         let begun = Instant::now();

@@ -17,11 +17,11 @@ pub const EARTH_RATE: f64 = 7.292_115_854_7e-5;
 pub struct Environment {
     /// [m/s2] local gravity, downwards.
     pub gravity: f64,
-    /// [rad] latitude, north positive.
+    /// \[rad\] latitude, north positive.
     pub latitude: f64,
-    /// [uT] magnetic field in n.
+    /// \[uT\] magnetic field in n.
     pub field_n_ut: Vector3<f64>,
-    /// [degC] temperature where the motion has none of its own.
+    /// \[degC\] temperature where the motion has none of its own.
     pub temperature_c: f64,
 }
 

@@ -51,9 +51,9 @@ pub struct Planned {
     pub target: usize,
     /// How large, in the unit of its [`Word::size`].
     pub size: Option<f64>,
-    /// [ns] from when on.
+    /// \[ns\] from when on.
     pub from: Nanos,
-    /// [ns] until when.
+    /// \[ns\] until when.
     pub to: Option<Nanos>,
     /// How many.
     pub times: u32,
@@ -127,7 +127,7 @@ fn number(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("\"{text}\" is no number"))
 }
 
-/// [ns] of a time such as 250ms, 3s, 10min, 2h or 3.
+/// \[ns\] of a time such as 250ms, 3s, 10min, 2h or 3.
 fn time(text: &str) -> Result<Nanos, String> {
     let units = [("ms", 1e6), ("min", 60e9), ("us", 1e3), ("s", 1e9), ("h", 3600e9)];
     let unit = units

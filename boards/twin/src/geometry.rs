@@ -29,7 +29,7 @@ pub fn gyro_axis_b(plate: usize) -> Vector3<f64> {
     -dcm_bp(plate).column(2).into_owned()
 }
 
-/// [m] accelerometer's place in b, from the unit's centre of rotation. Reference design: 16 mm and -9 mm along the
+/// \[m\] accelerometer's place in b, from the unit's centre of rotation. Reference design: 16 mm and -9 mm along the
 /// plate's axes from its middle, which is 42 mm (sides) or 38 mm (base) from the centre, against z_p.
 pub fn accelerometer_place_b(plate: usize) -> Vector3<f64> {
     let distance = if plate < 3 { 0.042 } else { 0.038 };

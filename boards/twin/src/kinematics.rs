@@ -18,7 +18,7 @@ pub struct Pose {
     pub attitude: Attitude,
     /// [m/s2] acceleration of the unit's centre relative to n, in n.
     pub acc_n: Vector3<f64>,
-    /// [degC] temperature of the unit, where the motion knows it.
+    /// \[degC\] temperature of the unit, where the motion knows it.
     pub temperature_c: Option<f64>,
     /// Lift-off line, `true` = asserted.
     pub lift_off: bool,
@@ -44,9 +44,9 @@ pub trait Motion: Send + Sync {
     /// Pose at `t_s` seconds after power-on. Defined for every time: before the start it is the start, after the end the
     /// end.
     fn at(&self, t_s: f64) -> Pose;
-    /// [s] when it ends; `None` for a motion without an end.
+    /// \[s\] when it ends; `None` for a motion without an end.
     fn duration_s(&self) -> Option<f64>;
-    /// [m] place of the unit's centre in n, from wherever the motion counts; zero where it does not tell.
+    /// \[m\] place of the unit's centre in n, from wherever the motion counts; zero where it does not tell.
     fn position_n(&self, _t_s: f64) -> Vector3<f64> {
         Vector3::zeros()
     }

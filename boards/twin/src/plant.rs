@@ -50,19 +50,19 @@ const ACCELEROMETER: Spread = Spread {
     noise: 0.045,
     bias: 0.02,
 };
-/// [uT] 2 mG.
+/// \[uT\] 2 mG.
 const MAGNETOMETER: Spread = Spread { noise: 0.2, bias: 0.1 };
 /// [rad/s] 0.044 deg/s/rtHz in 20 Hz.
 const GYRO: Spread = Spread {
     noise: 0.00344,
     bias: 0.0015,
 };
-/// [degC] thermometer in the gyro.
+/// \[degC\] thermometer in the gyro.
 const GYRO_THERMOMETER: Spread = Spread {
     noise: 0.12,
     bias: 0.06,
 };
-/// [degC] TMP102.
+/// \[degC\] TMP102.
 const THERMOMETER: Spread = Spread {
     noise: 0.05,
     bias: 0.03,
@@ -77,7 +77,7 @@ pub struct Quality {
     pub bias: f64,
     /// Which flight of these parts: they are the same in each, and their noise is another.
     pub flight: u64,
-    /// [1] by what part the periods of their clocks are off, standard deviation.
+    /// \[1\] by what part the periods of their clocks are off, standard deviation.
     pub clock: f64,
 }
 
@@ -324,13 +324,13 @@ fn i2c_address(kind: Kind) -> Option<u8> {
 pub struct Views {
     /// [m/s2] specific force at each accelerometer, in its plate's frame.
     pub force_p: [Input<Vector3<f64>>; PLATES],
-    /// [uT] field at each magnetometer, in its plate's frame.
+    /// \[uT\] field at each magnetometer, in its plate's frame.
     pub field_p_ut: [Input<Vector3<f64>>; PLATES],
     /// [rad/s] rate about each gyro's sense axis.
     pub rate: [Input<f64>; PLATES],
-    /// [degC] of each plate's thermometer.
+    /// \[degC\] of each plate's thermometer.
     pub temperature_c: [Input<f64>; PLATES],
-    /// [degC] of each gyro.
+    /// \[degC\] of each gyro.
     pub gyro_temperature_c: [Input<f64>; PLATES],
 }
 

@@ -37,7 +37,7 @@ pub struct Twin {
     unit: UnitDescription,
     environment: Environment,
     scene: Scene,
-    /// [s] when the cycles begin.
+    /// \[s\] when the cycles begin.
     starts_s: Vec<f64>,
     /// Low-passes of the nominal channels, by kind and time constant.
     filters: Filters,
@@ -150,12 +150,12 @@ impl Twin {
         &self.environment
     }
 
-    /// [s] when the cycles begin.
+    /// \[s\] when the cycles begin.
     pub fn starts_s(&self) -> &[f64] {
         &self.starts_s
     }
 
-    /// [s] when this channel is read, one instant a cycle.
+    /// \[s\] when this channel is read, one instant a cycle.
     pub fn instants_s(&self, channel: usize) -> Vec<f64> {
         let slot_s = self.unit.channels[channel].slot_s;
         self.starts_s.iter().map(|start_s| start_s + slot_s).collect()
@@ -267,7 +267,7 @@ impl Twin {
     }
 }
 
-/// [s] after the start of the cycle: what a channel's low-pass lets through when it is read, to first order in its time
+/// \[s\] after the start of the cycle: what a channel's low-pass lets through when it is read, to first order in its time
 /// constant. What an effect adds comes from then; for terms of some percent of a reading that is exact enough.
 fn seen_s(channel: &Channel) -> f64 {
     channel.slot_s - channel.tau_s()

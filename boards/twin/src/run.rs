@@ -41,7 +41,7 @@ pub enum Fault {
     SdaHeld(u8),
     /// The bus is held for good (`true`) or released.
     BusStuck(bool),
-    /// The I2C part in this reading-order slot holds SCL low for so long [ns] whenever it is called; 0: no longer.
+    /// The I2C part in this reading-order slot holds SCL low for so long \[ns\] whenever it is called; 0: no longer.
     Stretching(usize, Nanos),
     /// The sensor in this reading-order slot answers random words (`true`) or is itself again.
     Garbage(usize, bool),
@@ -63,13 +63,13 @@ pub enum Fault {
     /// The controller's DMA stands still in mid-transfer and cannot be switched off: whoever waits in place for it to stop
     /// never comes round. A reset frees it.
     DmaHung,
-    /// The processor is kept from the unit for so long [ns], as by a storm of interrupts. Host board only.
+    /// The processor is kept from the unit for so long \[ns\], as by a storm of interrupts. Host board only.
     Busy(Nanos),
     /// The firmware panics: it leaves a crash record and resets itself. Host board only.
     Panic,
     /// The processor runs in a circle the next time it serves this end. Host board only.
     Hang(End),
-    /// The unit's clock steps by so much [us]. Host board only.
+    /// The unit's clock steps by so much \[us\]. Host board only.
     ClockSteps(i64),
     /// The lift-off line, as the unit finds it.
     LiftOff(Level),
@@ -127,7 +127,7 @@ pub enum Level {
     High,
     /// Never asserted: the wire is broken.
     Low,
-    /// A contact that opens and closes every so long [ns].
+    /// A contact that opens and closes every so long \[ns\].
     Bouncing(Nanos),
 }
 

@@ -11,9 +11,9 @@ pub struct Truth {
     pub rate_dot_b: Vector3<f64>,
     /// [m/s2] specific force at the unit's centre of rotation, in b: (0, 0, -g) at rest and level.
     pub force_b: Vector3<f64>,
-    /// [uT] magnetic field, in b.
+    /// \[uT\] magnetic field, in b.
     pub field_b_ut: Vector3<f64>,
-    /// [degC] temperature of the unit.
+    /// \[degC\] temperature of the unit.
     pub temperature_c: f64,
     /// Lift-off line, `true` = asserted.
     pub lift_off: bool,
@@ -27,6 +27,6 @@ pub struct Truth {
 pub trait TruthSource: Send + Sync {
     /// Truth `t_s` seconds after power-on. Defined for every time: before the start it is the start, after the end the end.
     fn at(&self, t_s: f64) -> Truth;
-    /// [s] how long it lasts; `None` for a source without an end.
+    /// \[s\] how long it lasts; `None` for a source without an end.
     fn duration_s(&self) -> Option<f64>;
 }

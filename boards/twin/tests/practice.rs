@@ -191,7 +191,7 @@ fn each_of_eight_more_effects_comes_out_as_large_as_it_was_put_in() {
     ]);
 }
 
-/// How much likelier the log of each channel is with this effect, and its best variant and parameters [ln].
+/// How much likelier the log of each channel is with this effect, and its best variant and parameters \[ln\].
 fn scatter(case: &Case, name: &str) -> Vec<(String, f64, f64, Vec<f64>)> {
     let effect = by_name(name).unwrap();
     let look = |channel: usize| {

@@ -31,14 +31,14 @@ use twin::{
     truth::TruthSource,
 };
 
-/// [uT] standard deviation of what a component of the field is told wrong: 0.2 deg of 26 uT.
+/// \[uT\] standard deviation of what a component of the field is told wrong: 0.2 deg of 26 uT.
 const FIELD_OFF_UT: f64 = 0.09;
 
-/// [s] after power-on.
+/// \[s\] after power-on.
 const LIFT_OFF_S: f64 = 30.0;
 const END_S: f64 = 600.0;
 
-/// [s] begin and end after power-on, and what it is.
+/// \[s\] begin and end after power-on, and what it is.
 const PHASES: [(f64, f64, &str); 10] = [
     (5.0, 30.0, "pad"),
     (31.0, 36.0, "lift-off"),
@@ -159,7 +159,7 @@ impl Sent {
     }
 }
 
-/// [deg] root of the mean of squares \[rad2\].
+/// \[deg\] root of the mean of squares \[rad2\].
 fn rms(squares: impl Iterator<Item = f64>) -> f64 {
     let (count, sum) = squares.fold((0.0, 0.0), |(count, sum), square| (count + 1.0, sum + square));
     (sum / count).sqrt().to_degrees()
@@ -199,7 +199,7 @@ fn print(units: &[Vec<Sent>]) {
 
 /// Error and three standard deviations of one unit in full, of the others the error alone.
 fn page(units: &[Vec<Sent>]) -> Result<String, Box<dyn Error>> {
-    /// [deg] what is drawn at least, on a logarithmic axis.
+    /// \[deg\] what is drawn at least, on a logarithmic axis.
     const LEAST: f64 = 1e-3;
     let line = |unit: &[Sent], of: &dyn Fn(&Sent) -> f64| {
         let points = unit

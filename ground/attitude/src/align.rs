@@ -14,9 +14,9 @@ use crate::{
     recording::{Row, attitude_at},
 };
 
-/// [s] looked for at most, on either side.
+/// \[s\] looked for at most, on either side.
 const SPAN_S: f64 = 2.0;
-/// [s] step of the grid: a turn at 2 rad/s has moved by 5 deg.
+/// \[s\] step of the grid: a turn at 2 rad/s has moved by 5 deg.
 const GRID_S: f64 = 0.04;
 /// Estimates that are looked at: more say nothing more.
 const LOOKED_AT: usize = 1_500;
@@ -30,11 +30,11 @@ const SIGMAS: f64 = 3.0;
 /// An offset that fits better than the one that was told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// [s] by which the reference should come later than it does.
+    /// \[s\] by which the reference should come later than it does.
     pub later_s: f64,
-    /// [s] its sigma.
+    /// \[s\] its sigma.
     pub sigma_s: f64,
-    /// [deg] root mean square error about its mean, as told and with it.
+    /// \[deg\] root mean square error about its mean, as told and with it.
     pub rms_deg: [f64; 2],
 }
 
@@ -76,7 +76,7 @@ pub fn offset(flight: &Flight, reference: &[Row]) -> Option<Offset> {
     (best.1 < (1.0 - WORTH) * told && found.later_s.abs() > SIGMAS * found.sigma_s).then_some(found)
 }
 
-/// [rad2] mean square of the error about its mean, and how many errors; the reference later by `later_s`. The error is taken in
+/// \[rad2\] mean square of the error about its mean, and how many errors; the reference later by `later_s`. The error is taken in
 /// b, where a mounting is constant, or in n, where a declination is, whichever has less of it.
 fn scatter(sampled: &[&Estimate], reference: &[Row], later_s: f64, most_s: f64) -> Option<(f64, usize)> {
     let error = |estimate: &&Estimate| {

@@ -38,7 +38,7 @@ pub const GROUPS: [(&str, &[&str]); 8] = [
     ("attached magnet", &["32", "34", "36"]),
 ];
 
-/// [rad/s] the Earth's rate and [rad] the latitude of Berlin, where the recordings were made.
+/// [rad/s] the Earth's rate and \[rad\] the latitude of Berlin, where the recordings were made.
 const EARTH_RATE: f64 = 7.292_115e-5;
 const LATITUDE_DEG: f64 = 52.5;
 

@@ -306,7 +306,7 @@ enum Log {
     Unit(Vec<Cycle>),
 }
 
-/// [bytes] a beginning that tells what a file is.
+/// \[bytes\] a beginning that tells what a file is.
 const HEAD: u64 = 4096;
 
 /// Reads a log, whichever it is; its first bytes tell.

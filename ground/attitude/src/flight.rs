@@ -29,19 +29,19 @@ use crate::{
 /// One step's estimate.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// [s] time of the step.
+    /// \[s\] time of the step.
     pub t_s: f64,
     /// The filter's attitude.
     pub q_nb: UnitQuaternion<f64>,
-    /// TRIAD's, from this step's vectors alone, and when they were sampled [s].
+    /// TRIAD's, from this step's vectors alone, and when they were sampled \[s\].
     pub triad_nb: Option<(f64, UnitQuaternion<f64>)>,
-    /// [rad2] covariance of the attitude's error as a rotation vector in n.
+    /// \[rad2\] covariance of the attitude's error as a rotation vector in n.
     pub covariance_n: Matrix3<f64>,
     /// [rad/s] gyro bias.
     pub bias_b: Vector3<f64>,
     /// [m/s2] specific force, if it was sampled.
     pub force_b: Option<Vector3<f64>>,
-    /// [uT] field, if it was sampled.
+    /// \[uT\] field, if it was sampled.
     pub field_b_ut: Option<Vector3<f64>>,
     /// What was compared in it.
     pub innovations: Vec<Innovation>,
@@ -54,7 +54,7 @@ pub struct Flight {
     pub estimates: Vec<Estimate>,
     /// Steps refused, by reason.
     pub refused: BTreeMap<String, usize>,
-    /// [s] when the attitude was found afresh.
+    /// \[s\] when the attitude was found afresh.
     pub aligned_s: Vec<f64>,
     /// Cycles that are, bit for bit, what the unit sent, and those that are not.
     pub replayed: [usize; 2],
@@ -63,9 +63,9 @@ pub struct Flight {
 /// Errors against a reference.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// [deg] mean error about each axis of b.
+    /// \[deg\] mean error about each axis of b.
     pub mean_deg: Vector3<f64>,
-    /// [deg] its standard deviation.
+    /// \[deg\] its standard deviation.
     pub sd_deg: Vector3<f64>,
     /// Root mean squares.
     pub rmse: Rmse,
@@ -144,7 +144,7 @@ impl Flight {
         }
     }
 
-    /// With its times moved by `by_s` [s].
+    /// With its times moved by `by_s` \[s\].
     pub fn shifted(mut self, by_s: f64) -> Self {
         for t_s in self
             .estimates
@@ -207,17 +207,17 @@ impl Flight {
 }
 
 impl Estimate {
-    /// [deg] roll, pitch, yaw.
+    /// \[deg\] roll, pitch, yaw.
     pub fn euler_deg(&self) -> [f64; 3] {
         euler_deg(&self.q_nb)
     }
 
-    /// [rad] standard deviation of the attitude about north, east and down.
+    /// \[rad\] standard deviation of the attitude about north, east and down.
     pub fn sd_n(&self) -> Vector3<f64> {
         self.covariance_n.diagonal().map(|variance| variance.max(0.0).sqrt())
     }
 
-    /// [deg] standard deviation of roll, pitch and yaw. A small rotation `a` in n turns them by
+    /// \[deg\] standard deviation of roll, pitch and yaw. A small rotation `a` in n turns them by
     /// `roll = (a_N cos yaw + a_E sin yaw)/cos pitch`, `pitch = a_E cos yaw - a_N sin yaw` and
     /// `yaw = a_D + roll sin pitch`; near the vertical roll and yaw grow beyond all bounds, and are cut at half a turn.
     pub fn euler_sd_deg(&self) -> [f64; 3] {
@@ -232,13 +232,13 @@ impl Estimate {
     }
 }
 
-/// [deg] roll, pitch, yaw.
+/// \[deg\] roll, pitch, yaw.
 pub fn euler_deg(q_nb: &UnitQuaternion<f64>) -> [f64; 3] {
     let euler = euler(&q_nb.cast());
     [euler.roll, euler.pitch, euler.yaw].map(|angle| f64::from(angle).to_degrees())
 }
 
-/// [s] when a cycle's vectors were sampled: between its accelerometers and its magnetometers.
+/// \[s\] when a cycle's vectors were sampled: between its accelerometers and its magnetometers.
 fn vectors_s(cycle: &Cycle) -> f64 {
     let slots = cycle.sample.slots_us[..8].iter().filter(|slot| **slot != NO_SLOT);
     let (count, sum) = slots.fold((0, 0), |(count, sum), slot| (count + 1, sum + u64::from(*slot)));

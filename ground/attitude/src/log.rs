@@ -16,9 +16,9 @@ use emems::{
 use nalgebra::{Vector3, Vector4};
 use packets::stream::{Item, sequence::Sequence};
 
-/// [us] from one slot to the next where every sensor answers: sixteen within 4.2 ms.
+/// \[us\] from one slot to the next where every sensor answers: sixteen within 4.2 ms.
 const SLOT_US: u32 = 260;
-/// [us] from the start of a cycle to the middle of its gyros' slots.
+/// \[us\] from the start of a cycle to the middle of its gyros' slots.
 const GYROS_US: u64 = 2_500;
 
 /// One cycle.
@@ -43,9 +43,9 @@ pub struct Cycles {
     derived: Option<Box<Derived>>,
     /// A frame whose packet has not come yet.
     ahead: Option<Box<Derived>>,
-    /// [us] the unit's clock at packet number zero.
+    /// \[us\] the unit's clock at packet number zero.
     epoch_us: i64,
-    /// When the gyros were last read [us], and their counts.
+    /// When the gyros were last read \[us\], and their counts.
     last: Option<(u64, [i16; 4])>,
 }
 

@@ -13,9 +13,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::{Matrix4x3, Vector3, Vector4};
 use twin::part::signal::Noise;
 
-/// [Hz] samples of each gyro.
+/// \[Hz\] samples of each gyro.
 const RATE_HZ: f64 = 128.0;
-/// [s] 100 minutes.
+/// \[s\] 100 minutes.
 const DURATION_S: f64 = 6000.0;
 /// [deg/s] about x.
 const TURN_DEG_S: f64 = 0.06;
@@ -28,11 +28,11 @@ pub struct Parameters {
     pub name: &'static str,
     /// [V/(deg/s)] of each.
     scale: [f64; 4],
-    /// [V] of each.
+    /// \[V\] of each.
     bias: [f64; 4],
     /// Sense axes, a row each.
     axes: [[f64; 3]; 4],
-    /// [deg] what the thesis found with them.
+    /// \[deg\] what the thesis found with them.
     pub printed_deg: Option<f64>,
 }
 
@@ -81,7 +81,7 @@ const OURS: Parameters = Parameters {
 /// What one set of parameters makes of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// [deg] summed about x, y, z.
+    /// \[deg\] summed about x, y, z.
     pub angle_deg: Vector3<f64>,
 }
 
@@ -90,13 +90,13 @@ impl Parameters {
         Matrix4x3::from_fn(|gyro, axis| self.axes[gyro][axis])
     }
 
-    /// [V] outputs at a rate [deg/s].
+    /// \[V\] outputs at a rate [deg/s].
     fn outputs(&self, rate_deg_s: &Vector3<f64>) -> Vector4<f64> {
         let along = self.axes() * rate_deg_s;
         Vector4::from_fn(|gyro, _| self.scale[gyro] * along[gyro] + self.bias[gyro])
     }
 
-    /// [deg] least squares over what the gyros summed [V s] in so many seconds.
+    /// \[deg\] least squares over what the gyros summed [V s] in so many seconds.
     fn angle_deg(&self, summed: &Vector4<f64>, seconds: f64) -> Option<Vector3<f64>> {
         let axes = self.axes();
         let along = Vector4::from_fn(|gyro, _| (summed[gyro] - self.bias[gyro] * seconds) / self.scale[gyro]);
@@ -147,7 +147,7 @@ pub fn table(seed: u64) -> String {
 mod tests {
     use super::*;
 
-    /// [deg] four standard deviations: 1.25e-5 V sqrt(s) at 0.078 V/(deg/s) over 6000 s are 0.012 deg for one gyro.
+    /// \[deg\] four standard deviations: 1.25e-5 V sqrt(s) at 0.078 V/(deg/s) over 6000 s are 0.012 deg for one gyro.
     const NOISE_DEG: f64 = 0.05;
 
     #[test]

@@ -23,7 +23,7 @@ pub fn python() -> &'static str {
     if Path::new(OWN).exists() { OWN } else { "python3" }
 }
 
-/// [deg] total error by filter, mode and recording.
+/// \[deg\] total error by filter, mode and recording.
 pub type Totals = BTreeMap<String, BTreeMap<(String, String), f64>>;
 
 /// Runs the script, or says why not.

@@ -12,13 +12,13 @@ use packets::magnitude::{self, Doubt, Kind, digits};
 
 use crate::recording::Row;
 
-/// [s] what the filter needs of rest or motion before it has an attitude.
+/// \[s\] what the filter needs of rest or motion before it has an attitude.
 const LEAST_S: f64 = 1.0;
 
 /// Rows in it.
 const LEAST_ROWS: usize = 5;
 
-/// [s] shortest time between two looks at a vector: noise of a sample over a shorter one hides what the rates do.
+/// \[s\] shortest time between two looks at a vector: noise of a sample over a shorter one hides what the rates do.
 const LOOK_S: f64 = 0.02;
 
 /// Sigmas by which a slope must differ from one before it is believed.

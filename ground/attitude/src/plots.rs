@@ -108,7 +108,7 @@ fn angles(flight: &Flight, reference: Option<&[Row]>) -> Result<Figure, ChartErr
     Figure::of("Attitude", 3, &angles.chain(widths).collect::<Vec<_>>())
 }
 
-/// [deg] a jump between two points that is the angle's end and not a turn.
+/// \[deg\] a jump between two points that is the angle's end and not a turn.
 const WRAP_DEG: f64 = 180.0;
 
 /// A line that breaks where an angle goes from one end of its range to the other.

@@ -17,13 +17,13 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 /// One sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// [s] since the recording's zero.
+    /// \[s\] since the recording's zero.
     pub t_s: f64,
     /// [rad/s] in b.
     pub rate_b: Vector3<f64>,
     /// [m/s2] specific force in b, if it was read.
     pub acc_b: Option<Vector3<f64>>,
-    /// [uT] in b, if it was read.
+    /// \[uT\] in b, if it was read.
     pub mag_b: Option<Vector3<f64>>,
     /// The reference, b to n.
     pub reference_nb: Option<UnitQuaternion<f64>>,
@@ -196,7 +196,7 @@ pub fn parse(file: &str, lines: impl BufRead) -> Result<Vec<Row>, RecordingError
     Ok(rows)
 }
 
-/// The attitude that rows have at `t_s`: between two of them that are at most `most_s` [s] from it, or at the one that is
+/// The attitude that rows have at `t_s`: between two of them that are at most `most_s` \[s\] from it, or at the one that is
 /// within half of that. `None` where they have none or do not count.
 pub fn attitude_at(rows: &[Row], t_s: f64, most_s: f64) -> Option<UnitQuaternion<f64>> {
     let near = |row: &&Row| row.scored && (row.t_s - t_s).abs() <= most_s;

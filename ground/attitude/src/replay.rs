@@ -129,7 +129,7 @@ fn uncut(rate_b: &Vector3<f64>, step: f64) -> Vector3<f64> {
     })
 }
 
-/// [s] the filter's clock at the recording's zero: recordings may begin before theirs, the filter's clock may not.
+/// \[s\] the filter's clock at the recording's zero: recordings may begin before theirs, the filter's clock may not.
 pub const EPOCH_S: f64 = 1e6;
 
 fn micros(t_s: f64) -> u64 {

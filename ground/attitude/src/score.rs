@@ -9,11 +9,11 @@ use nalgebra::UnitQuaternion;
 /// Root mean square errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rmse {
-    /// [deg] of the whole error.
+    /// \[deg\] of the whole error.
     pub total_deg: f64,
-    /// [deg] of the turn about the vertical.
+    /// \[deg\] of the turn about the vertical.
     pub heading_deg: f64,
-    /// [deg] of the tilt.
+    /// \[deg\] of the tilt.
     pub inclination_deg: f64,
 }
 
@@ -24,7 +24,7 @@ pub struct Score {
     count: f64,
 }
 
-/// [rad] total, heading and inclination of an error.
+/// \[rad\] total, heading and inclination of an error.
 pub fn angles(estimate_nb: &UnitQuaternion<f64>, reference_nb: &UnitQuaternion<f64>) -> [f64; 3] {
     let e = estimate_nb * reference_nb.inverse();
     let tilt = e.i.hypot(e.j);

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use attitude::broad::{self, Mode, REPORT, TUNE, mean_of};
 
-/// [deg] VQF 2.1.2 with its defaults on the same rates (`ground attitude --recordings --peers`): at every row on those of
+/// \[deg\] VQF 2.1.2 with its defaults on the same rates (`ground attitude --recordings --peers`): at every row on those of
 /// [`TUNE`] and of [`REPORT`], at 5 Hz with one sample of force a period, and from a start in motion.
 const VQF: [f64; 4] = [2.78, 1.93, 3.85, 4.59];
 
-/// [deg] what the unit is to reach at 5 Hz, whichever rows are read.
+/// \[deg\] what the unit is to reach at 5 Hz, whichever rows are read.
 const WANTED_AT_5_HZ: f64 = 1.5;
 
-/// [deg] the same on the minute that is in `data/broad` (`ground attitude --recordings data/broad --peers`): at every row, at
+/// \[deg\] the same on the minute that is in `data/broad` (`ground attitude --recordings data/broad --peers`): at every row, at
 /// 5 Hz with one sample of force a period, and from a start in motion.
 const VQF_ON_THE_MINUTE: [f64; 3] = [1.38, 3.16, 3.12];
 

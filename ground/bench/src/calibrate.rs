@@ -198,10 +198,10 @@ pub(crate) struct Place {
         default_value_t = 9.80665
     )]
     gravity: f64,
-    /// Latitude of the site [deg], north positive
+    /// Latitude of the site (deg), north positive
     #[arg(long = "latitude-deg", alias = "latitude", value_name = "DEG", default_value_t = -23.2111, allow_negative_numbers = true)]
     latitude: f64,
-    /// Azimuth of the table's outer axis [deg]; without it the Earth's rate stays in the bias
+    /// Azimuth of the table's outer axis (deg); without it the Earth's rate stays in the bias
     #[arg(
         long = "azimuth-deg",
         alias = "azimuth",

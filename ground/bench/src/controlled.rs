@@ -53,7 +53,7 @@ pub struct Channel {
     pub response: Response,
     /// Rows it was fitted on.
     pub rows: Vec<usize>,
-    /// Error of each of these rows when predicted without it and its antagonist [counts]; `NaN` where the rest does not
+    /// Error of each of these rows when predicted without it and its antagonist \[counts\]; `NaN` where the rest does not
     /// determine the channel.
     pub held_out: Vec<f64>,
 }
@@ -252,7 +252,7 @@ fn repeated(experiment: &Experiment, excitation_b: &[Option<Vector3<f64>>]) -> V
 }
 
 impl Calibration {
-    /// Root mean square of the held-out errors of a channel [counts].
+    /// Root mean square of the held-out errors of a channel \[counts\].
     pub fn held_out_rms(channel: &Channel) -> f64 {
         (channel.held_out.iter().map(|error| error * error).sum::<f64>() / channel.held_out.len() as f64).sqrt()
     }

@@ -39,15 +39,15 @@ pub struct Means {
     pub mount: Mount,
     /// Where the table stands.
     pub site: Site,
-    /// Time on the table [s].
+    /// Time on the table \[s\].
     pub time_s: f64,
-    /// Time a run is measured for [s].
+    /// Time a run is measured for (s).
     pub run_s: f64,
-    /// Time between two runs [s].
+    /// Time between two runs (s).
     pub between_s: f64,
     /// Rate of the runs [rad/s], for gyros.
     pub rate_rad_s: f64,
-    /// Steps of the table's angles [deg].
+    /// Steps of the table's angles (deg).
     pub step_deg: f64,
     /// Nominal axes in b, one a channel.
     pub axes_b: Vec<Vector3<f64>>,
@@ -73,7 +73,7 @@ pub struct Plan {
     pub runs: Vec<Run>,
     /// Sigma to expect of the relative scale, root mean square over channels.
     pub scale_sigma: f64,
-    /// Of the axis [rad].
+    /// Of the axis \[rad\].
     pub axis_sigma_rad: f64,
     /// Of the bias [rad/s, m/s2].
     pub bias_sigma: f64,
@@ -87,9 +87,9 @@ pub struct Plan {
 pub struct TooShort {
     /// Runs there is time for.
     pub runs: usize,
-    /// Time of a run and the pause after it [s].
+    /// Time of a run and the pause after it \[s\].
     pub run_s: f64,
-    /// Time needed [s].
+    /// Time needed \[s\].
     pub least_s: f64,
 }
 

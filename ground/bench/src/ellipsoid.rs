@@ -1,7 +1,7 @@
 //! Calibration without controlled inputs (MV SEC): a triad turned every way in a field of known strength.
 //!
-//! In: points `v` [counts] of an accelerometer at rest or a magnetometer, and the field's strength `R` [m/s2, uT]. Out:
-//! `v = T B + v0` with `|B| = R`: offset `v0` [counts] and lower triangular `T` [counts per unit], whose first row ties x
+//! In: points `v` \[counts\] of an accelerometer at rest or a magnetometer, and the field's strength `R` [m/s2, uT]. Out:
+//! `v = T B + v0` with `|B| = R`: offset `v0` \[counts\] and lower triangular `T` [counts per unit], whose first row ties x
 //! to the sensor's own x axis, with covariance. Nine parameters; how the sensor sits in the body is not among them.
 //!
 //! Start: the algebraic ellipsoid `[x2 y2 z2 2xy 2xz 2yz 2x 2y 2z] s = 1` of centred and scaled data, then
@@ -38,13 +38,13 @@ pub enum Convention {
 pub struct Ellipsoid {
     /// `T` [counts per unit], lower triangular.
     pub shape: Matrix3<f64>,
-    /// `v0` [counts].
+    /// `v0` \[counts\].
     pub offset: Vector3<f64>,
     /// Covariance of T11 T21 T22 T31 T32 T33 and the offset.
     pub covariance: SMatrix<f64, 9, 9>,
     /// `1 - h/R` of every point.
     pub residuals: Vec<f64>,
-    /// Noise of one output [counts], from the residuals.
+    /// Noise of one output \[counts\], from the residuals.
     pub scatter: f64,
     /// Points less nine.
     pub freedom: usize,

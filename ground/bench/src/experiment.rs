@@ -53,9 +53,9 @@ pub struct Trial {
     pub pose: Option<(Pose, Option<Turning>)>,
     /// Excitation in b that is used: of the angles if there are any, else as claimed.
     pub excitation_b: Vector3<f64>,
-    /// Temperature [degC]; `NaN` if nobody measured it.
+    /// Temperature \[degC\]; `NaN` if nobody measured it.
     pub temperature_c: f64,
-    /// Mean output of each channel [counts]; `None` where it was not read.
+    /// Mean output of each channel \[counts\]; `None` where it was not read.
     pub values: Vec<Option<f64>>,
     /// Their sigmas as the table states them (`NAME_sigma`).
     pub stated: Vec<Option<f64>>,
@@ -91,7 +91,7 @@ pub struct Layout<'a> {
     pub channels: &'a [String],
     /// Units that were told, whatever the columns' names say.
     pub units: Units,
-    /// Code limit of each channel [counts]: beyond it, or at it, the sensor saturates.
+    /// Code limit of each channel \[counts\]: beyond it, or at it, the sensor saturates.
     pub limit: &'a dyn Fn(&str) -> f64,
 }
 

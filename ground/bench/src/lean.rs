@@ -15,7 +15,7 @@ use crate::{
     turntable::{Mount, Site},
 };
 
-/// [rad] difference for derivatives: small against a lean's effect on curvature, large against rounding.
+/// \[rad\] difference for derivatives: small against a lean's effect on curvature, large against rounding.
 const STEP: f64 = 1e-5;
 
 /// Gauss-Newton steps; the problem is nearly linear.
@@ -24,9 +24,9 @@ const STEPS: usize = 4;
 /// How the table leans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lean {
-    /// Outer axis below the horizon, and outer angle short of its true value [rad].
+    /// Outer axis below the horizon, and outer angle short of its true value \[rad\].
     pub lean_rad: [f64; 2],
-    /// Their sigmas [rad].
+    /// Their sigmas \[rad\].
     pub sigma_rad: [f64; 2],
 }
 

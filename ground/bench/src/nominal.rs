@@ -11,7 +11,7 @@ use serde::Deserialize;
 pub struct Nominal {
     /// Its name.
     pub name: String,
-    /// [s] between two packets.
+    /// \[s\] between two packets.
     pub cycle_s: Option<f64>,
     /// Its channels.
     #[serde(rename = "channel")]
@@ -73,7 +73,7 @@ impl Nominal {
 }
 
 impl NominalChannel {
-    /// Outputs from here on are no measurement [counts]: the range, less a count where the channel is rounded.
+    /// Outputs from here on are no measurement \[counts\]: the range, less a count where the channel is rounded.
     pub fn limit_counts(&self) -> f64 {
         let rounding = if self.bits.is_some() { 1.0 } else { 0.0 };
         let least = |[low, high]: [f64; 2]| low.abs().min(high.abs()) / self.lsb - rounding;

@@ -1,7 +1,7 @@
 //! One channel's answer to a known excitation: scale, sensitive axis, bias, and how they move with temperature.
 //!
 //! `y = (1 + k1 t + .. + kq t^q) s.x + b0 + b1 t + .. + bp t^p`, with excitation `x` in b (rate [rad/s], specific force
-//! [m/s2] or field [uT]), output `y` [counts], `t` [K] from the reference temperature. Sensitivity `s = K n` holds scale
+//! [m/s2] or field \[uT\]), output `y` \[counts\], `t` \[K\] from the reference temperature. Sensitivity `s = K n` holds scale
 //! `K` [counts per unit] and unit axis `n`, so the axis never needs a constraint while it is being fitted. This is
 //! Eq 4.11 and Eq 4.26 of Marinho (2017) and Eq 7.5 of Siqueira (2014), whose scale is then the length of a row (Eqs
 //! 4.13, 4.33, 7.10); temperature is ours.
@@ -35,9 +35,9 @@ pub struct Orders {
 pub struct Observation {
     /// Excitation in b.
     pub excitation_b: Vector3<f64>,
-    /// Temperature of the channel [degC].
+    /// Temperature of the channel \[degC\].
     pub temperature_c: f64,
-    /// Mean output [counts].
+    /// Mean output \[counts\].
     pub value: f64,
 }
 
@@ -50,15 +50,15 @@ pub struct Response {
     pub bias: Vec<f64>,
     /// Scale polynomial without its constant 1 [1/K, 1/K2, ..].
     pub scale: Vec<f64>,
-    /// Where both polynomials have their zero [degC].
+    /// Where both polynomials have their zero \[degC\].
     pub reference_c: f64,
-    /// Temperatures the fit has seen [degC]; beyond them it is a guess.
+    /// Temperatures the fit has seen \[degC\]; beyond them it is a guess.
     pub valid_c: RangeInclusive<f64>,
     /// Covariance of sensitivity, bias and scale, in this order.
     pub covariance: DMatrix<f64>,
-    /// Observed minus predicted [counts], in the order of the observations.
+    /// Observed minus predicted \[counts\], in the order of the observations.
     pub residuals: Vec<f64>,
-    /// Root mean square residual per degree of freedom [counts].
+    /// Root mean square residual per degree of freedom \[counts\].
     pub scatter: f64,
     /// Observations less parameters.
     pub freedom: usize,
@@ -122,7 +122,7 @@ impl Response {
         })
     }
 
-    /// The output for an excitation [counts].
+    /// The output for an excitation \[counts\].
     pub fn predict(&self, excitation_b: &Vector3<f64>, temperature_c: f64) -> f64 {
         // Without a thermometer there is no polynomial either.
         let t = if self.reference_c.is_finite() {
@@ -153,14 +153,14 @@ impl Response {
             / self.counts_per_unit()
     }
 
-    /// Sigma of the axis about each of the two directions across it [rad], root mean square of both.
+    /// Sigma of the axis about each of the two directions across it \[rad\], root mean square of both.
     pub fn axis_sigma_rad(&self) -> f64 {
         let across = Matrix3::identity() - self.axis_b() * self.axis_b().transpose();
         let covariance = across * self.sensitivity_covariance() * across;
         (covariance.trace().max(0.0) / 2.0).sqrt() / self.counts_per_unit()
     }
 
-    /// Sigma of the bias at the reference temperature [counts].
+    /// Sigma of the bias at the reference temperature \[counts\].
     pub fn bias_sigma(&self) -> f64 {
         self.covariance.get((3, 3)).map_or(f64::NAN, |variance| variance.sqrt())
     }

@@ -2,7 +2,7 @@
 //!
 //! TOML, a `[[channel]]` each, so that two sets differ line by line under review: parameters in counts and SI, covariance,
 //! temperatures, part identities, and the SHA-256 of every file it came from. Out of calibrations, merged by channel; in
-//! for [`diff`], for the twin's [`unit`] and, in single precision, for the unit itself ([`image`]).
+//! for [`diff`], for the twin's [`mod@unit`] and, in single precision, for the unit itself ([`image`]).
 //!
 //! Refused: another format, a covariance that is not square or not positive, an axis without length, two channels with
 //! one name.
@@ -72,13 +72,13 @@ pub struct Entry {
     /// Scale polynomial without its 1 [1/K, ..].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub scale_per_k: Vec<f64>,
-    /// Where the polynomials have their zero [degC]; absent if nobody measured temperature.
+    /// Where the polynomials have their zero \[degC\]; absent if nobody measured temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_c: Option<f64>,
-    /// Temperatures it was calibrated at [degC].
+    /// Temperatures it was calibrated at \[degC\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_c: Option<[f64; 2]>,
-    /// Root mean square residual [counts].
+    /// Root mean square residual \[counts\].
     pub scatter_counts: f64,
     /// Degrees of freedom the scatter was judged by.
     pub freedom: usize,

@@ -55,7 +55,7 @@ pub fn welch(values: &[f64], step_s: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Frequency of the peak that stands out most of its surroundings, if any does [Hz].
+/// Frequency of the peak that stands out most of its surroundings, if any does \[Hz\].
 pub fn peak(density: &[(f64, f64)]) -> Option<f64> {
     let above = |k: usize| {
         let around = &density[k.saturating_sub(SURROUNDINGS)..density.len().min(k + SURROUNDINGS + 1)];

@@ -15,7 +15,7 @@ const QUIET: f64 = 3.0;
 /// Rise allowed over a still window, in noises: chance alone lifts windows of ten by 1.1 true noises, this is 4.4 of that.
 const LEVEL: f64 = 6.0;
 
-/// Shortest window [samples].
+/// Shortest window \[samples\].
 const LEAST: usize = 5;
 
 /// A stretch at rest.

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub use number::Decimal;
 
-/// [bytes] largest table that is read, unpacked: a day of the unit's packets is 67 MB.
+/// \[bytes\] largest table that is read, unpacked: a day of the unit's packets is 67 MB.
 pub const LARGEST: u64 = 1 << 30;
 
 /// Where a file's meaning is not certain, and why.

@@ -33,7 +33,7 @@ pub enum Turning {
     Outer,
 }
 
-/// Angles of both axes [rad].
+/// Angles of both axes \[rad\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Inner angle.
@@ -47,9 +47,9 @@ pub struct Pose {
 pub struct Site {
     /// Gravity [m/s2].
     pub gravity_m_s2: f64,
-    /// Latitude [rad], north positive.
+    /// Latitude \[rad\], north positive.
     pub latitude_rad: f64,
-    /// Azimuth of the outer axis [rad], east of north; `None` if nobody measured it.
+    /// Azimuth of the outer axis \[rad\], east of north; `None` if nobody measured it.
     pub outer_azimuth_rad: Option<f64>,
 }
 

@@ -40,7 +40,7 @@ fn campaign() -> Experiment {
     }
 }
 
-/// Root mean square error of pairs left out [mV], computed apart from this program from the same two tables.
+/// Root mean square error of pairs left out \[mV\], computed apart from this program from the same two tables.
 const LEFT_OUT_MV: [f64; 4] = [1.657_279, 1.375_262, 1.951_572, 1.389_906];
 
 fn nominal() -> Vec<Vector3<f64>> {

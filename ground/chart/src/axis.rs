@@ -18,7 +18,7 @@ pub enum Scale {
 /// An axis of a panel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// Quantity and unit, "time [s]".
+    /// Quantity and unit, "time \[s\]".
     pub label: String,
     /// How values stand on it.
     pub scale: Scale,

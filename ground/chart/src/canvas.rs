@@ -8,9 +8,9 @@ use crate::ChartError;
 pub const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Axes.
 pub const FRAME: RGBColor = RGBColor(120, 120, 120);
-/// [px] height of a panel's title.
+/// \[px\] height of a panel's title.
 pub const TITLE_PX: u32 = 34;
-/// [px] height of labels and ticks.
+/// \[px\] height of labels and ticks.
 pub const LABEL_PX: u32 = 30;
 
 /// What a drawing on an SVG may fail with.
@@ -19,7 +19,7 @@ pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 /// Where panels are drawn.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The SVG of a drawing of some size [px].
+/// The SVG of a drawing of some size \[px\].
 ///
 /// # Errors
 /// When the plotting library refuses.

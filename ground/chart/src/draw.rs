@@ -17,10 +17,10 @@ use crate::{
     canvas::{Area, Drawn, FRAME, GRID, LABEL_PX, TITLE_PX, drawing, font},
 };
 
-/// [px] size of a panel; a picture is shown at half of it or less, so that lines are finer than a pixel.
+/// \[px\] size of a panel; a picture is shown at half of it or less, so that lines are finer than a pixel.
 const PANEL: (u32, u32) = (1300, 620);
 
-/// [px] size of a panel that has the width for itself.
+/// \[px\] size of a panel that has the width for itself.
 const WIDE: (u32, u32) = (2600, 760);
 
 /// Stretches of x of which least and most are drawn.

@@ -45,9 +45,9 @@ pub struct Fly {
     pub plans: &'static [&'static str],
     /// A motion of the twin.
     pub motion: &'static str,
-    /// What is said on the umbilical, and when [ms].
+    /// What is said on the umbilical, and when \[ms\].
     pub said: &'static [(u64, &'static str)],
-    /// [ms] how long.
+    /// \[ms\] how long.
     pub ms: u64,
     /// What is accepted.
     pub judge: fn(&Flown) -> Verdict,

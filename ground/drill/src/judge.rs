@@ -175,7 +175,7 @@ pub fn configured_again(flown: &Flown) -> Verdict {
     Ok(format!("{said}; configured again"))
 }
 
-/// [ns] from a reset to the first durable record.
+/// \[ns\] from a reset to the first durable record.
 const BACK: Nanos = 400 * MS;
 
 /// F8, F9: FLIGHT and recording at the end, and what telemetry sent whole after lift-off is in the log, but for the time after a

@@ -19,7 +19,7 @@ use twin::{
     predict::{Scene, Twin, emems},
 };
 
-/// [s] a cycle of the unit, and a row of its motion.
+/// \[s\] a cycle of the unit, and a row of its motion.
 const CYCLE_S: f64 = 0.2;
 const STEP_S: f64 = 0.02;
 

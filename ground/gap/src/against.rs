@@ -41,11 +41,11 @@ pub struct Against {
     pub effects: Vec<String>,
     /// The gap, in total and by kind; then attitudes.
     pub pairs: Vec<Pair>,
-    /// Attitude error [deg] against time [s], by the filter, before and after.
+    /// Attitude error \[deg\] against time \[s\], by the filter, before and after.
     pub errors_deg: [Errors; 2],
 }
 
-/// Attitude errors [deg] against time [s].
+/// Attitude errors \[deg\] against time \[s\].
 pub type Errors = Vec<(f64, f64)>;
 
 /// Attitudes, row by row.

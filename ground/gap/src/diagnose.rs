@@ -96,7 +96,7 @@ pub struct Diagnosis {
     pub known: Vec<twin::predict::KnownEffect>,
     /// Residuals of the channels that stand out most.
     pub traces: Vec<Trace>,
-    /// Per channel, the gap in each of [`STRETCHES`] stretches of the fit windows.
+    /// Per channel, the gap in each of so many stretches of the fit windows.
     pub cells: Vec<(String, Vec<f64>)>,
     /// The pair most worth telling apart, for planning.
     pub rivals: Option<confusion::Pair>,

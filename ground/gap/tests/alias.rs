@@ -13,18 +13,18 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use written::written;
 
-/// [s] of the log, at [`RATE_HZ`].
+/// \[s\] of the log, at [`RATE_HZ`].
 const SECONDS: usize = 400;
 
 const RATE_HZ: usize = 5;
 
-/// [uT] white noise.
+/// \[uT\] white noise.
 const NOISE_UT: f64 = 0.2;
 
-/// [uT] field in n.
+/// \[uT\] field in n.
 const FIELD_N_UT: [f64; 3] = [17.0, 0.3, 41.0];
 
-/// [s] after the row's time.
+/// \[s\] after the row's time.
 const SLOTS_S: [f64; 2] = [0.0, 0.004];
 
 const CASE: &str = r#"[environment]

@@ -24,7 +24,7 @@ fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
     assert!((tau_s - 57.0).abs() < 4.0, "{which}");
 }
 
-/// [s] time constants of a warm-up, none of which is tried as it is.
+/// \[s\] time constants of a warm-up, none of which is tried as it is.
 const TAUS_S: [f64; 12] = [
     53.7, 57.9, 64.2, 66.3, 71.8, 97.1, 101.4, 108.9, 113.6, 122.3, 128.7, 141.2,
 ];

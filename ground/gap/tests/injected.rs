@@ -16,7 +16,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Three gyros along the axes of b, turning about z; gz reads `scale` of the time [s] too much.
+/// Three gyros along the axes of b, turning about z; gz reads `scale` of the time \[s\] too much.
 fn case(scale: impl Fn(f64) -> f64) -> TempDir {
     erring(|t_s| scale(t_s) * rate(t_s), "")
 }
@@ -219,7 +219,7 @@ fn the_floor_of_a_gap_is_what_a_perfect_twin_leaves() {
     }
 }
 
-/// What three gyros whose packets are numbered say of readings that are `late_s` [s] late.
+/// What three gyros whose packets are numbered say of readings that are `late_s` \[s\] late.
 fn of_late(late_s: impl Fn(f64) -> f64) -> Diagnosis {
     let folder = erring(|t_s| rate(t_s + late_s(t_s)) - rate(t_s), "");
     let change = |name: &str, of: &dyn Fn(String) -> String| {

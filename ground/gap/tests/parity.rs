@@ -20,7 +20,7 @@ use twin::{
     predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
 };
 
-/// [s] of a log.
+/// \[s\] of a log.
 const SECONDS: f64 = 120.0;
 
 /// A case of a unit along a motion, from `from_s` on, whose calibration is off by what its description allows.

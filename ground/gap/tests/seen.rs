@@ -16,19 +16,19 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use written::written;
 
-/// [s] of the log.
+/// \[s\] of the log.
 const SECONDS: usize = 120;
 
-/// [Hz] of the log, and of the record.
+/// \[Hz\] of the log, and of the record.
 const RATE_HZ: [usize; 2] = [25, 100];
 
-/// [rad/s] white noise of a gyro, and [uT] of a magnetometer.
+/// [rad/s] white noise of a gyro, and \[uT\] of a magnetometer.
 const NOISE: [f64; 2] = [0.003, 0.3];
 
-/// [rad] noise of the optical system: from sample to sample it turns into rates of 0.03 rad/s, ten times a gyro's noise.
+/// \[rad\] noise of the optical system: from sample to sample it turns into rates of 0.03 rad/s, ten times a gyro's noise.
 const OPTICS_RAD: f64 = 2e-4;
 
-/// [uT] field in n.
+/// \[uT\] field in n.
 const FIELD: [f64; 3] = [17.0, 0.3, 41.0];
 
 const CASE: &str = r#"[environment]
@@ -56,11 +56,11 @@ fn attitude(t_s: f64) -> UnitQuaternion<f64> {
 /// What is seen.
 struct Seen {
     case: String,
-    /// [uT] of a magnet at the magnetometers.
+    /// \[uT\] of a magnet at the magnetometers.
     iron_b: Vector3<f64>,
-    /// [s] when it is there.
+    /// \[s\] when it is there.
     iron_s: [f64; 2],
-    /// [uT] that each magnetometer's calibration is off by.
+    /// \[uT\] that each magnetometer's calibration is off by.
     zero: f64,
     /// How much more each magnetometer scatters than described.
     louder: [f64; 3],

@@ -8,7 +8,7 @@ use emems::{
     mode::{Action, Mode, State, Verdict},
 };
 
-/// [us] what a step of the fuzzer's clock is worth: up to 12.75 s, longer than any confirmation waits.
+/// \[us\] what a step of the fuzzer's clock is worth: up to 12.75 s, longer than any confirmation waits.
 const STEP_US: u64 = 50_000;
 
 fn times(said: &[u8], word: &[u8]) -> usize {

@@ -26,7 +26,7 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// Where the codes of both halves stand in a page.
 const CODES: [usize; 2] = [MAIN_BYTES, MAIN_BYTES + 6];
 
-/// [ns] of the chip's time: 100 ms for a mount of a chip of full size, and for each page read, appended or erased here 60 us,
+/// \[ns\] of the chip's time: 100 ms for a mount of a chip of full size, and for each page read, appended or erased here 60 us,
 /// 1.5 ms with superblock and retired blocks, 3 ms.
 const LIMIT: u64 = 100_000_000 + PAGES as u64 * 60_000 + 6 * 4 * 20_000_000;
 

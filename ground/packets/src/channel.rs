@@ -30,7 +30,7 @@ pub const GYRO_LSB: f64 = 0.07326 * std::f64::consts::PI / 180.0;
 /// [degC per count] ADIS16265 TEMP_OUT: 0.1453 degC a digit (datasheet, table 1).
 pub const GYRO_TEMPERATURE_LSB_C: f64 = 0.1453;
 
-/// [degC] ADIS16265 temperature at 0 counts.
+/// \[degC\] ADIS16265 temperature at 0 counts.
 pub const GYRO_TEMPERATURE_ZERO_C: f64 = 25.0;
 
 /// [degC per count] TMP102: 0.0625 degC a digit (datasheet, section 7.3.1).
@@ -41,13 +41,13 @@ pub const TEMPERATURE_LSB_C: f64 = 0.0625;
 pub enum Quantity {
     /// [m/s2] specific force along an axis of the plate.
     SpecificForce,
-    /// [uT] magnetic field along an axis of the plate.
+    /// \[uT\] magnetic field along an axis of the plate.
     Field,
     /// [rad/s] angular rate about the plate's sense axis.
     Rate,
-    /// [degC] temperature inside a gyro.
+    /// \[degC\] temperature inside a gyro.
     GyroTemperature,
-    /// [degC] temperature of a plate.
+    /// \[degC\] temperature of a plate.
     Temperature,
 }
 

@@ -19,7 +19,7 @@ use emems::{
     packet::PACKET_BYTES,
 };
 
-/// [bytes] the largest file that is read: a K9F1208's image has 69 million, a dump of it 49 million.
+/// \[bytes\] the largest file that is read: a K9F1208's image has 69 million, a dump of it 49 million.
 pub const LIMIT: u64 = 128 << 20;
 
 /// What was found.
@@ -200,7 +200,7 @@ impl Log {
     }
 
     /// Stretches of records that are missing within a boot: first and last that is, and when the record before began
-    /// [us]. Records are numbered from 1 without a gap, but for copies and headers.
+    /// \[us\]. Records are numbered from 1 without a gap, but for copies and headers.
     pub fn gaps(&self) -> Vec<Gap> {
         let mut gaps = Vec::new();
         let mut before: Option<(Key, u64)> = None;
@@ -240,7 +240,7 @@ pub struct Gap {
     pub first: Key,
     /// Number of the last.
     pub last: u32,
-    /// [us] when the record before them began, in its boot.
+    /// \[us\] when the record before them began, in its boot.
     pub after_us: Option<u64>,
 }
 

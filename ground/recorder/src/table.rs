@@ -2,8 +2,8 @@
 //!
 //! In: a key and its entry. Out: names, values, and lines without their ends. Columns: the key (`epoch`, `boot`, `seq`),
 //! `t_s` within the boot, the mode, health, the packet's counter, errors, lift-off and micro-g, its thirty-six channels,
-//! when each of the sixteen sensors was sampled after `t_s` [us], and the estimator's state: attitude, gyro bias [rad/s],
-//! deviations of attitude [rad] and bias [rad/s], sensors not used. What was not measured is an empty cell.
+//! when each of the sixteen sensors was sampled after `t_s` \[us\], and the estimator's state: attitude, gyro bias [rad/s],
+//! deviations of attitude \[rad\] and bias [rad/s], sensors not used. What was not measured is an empty cell.
 
 use std::fmt;
 

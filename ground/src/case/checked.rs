@@ -15,7 +15,7 @@ use super::clock;
 /// Sigmas from which a clock is off.
 const OFF: f64 = 4.0;
 
-/// [s] below which nobody minds: what a gyro at 100 deg/s turns in it is a tenth of a degree.
+/// \[s\] below which nobody minds: what a gyro at 100 deg/s turns in it is a tenth of a degree.
 const MINDED_S: f64 = 1e-3;
 
 /// One half of what the windows hold over the other from which they differ.

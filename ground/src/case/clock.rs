@@ -24,7 +24,7 @@ use twin::{
     predict::{Kind, UnitDescription},
 };
 
-/// [s] step of the coarse search: a rate that turns within a second is alike over a tenth.
+/// \[s\] step of the coarse search: a rate that turns within a second is alike over a tenth.
 const STEP_S: f64 = 0.05;
 
 /// Correlation below which two rates are not the same motion: of independent logs a hundred turns long it is 0.1.
@@ -54,13 +54,13 @@ pub enum ClockError {
 /// An offset and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// [s] to be taken from the reference's times to have the log's.
+    /// \[s\] to be taken from the reference's times to have the log's.
     pub seconds: f64,
-    /// [s] one standard deviation.
+    /// \[s\] one standard deviation.
     pub sigma_s: f64,
 }
 
-/// Rates of a log in b, with their instants [s].
+/// Rates of a log in b, with their instants \[s\].
 pub fn rates(log: &Log, unit: &UnitDescription) -> Vec<(f64, Vector3<f64>)> {
     let rows = log.start_s.len();
     let mut sums = vec![(Matrix3::zeros(), Vector3::zeros()); rows];
@@ -88,7 +88,7 @@ pub fn rates(log: &Log, unit: &UnitDescription) -> Vec<(f64, Vector3<f64>)> {
     sums.into_iter().enumerate().filter_map(rate).collect()
 }
 
-/// [s] to be taken from the reference's times, by the norm of the rates; and the correlation there.
+/// \[s\] to be taken from the reference's times, by the norm of the rates; and the correlation there.
 ///
 /// # Errors
 /// When it cannot be told.

@@ -13,7 +13,7 @@ use twin::predict::{Channel, Kind, UnitDescription, emems};
 
 use super::made::{Arguments, MadeError};
 
-/// [s] conversions of a part by its own clock; a reading is half of it old on the average.
+/// \[s\] conversions of a part by its own clock; a reading is half of it old on the average.
 const PERIODS_S: [(Kind, f64); 4] = [
     (Kind::Accelerometer, 1.0 / 50.0),
     (Kind::Magnetometer, 1.0 / 75.0),
@@ -21,7 +21,7 @@ const PERIODS_S: [(Kind, f64); 4] = [
     (Kind::Thermometer, 0.25),
 ];
 
-/// Packets or CSV; the mean slots [s] of a log with derived frames.
+/// Packets or CSV; the mean slots \[s\] of a log with derived frames.
 ///
 /// # Errors
 /// When it is neither.

@@ -14,7 +14,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use trials::scene::Record;
 use twin::part::signal::Noise;
 
-/// [m] way of the centre that an instrument without positions may overlook: at 0.5 Hz it is 0.01 m/s2, a fifth of an
+/// \[m\] way of the centre that an instrument without positions may overlook: at 0.5 Hz it is 0.01 m/s2, a fifth of an
 /// accelerometer's noise.
 const STILL_M: f64 = 1e-3;
 
@@ -36,7 +36,7 @@ pub enum Instrument {
     "the centre moves ({most_m:.3} m), which the encoders of a table do not see; take --reference exact or optical"
 )]
 pub struct Unseen {
-    /// [m] the farthest it was from its start.
+    /// \[m\] the farthest it was from its start.
     pub most_m: f64,
 }
 
@@ -44,12 +44,12 @@ pub struct Unseen {
 pub struct Scenery<'a> {
     /// Attitude q_nb and place in n.
     pub record: &'a Record,
-    /// [degC]
+    /// \[degC\]
     pub temperature_c: &'a dyn Fn(f64) -> f64,
 }
 
 impl Instrument {
-    /// [Hz] records a second.
+    /// \[Hz\] records a second.
     pub fn rate_hz(self) -> f64 {
         match self {
             Instrument::Exact | Instrument::Table => 100.0,
@@ -57,7 +57,7 @@ impl Instrument {
         }
     }
 
-    /// [rad] of an attitude, about each axis; 0 is exact. Camera: markers 0.3 m apart, each to 0.06 mm. Table: 18 bits.
+    /// \[rad\] of an attitude, about each axis; 0 is exact. Camera: markers 0.3 m apart, each to 0.06 mm. Table: 18 bits.
     pub fn attitude_sigma_rad(self) -> f64 {
         match self {
             Instrument::Exact => 0.0,
@@ -66,7 +66,7 @@ impl Instrument {
         }
     }
 
-    /// [m] of a position along each axis; `None` where there is none.
+    /// \[m\] of a position along each axis; `None` where there is none.
     pub fn position_sigma_m(self) -> Option<f64> {
         match self {
             Instrument::Exact => Some(0.0),

@@ -37,7 +37,7 @@ use super::{
 /// Steps that the fine search of the clocks takes at most; three come to a tenth of a sigma from 50 ms off.
 const MOST_STEPS: usize = 6;
 
-/// [rad] and [m] that a reference is taken to be good for where nobody says: a camera system's.
+/// \[rad\] and \[m\] that a reference is taken to be good for where nobody says: a camera system's.
 const REFERENCE: [f64; 2] = [1e-3, 1e-3];
 
 /// Makes a gap case of a real unit's log and its reference
@@ -61,7 +61,7 @@ pub struct Arguments {
     /// Seconds to take from the reference's times [default: from the rates]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub offset_s: Option<f64>,
-    /// How well the reference knows attitudes [rad]; 0 for exact
+    /// How well the reference knows attitudes (rad); 0 for exact
     #[arg(long, value_name = "RAD", default_value_t = REFERENCE[0])]
     pub attitude_sigma_rad: f64,
     /// Latitude, north positive

@@ -97,9 +97,9 @@ pub fn check_units(log: &Log, unit: &UnitDescription, name: &str) -> Result<(), 
 pub struct Place {
     /// [m/s2]
     pub gravity: f64,
-    /// [uT]
+    /// \[uT\]
     pub field_n_ut: Vector3<f64>,
-    /// [uT] of that mean.
+    /// \[uT\] of that mean.
     pub field_sigma_ut: f64,
 }
 

@@ -40,13 +40,13 @@ pub struct Refused {
 /// A row.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// [s] on the instrument's clock.
+    /// \[s\] on the instrument's clock.
     pub t_s: f64,
     /// As written: to be settled which way it turns.
     pub q: UnitQuaternion<f64>,
-    /// [m]
+    /// \[m\]
     pub place: Option<Vector3<f64>>,
-    /// [degC]
+    /// \[degC\]
     pub temperature_c: Option<f64>,
 }
 
@@ -300,7 +300,7 @@ impl Told {
     }
 }
 
-/// The column of time, and what its name says of its unit [s].
+/// The column of time, and what its name says of its unit \[s\].
 fn time_column(columns: &[String]) -> Option<(usize, Option<f64>)> {
     const NAMES: [(&str, Option<f64>); 12] = [
         ("t_s", Some(1.0)),
@@ -321,7 +321,7 @@ fn time_column(columns: &[String]) -> Option<(usize, Option<f64>)> {
         .find_map(|(name, unit_s)| columns.iter().position(|column| column == name).map(|at| (at, *unit_s)))
 }
 
-/// [s] of a unit, such that the median step is 1 to 200 ms.
+/// \[s\] of a unit, such that the median step is 1 to 200 ms.
 fn time_unit_s(times: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);

@@ -16,10 +16,10 @@ use twin::motion::Motion;
 /// Parts of the span. Eight can be halved in 35 ways.
 const BLOCKS: usize = 8;
 
-/// [s] of a part at least: ten packets.
+/// \[s\] of a part at least: ten packets.
 const SHORTEST_S: f64 = 2.0;
 
-/// [s] between looks at the motion: five a second, as often as the unit's packets.
+/// \[s\] between looks at the motion: five a second, as often as the unit's packets.
 const LOOK_S: f64 = 0.2;
 
 /// Part of the difference that an edge may cost.

@@ -22,7 +22,7 @@ use super::{
 /// Narrowest vertical range, in counts.
 const LEAST_COUNTS: i16 = 16;
 
-/// [s] pause over which no line is drawn: more than a cycle at 1 Hz.
+/// \[s\] pause over which no line is drawn: more than a cycle at 1 Hz.
 const GAP_S: f64 = 1.5;
 
 /// Part of the range left free above and below.

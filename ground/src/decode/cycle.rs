@@ -27,9 +27,9 @@ const SAME: f64 = 0.01;
     1e3 * .used_s, 1e3 * .seen_s, 1e6 * .seen_s
 )]
 pub struct Contradicted {
-    /// [s] told or settled on.
+    /// \[s\] told or settled on.
     pub used_s: f64,
-    /// [s] by the frames.
+    /// \[s\] by the frames.
     pub seen_s: f64,
 }
 
@@ -40,9 +40,9 @@ pub struct Cycle {
     settled_s: Option<f64>,
     held: Vec<Entry>,
     packets: usize,
-    /// Counter and start [us] of the last derived frame.
+    /// Counter and start \[us\] of the last derived frame.
     frame: Option<(u16, u64)>,
-    /// [s] a cycle that contradicts, seen once: one may be a restart's.
+    /// \[s\] a cycle that contradicts, seen once: one may be a restart's.
     doubt_s: Option<f64>,
 }
 
@@ -59,7 +59,7 @@ impl Cycle {
         }
     }
 
-    /// [s] The cycle, as far as it is known.
+    /// \[s\] The cycle, as far as it is known.
     pub fn s(&self) -> f64 {
         self.settled_s.or(self.told_s).unwrap_or(CYCLE_S)
     }

@@ -14,7 +14,7 @@ use recorder::{
 use super::{DecodeError, finish, input::Input, stem};
 use crate::{digest::Digest, folder::Folder};
 
-/// [us] from packet to packet where no header of a boot is left to say it.
+/// \[us\] from packet to packet where no header of a boot is left to say it.
 const PERIOD_US: u32 = 200_000;
 
 /// The log in an image, of which `head` was read already.

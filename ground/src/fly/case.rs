@@ -31,17 +31,17 @@ use crate::case::{
 /// What was done to the unit.
 pub const ANSWER: &str = "answer.toml";
 
-/// [s] that a reference records at most.
+/// \[s\] that a reference records at most.
 pub const LONGEST_S: f64 = 3600.0;
 
-/// [s] between conversions of a part by its own clock (data sheets: LIS331HH at 50 Hz, HMC5883L at 75 Hz, ADIS16265 at 256 Hz).
+/// \[s\] between conversions of a part by its own clock (data sheets: LIS331HH at 50 Hz, HMC5883L at 75 Hz, ADIS16265 at 256 Hz).
 const PERIODS_S: [(Kind, f64); 3] = [
     (Kind::Accelerometer, 1.0 / 50.0),
     (Kind::Magnetometer, 1.0 / 75.0),
     (Kind::Gyro, 1.0 / 256.0),
 ];
 
-/// [s] that the record goes on beyond the log at either end: what filters look back on.
+/// \[s\] that the record goes on beyond the log at either end: what filters look back on.
 const BEYOND_S: f64 = 0.3;
 
 /// Why a flight's folder is no case.
@@ -83,7 +83,7 @@ pub struct Flown<'a> {
     pub seed: u64,
     /// Of the flight: the reference's errors are its own.
     pub flight: u64,
-    /// [s] since power-on.
+    /// \[s\] since power-on.
     pub flown_s: f64,
     /// What recorded it.
     pub instrument: Instrument,

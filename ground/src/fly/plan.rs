@@ -75,7 +75,7 @@ pub struct Arguments {
     /// Silence a sensor (a1..a4, m1..m4, g1..g4, t1..t4) from a time on, or for a while: a2@10s, g1@10s..20s
     #[arg(long, value_name = "SENSOR@TIME", value_parser = silence)]
     pub silent: Vec<Silence>,
-    /// Disturb the unit: NAME[=SIZE][@SENSOR][@FROM..TO], such as hard-iron, gyro-scale=0.01@g2, accel-bias=3x@a1,
+    /// Disturb the unit: NAME=SIZE@SENSOR@FROM..TO, all but the name if wanted, such as hard-iron, gyro-scale=0.01@g2, accel-bias=3x@a1,
     /// vibration@20s..80s; `ground effects` lists them. What was done is written to answer.toml
     #[arg(long, value_name = "EFFECT")]
     pub with: Vec<Wish>,
@@ -131,7 +131,7 @@ pub fn duration_of(asked: Option<Duration>, source_s: Option<f64>) -> Duration {
     asked.unwrap_or_else(own)
 }
 
-/// [ns] on the clock of a run.
+/// \[ns\] on the clock of a run.
 ///
 /// # Errors
 /// When it does not fit.

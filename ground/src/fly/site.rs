@@ -9,11 +9,11 @@ use twin::environment::Environment;
 
 /// [m/s2] none in free fall, and no more than anywhere on Earth by far.
 const GRAVITY: RangeInclusive<f64> = 0.0..=10.0;
-/// [deg]
+/// \[deg\]
 const LATITUDE: RangeInclusive<f64> = -90.0..=90.0;
-/// [uT] the strongest field at the surface is 67.
+/// \[uT\] the strongest field at the surface is 67.
 const FIELD: RangeInclusive<f64> = -100.0..=100.0;
-/// [degC] what the parts are specified for (LIS331HH datasheet: -40 to 85).
+/// \[degC\] what the parts are specified for (LIS331HH datasheet: -40 to 85).
 const TEMPERATURE: RangeInclusive<f64> = -40.0..=85.0;
 
 /// The place of a recorded motion.

@@ -36,7 +36,7 @@ const HAND: (&str, &str) = (
     "carried about by hand: turns about all axes, ways of decimetres, rests between",
 );
 
-/// [s] it lasts, and the draw it is of.
+/// \[s\] it lasts, and the draw it is of.
 const HAND_S: f64 = 600.0;
 const HAND_DRAW: u64 = 1;
 

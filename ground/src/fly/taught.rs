@@ -25,10 +25,10 @@ use twin::{
     predict::{Scene, Twin, UnitDescription, UnitError, emems},
 };
 
-/// [s] between predictions: the difference of two predictions of one motion has nothing above some hertz.
+/// \[s\] between predictions: the difference of two predictions of one motion has nothing above some hertz.
 const STEP_S: f64 = 0.01;
 
-/// [s] of a flight at most: 36 channels of it are 70 MB.
+/// \[s\] of a flight at most: 36 channels of it are 70 MB.
 const LONGEST_S: f64 = 1200.0;
 
 /// Why a description cannot be flown.

@@ -20,7 +20,7 @@ use crate::{
     summary::Summary,
 };
 
-/// [ns] when derived frames are asked for: the unit has long booted.
+/// \[ns\] when derived frames are asked for: the unit has long booted.
 const ASK_AT: Nanos = 300_000_000;
 
 /// What is left of a watched flight.

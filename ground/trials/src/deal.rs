@@ -33,11 +33,11 @@ use crate::{
     strength, unit,
 };
 
-/// [s] of a case, and where its fit window ends and its hold window begins.
+/// \[s\] of a case, and where its fit window ends and its hold window begins.
 pub(crate) const DURATION_S: f64 = 600.0;
 const FIT_S: f64 = 300.0;
 
-/// [s] between rows of the record: motions of the trials have no tone above 0.5 Hz.
+/// \[s\] between rows of the record: motions of the trials have no tone above 0.5 Hz.
 const RECORD_S: f64 = 0.02;
 
 /// Marginal signal to noise ratios dealt, least and most.
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn every_disturbance_disturbs_what_it_says_it_touches() {
-        /// [s] long enough for what happens once to have happened.
+        /// \[s\] long enough for what happens once to have happened.
         const LONG_S: f64 = 250.0;
         let site = Environment::laboratory();
         let instants = flight::instants(3).expect("derived frames");

@@ -22,24 +22,24 @@ use twin::{
     run::{Bench, Flow},
 };
 
-/// [s] read cycle of the unit's nominal settings.
+/// \[s\] read cycle of the unit's nominal settings.
 pub const CYCLE_S: f64 = 0.2;
 
-/// [s] flown to learn the instants.
+/// \[s\] flown to learn the instants.
 const LISTEN_S: f64 = 6.0;
 
-/// [s] that a part's registers may be read after the time stamp of its turn: eight bytes at 400 kHz and the multiplexer's
+/// \[s\] that a part's registers may be read after the time stamp of its turn: eight bytes at 400 kHz and the multiplexer's
 /// switching are below it, and a conversion in between is the one that is read.
 const TRANSFER_S: f64 = 1e-3;
 
 /// When the unit's samples are made.
 #[derive(Clone, Debug)]
 pub struct Instants {
-    /// [s] after power-on at which packet 0 has its time zero: its oldest sample.
+    /// \[s\] after power-on at which packet 0 has its time zero: its oldest sample.
     pub zero_s: f64,
-    /// [s] after that at which its cycle begins.
+    /// \[s\] after that at which its cycle begins.
     pub lead_s: f64,
-    /// [s] each channel's sampling instant after its packet's time zero; at least zero.
+    /// \[s\] each channel's sampling instant after its packet's time zero; at least zero.
     pub slots_s: [f64; CHANNEL_COUNT],
 }
 
@@ -146,14 +146,14 @@ fn nanos(seconds: f64) -> Nanos {
 mod tests {
     use super::*;
 
-    /// [s] a set of a magnetometer at 75 Hz or an accelerometer at 50 Hz is at most this old, and reading all takes 5 ms.
+    /// \[s\] a set of a magnetometer at 75 Hz or an accelerometer at 50 Hz is at most this old, and reading all takes 5 ms.
     const OLDEST: f64 = 0.026;
 
     #[test]
     fn an_accelerometer_reads_a_ramp_as_of_the_instant_it_is_said_to_sample_at() {
         /// [m/s2] a second; six seconds are within the range, and a count is 2 ms.
         const SLOPE: f64 = 15.0;
-        /// [s] of its low-pass of 25 Hz.
+        /// \[s\] of its low-pass of 25 Hz.
         const TAU_S: f64 = 1.0 / (std::f64::consts::TAU * 25.0);
         for seed in 1..9 {
             let instants = instants(seed).expect("derived frames");

@@ -14,12 +14,12 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use twin::motion::{Motion, Pose};
 
-/// [s] between the entries of the table.
+/// \[s\] between the entries of the table.
 const STEP_S: f64 = 0.01;
 
 /// A motion whose heading is known too.
 pub trait Followed: Motion {
-    /// [rad] turned about the vertical since the start, whole turns counted.
+    /// \[rad\] turned about the vertical since the start, whole turns counted.
     fn heading_rad(&self, t_s: f64) -> f64;
 }
 

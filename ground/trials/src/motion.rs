@@ -27,11 +27,11 @@ pub enum Style {
 #[derive(Clone, Debug)]
 pub struct Wander {
     envelope: Profile,
-    /// For yaw, pitch and roll: amplitude [rad], angular frequency [rad/s], phase [rad].
+    /// For yaw, pitch and roll: amplitude \[rad\], angular frequency [rad/s], phase \[rad\].
     angles: [[(f64, f64, f64); TONES]; 3],
-    /// For each axis of n: amplitude [m], angular frequency [rad/s].
+    /// For each axis of n: amplitude \[m\], angular frequency [rad/s].
     path: [(f64, f64); 3],
-    /// Mean and swing [degC], angular frequency [rad/s].
+    /// Mean and swing \[degC\], angular frequency [rad/s].
     temperature: (f64, f64, f64),
     duration_s: f64,
 }
@@ -127,7 +127,7 @@ impl Followed for Wander {
 mod tests {
     use super::*;
 
-    /// [s] half the step of the difference quotients, and what they are off by at 2.5 rad/s: (H w)^2 / 6 with a margin.
+    /// \[s\] half the step of the difference quotients, and what they are off by at 2.5 rad/s: (H w)^2 / 6 with a margin.
     const H: f64 = 1e-3;
     const QUOTIENT: f64 = 5e-4;
 

@@ -19,7 +19,7 @@ use twin::{
 
 use crate::{answer::Size, deal::DURATION_S, draw::Draw, followed::Followed, motion::Wander, unit::kind};
 
-/// [s] step of the tables of slow filters.
+/// \[s\] step of the tables of slow filters.
 const STEP_S: f64 = 2e-3;
 
 /// What the truth instrument writes for an instant: attitude q_nb and position in n.
@@ -32,7 +32,7 @@ pub type Transit = Box<dyn Fn(&mut Vec<Reading>) + Send + Sync>;
 pub struct Scene {
     /// How the unit really moves.
     pub motion: Arc<dyn Followed>,
-    /// [s] for how long.
+    /// \[s\] for how long.
     pub duration_s: f64,
     /// Where.
     pub site: Environment,

@@ -25,7 +25,7 @@ use crate::{
     unit::{axis_b, kind},
 };
 
-/// [s] half the step with which the record is differentiated.
+/// \[s\] half the step with which the record is differentiated.
 const STEP_S: f64 = 0.01;
 
 /// A flight and what is said about it.

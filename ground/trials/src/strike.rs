@@ -45,7 +45,7 @@ pub struct Wish {
     pub large: Option<Large>,
     /// Where; drawn where absent.
     pub place: Option<Asked>,
-    /// [s] of the flight, from and to; always where absent.
+    /// \[s\] of the flight, from and to; always where absent.
     pub during_s: Option<[f64; 2]>,
 }
 
@@ -60,7 +60,7 @@ pub struct Struck {
     pub strength: f64,
     /// Its sizes that verdicts state too.
     pub sizes: Vec<Size>,
-    /// [s] from and to; always where absent.
+    /// \[s\] from and to; always where absent.
     pub during_s: Option<[f64; 2]>,
     /// What it is done to.
     pub acts_on: ActsOn,

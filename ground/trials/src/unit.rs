@@ -26,7 +26,7 @@ pub struct Kind {
     range: [f64; 2],
     bits: u32,
     bandwidth_hz: Option<f64>,
-    /// [s] how well a sampling instant is known: the part converts by its own clock, so a reading's age is spread evenly over a
+    /// \[s\] how well a sampling instant is known: the part converts by its own clock, so a reading's age is spread evenly over a
     /// period. Zero for thermometers, whose part the twin knows.
     pub instant_sigma_s: f64,
 }

@@ -9,7 +9,7 @@ use crate::{
     unit::Settings,
 };
 
-/// [s] from the first reading to the packet's, and between readings.
+/// \[s\] from the first reading to the packet's, and between readings.
 const APART_S: f32 = 0.066;
 const ALL: u16 = 0xFFF;
 const GRAVITY_N: Vector3<f32> = Vector3::new(0.0, 0.0, -9.81);

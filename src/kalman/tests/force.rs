@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// [deg] attitude error after 15 s in which vibration, folded down by slow samples, looks like a steady push to the north
+/// \[deg\] attitude error after 15 s in which vibration, folded down by slow samples, looks like a steady push to the north
 /// and upwards.
 fn folded(params: Params) -> f32 {
     let rate_b = Vector3::new(0.1, 0.05, 0.0);

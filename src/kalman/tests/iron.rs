@@ -2,10 +2,10 @@
 
 use super::*;
 
-/// [uT] a small magnet at a finger's breadth, as one was stuck to a real unit.
+/// \[uT\] a small magnet at a finger's breadth, as one was stuck to a real unit.
 const MAGNET_B: Vector3<f32> = Vector3::new(-6.0, -1.0, 58.0);
 
-/// Turns for `duration_s` about an axis that changes every second, with `magnet_b` [uT] on the unit.
+/// Turns for `duration_s` about an axis that changes every second, with `magnet_b` \[uT\] on the unit.
 fn turn(world: &mut World, duration_s: u32, magnet_b: Vector3<f32>) {
     for second in 0..duration_s {
         let (sin, cos) = ComplexField::sin_cos(0.7 * second as f32);
@@ -75,7 +75,7 @@ fn a_magnet_on_its_way_past_is_no_iron_of_the_unit() {
     assert!(found_b.norm() < 0.5, "{found_b}");
 }
 
-/// [deg] heading error at the end of a rest with a little iron, and after a minute of turning that shows it.
+/// \[deg\] heading error at the end of a rest with a little iron, and after a minute of turning that shows it.
 fn headings_with_little_iron(field: Reference) -> [f32; 2] {
     let iron_b = Vector3::new(0.0, 2.0, 0.0);
     let mut world = World::new(UnitQuaternion::identity(), Params { field, ..params() });

@@ -8,9 +8,9 @@ use embedded_hal_async::{delay::DelayNs, i2c::I2c};
 
 use super::{Config, DATA_X, DATA_Y, DATA_Z, Error, Gain, Hmc5883l, Rate};
 
-/// [counts] what self-test must move each axis by at 390 counts a gauss (datasheet, specifications).
+/// \[counts\] what self-test must move each axis by at 390 counts a gauss (datasheet, specifications).
 const COUNTS_AT_390: (i32, i32) = (243, 575);
-/// [ms] two periods of the slowest rate at which self-test measures.
+/// \[ms\] two periods of the slowest rate at which self-test measures.
 const WAIT_MS: u32 = 150;
 
 /// Which way self-test drives the offset straps (datasheet table 6, MS1 MS0).
@@ -21,7 +21,7 @@ pub enum Bias {
     Negative = 0b10,
 }
 
-/// [counts] what an axis may change by: the same field at every gain.
+/// \[counts\] what an axis may change by: the same field at every gain.
 fn limits(gain: Gain, bias: Bias) -> (i16, i16) {
     let (weak, strong) = COUNTS_AT_390;
     // At most 575 * 1370 / 390 = 2019: fits.

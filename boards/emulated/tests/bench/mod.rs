@@ -16,7 +16,7 @@ use twin::{
     truth::TruthSource,
 };
 
-/// [ns] in a millisecond.
+/// \[ns\] in a millisecond.
 pub const MS: Nanos = 1_000_000;
 
 /// Keeps what it hears.

@@ -11,13 +11,13 @@
 use super::feel::{Aim, Feel};
 use super::unit::Channel;
 
-/// [s] later as a function of the nominal instant [s].
+/// \[s\] later as a function of the nominal instant \[s\].
 type Delay<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 /// [physical unit] added, from what is felt and the channel's own input.
 type Term<'a> = Box<dyn Fn(&Feel, f64) -> f64 + 'a>;
 /// [physical unit] added, from what is felt.
 type Felt<'a> = Box<dyn Fn(&Feel) -> f64 + 'a>;
-/// Changes the series of readings; told the nominal instants [s].
+/// Changes the series of readings; told the nominal instants \[s\].
 type Stage<'a> = Box<dyn Fn(&[f64], &mut [f64]) + 'a>;
 
 /// How one channel comes to its readings.
@@ -26,15 +26,15 @@ pub struct Chain<'a> {
     pub aim: Aim,
     /// [physical unit] constant.
     pub bias: f64,
-    /// [s] time constant of a second first-order low-pass. Below zero it is a lead of the same slope: the low-pass of the
+    /// \[s\] time constant of a second first-order low-pass. Below zero it is a lead of the same slope: the low-pass of the
     /// channel is then faster than described.
     pub lag_s: f64,
-    /// [s] time constant of a first-order high-pass.
+    /// \[s\] time constant of a first-order high-pass.
     pub high_pass_s: Option<f64>,
     delays: Vec<Delay<'a>>,
     terms: Vec<Term<'a>>,
     gross: Vec<Felt<'a>>,
-    /// Time constants [s], and [physical unit] per degC/s behind them.
+    /// Time constants \[s\], and [physical unit] per degC/s behind them.
     thermal: Vec<(f64, f64)>,
     stages: Vec<Stage<'a>>,
 }
@@ -55,7 +55,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// What is logged at `t` was physically read `delay(t)` [s] later.
+    /// What is logged at `t` was physically read `delay(t)` \[s\] later.
     pub fn read_late(&mut self, delay: impl Fn(f64) -> f64 + 'a) {
         self.delays.push(Box::new(delay));
     }
@@ -82,7 +82,7 @@ impl<'a> Chain<'a> {
         self.stages.push(Box::new(stage));
     }
 
-    /// [s] the physical instant of what is logged at `t_s`.
+    /// \[s\] the physical instant of what is logged at `t_s`.
     pub(crate) fn instant(&self, t_s: f64) -> f64 {
         t_s + self.delays.iter().map(|delay| delay(t_s)).sum::<f64>()
     }
@@ -101,7 +101,7 @@ impl<'a> Chain<'a> {
         !self.terms.is_empty()
     }
 
-    /// What is gross of a reading, through a low-pass of `tau_s`, given what is felt so long [s] before. The exponential's mean by
+    /// What is gross of a reading, through a low-pass of `tau_s`, given what is felt so long \[s\] before. The exponential's mean by
     /// two of its instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
     pub(crate) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
         let root = core::f64::consts::SQRT_2;
@@ -112,7 +112,7 @@ impl<'a> Chain<'a> {
         self.gross.iter().map(mean).sum()
     }
 
-    /// Time constants [s] and gains [physical unit per degC/s] of what follows the temperature.
+    /// Time constants \[s\] and gains [physical unit per degC/s] of what follows the temperature.
     pub(crate) fn thermal(&self) -> &[(f64, f64)] {
         &self.thermal
     }

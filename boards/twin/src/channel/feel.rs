@@ -7,7 +7,7 @@ use super::unit::{Channel, Kind};
 /// The physical state of the unit's centre at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feel {
-    /// [s] the instant, from the start of the log.
+    /// \[s\] the instant, from the start of the log.
     pub t_s: f64,
     /// [rad/s] inertial rate of b, in b.
     pub rate_b: Vector3<f64>,
@@ -15,17 +15,17 @@ pub struct Feel {
     pub rate_dot_b: Vector3<f64>,
     /// [m/s2] specific force at the centre, in b.
     pub force_b: Vector3<f64>,
-    /// [uT] magnetic field, in b.
+    /// \[uT\] magnetic field, in b.
     pub field_b_ut: Vector3<f64>,
-    /// [degC] temperature.
+    /// \[degC\] temperature.
     pub temperature_c: f64,
     /// [degC/s] its time derivative.
     pub temperature_rate: f64,
     /// Body to navigation: `v_n = q_nb v_b q_nb*`.
     pub q_nb: UnitQuaternion<f64>,
-    /// [m] place of the centre in n.
+    /// \[m\] place of the centre in n.
     pub position_n: Vector3<f64>,
-    /// [rad] turned about the vertical since the motion began, whole turns counted ([`crate::predict::Scene`]).
+    /// \[rad\] turned about the vertical since the motion began, whole turns counted ([`crate::predict::Scene`]).
     pub heading: f64,
     /// [rad/s] its time derivative.
     pub heading_rate: f64,
@@ -53,7 +53,7 @@ pub struct Aim {
     pub sensor: Kind,
     /// Its axis in b. Its length is its scale.
     pub axis_b: Vector3<f64>,
-    /// [m] its place in b; accelerometers only.
+    /// \[m\] its place in b; accelerometers only.
     pub lever_m: Vector3<f64>,
 }
 

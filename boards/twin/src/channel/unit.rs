@@ -26,9 +26,9 @@ pub enum Kind {
     Accelerometer,
     /// Inertial rate [rad/s].
     Gyro,
-    /// Magnetic field [uT].
+    /// Magnetic field \[uT\].
     Magnetometer,
-    /// Temperature [degC].
+    /// Temperature \[degC\].
     Thermometer,
 }
 
@@ -58,10 +58,10 @@ pub struct Channel {
     /// [physical unit] how well the calibration knew the bias.
     #[serde(default)]
     pub bias_sigma: f64,
-    /// [1] how well it knew the scale.
+    /// \[1\] how well it knew the scale.
     #[serde(default)]
     pub scale_sigma: f64,
-    /// [rad] how well it knew the axis, about each of the two directions across it.
+    /// \[rad\] how well it knew the axis, about each of the two directions across it.
     #[serde(default)]
     pub axis_sigma_rad: f64,
     /// [physical unit] beyond it the channel clips.
@@ -70,17 +70,17 @@ pub struct Channel {
     /// Width of the two's complement count; `None` for no rounding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bits: Option<u32>,
-    /// [Hz] corner of the sensor's first-order low-pass; `None` for none.
+    /// \[Hz\] corner of the sensor's first-order low-pass; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bandwidth_hz: Option<f64>,
-    /// [s] sampling instant after the start of the cycle.
+    /// \[s\] sampling instant after the start of the cycle.
     #[serde(default)]
     pub slot_s: f64,
-    /// [s] how well that instant is known; `None` for as well as the part's data sheet lets anyone know it. A part that
+    /// \[s\] how well that instant is known; `None` for as well as the part's data sheet lets anyone know it. A part that
     /// converts by its own clock gives a reading of unknown age, and the ages of two clocks drift.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instant_sigma_s: Option<f64>,
-    /// [m] place in b from the centre of rotation; accelerometers only.
+    /// \[m\] place in b from the centre of rotation; accelerometers only.
     #[serde(default)]
     pub lever_m: Vector3<f64>,
 }
@@ -90,7 +90,7 @@ fn unbounded() -> [f64; 2] {
 }
 
 impl Channel {
-    /// [s] time constant of its low-pass; 0 for none.
+    /// \[s\] time constant of its low-pass; 0 for none.
     pub fn tau_s(&self) -> f64 {
         self.bandwidth_hz
             .map_or(0.0, |corner_hz| 1.0 / (core::f64::consts::TAU * corner_hz))
@@ -118,7 +118,7 @@ impl Channel {
         [first, self.axis_b.cross(&first)]
     }
 
-    /// The code [counts] the channel logs for a physical value; the value itself where it does not round.
+    /// The code \[counts\] the channel logs for a physical value; the value itself where it does not round.
     pub fn logged(&self, value: f64) -> f64 {
         let clipped = value.clamp(self.range[0], self.range[1]);
         match self.bits {
@@ -149,7 +149,7 @@ pub struct KnownEffect {
 pub struct UnitDescription {
     /// Its name.
     pub name: String,
-    /// [s] one packet each cycle; `None` for a log without packets.
+    /// \[s\] one packet each cycle; `None` for a log without packets.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cycle_s: Option<f64>,
     /// Channels, in the order of the file.
@@ -199,7 +199,7 @@ pub enum UnitError {
     },
 }
 
-/// [bytes] largest file that is read: 40 channels are 10 kB. A device such as `/dev/zero` has no end.
+/// \[bytes\] largest file that is read: 40 channels are 10 kB. A device such as `/dev/zero` has no end.
 const LARGEST: u64 = 16 << 20;
 
 /// How far from one the length of an axis may be: three decimals.

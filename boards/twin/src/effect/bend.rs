@@ -9,7 +9,7 @@ pub(super) const RANGE: [f64; 3] = [-LARGEST, 0.0, LARGEST];
 
 const LARGEST: f64 = 0.02;
 
-/// [degC] that count as this distance from the temperature of the calibration.
+/// \[degC\] that count as this distance from the temperature of the calibration.
 pub(super) fn bent(away_c: f64, bend: f64) -> f64 {
     away_c * (1.0 + bend.clamp(-LARGEST, LARGEST) * away_c)
 }

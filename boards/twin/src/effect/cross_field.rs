@@ -6,7 +6,7 @@
 use super::{Effect, Page, Scope, Site, Symbol};
 use crate::channel::{Chain, Kind};
 
-/// [uT] the field that holds the film: 8 G.
+/// \[uT\] the field that holds the film: 8 G.
 const HOLDING_UT: f64 = 800.0;
 
 /// `mag-cross-field`.

@@ -68,7 +68,7 @@ impl Effect for CurrentField {
         variant == AGAIN
     }
 
-    /// With the rate, while turning, again and again, then onsets [s].
+    /// With the rate, while turning, again and again, then onsets \[s\].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         [WITH_RATE, WHILE_TURNING, AGAIN]
             .into_iter()

@@ -10,7 +10,7 @@ use crate::channel::{Chain, Kind};
 /// The variant that is a ramp.
 const RAMP: f64 = -1.0;
 
-/// [s] in which electrodes follow a load.
+/// \[s\] in which electrodes follow a load.
 const FOLLOWING_S: f64 = 15.0;
 
 /// `gyro-supply`.
@@ -58,7 +58,7 @@ impl Effect for GyroSupply {
         })
     }
 
-    /// A ramp, then onsets [s].
+    /// A ramp, then onsets \[s\].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         core::iter::once(RAMP).chain(onsets(starts_s)).collect()
     }

@@ -8,7 +8,7 @@ use crate::channel::{Chain, Kind};
 /// `accel-high-pass`.
 pub struct HighPass;
 
-/// [Hz] corners to begin from: of those of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0; in proportion to the data rate,
+/// \[Hz\] corners to begin from: of those of the LIS331HH (CTRL_REG2, table of HPCF1 and HPCF0; in proportion to the data rate,
 /// so lower in its low-power modes) as many as a log of 5 Hz tells apart.
 const CORNERS_HZ: [f64; 9] = [0.03, 0.06, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0];
 
@@ -40,7 +40,7 @@ impl Effect for HighPass {
         Some(format!("with a corner of {variant:.3} Hz"))
     }
 
-    /// Corners [Hz].
+    /// Corners \[Hz\].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         CORNERS_HZ.to_vec()
     }

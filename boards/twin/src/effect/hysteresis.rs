@@ -59,7 +59,7 @@ impl Effect for Hysteresis {
         })
     }
 
-    /// Half-widths [m/s2] of the play, negated, then onsets [s] of a step.
+    /// Half-widths [m/s2] of the play, negated, then onsets \[s\] of a step.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         HALF_WIDTHS
             .into_iter()

@@ -102,7 +102,7 @@ impl Block {
         (first_bin(length)..length / 2).map(line).collect()
     }
 
-    /// [nats] that a line of amplitude `a` sigma gains whose power is `line`.
+    /// \[nats\] that a line of amplitude `a` sigma gains whose power is `line`.
     pub(super) fn gain(&self, a: f64, line: f64) -> f64 {
         let v = 1.0 + self.count * a * a / 4.0;
         line * (1.0 - 1.0 / v) - v.ln()

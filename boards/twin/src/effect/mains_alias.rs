@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::{Effect, Page, Scope, Site, Symbol};
 use crate::channel::{Chain, Kind};
 
-/// [Hz] how far the mains and the clock of the unit are off together.
+/// \[Hz\] how far the mains and the clock of the unit are off together.
 const SPREAD_HZ: f64 = 0.03;
 
 /// `mains-alias`.
@@ -61,7 +61,7 @@ impl Effect for MainsAlias {
         Some(format!("at {variant:.3} Hz"))
     }
 
-    /// Frequencies [Hz], as close as the log can tell apart.
+    /// Frequencies \[Hz\], as close as the log can tell apart.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         let span_s = starts_s.last().unwrap_or(&0.0) - starts_s.first().unwrap_or(&0.0);
         let step_hz = (1.0 / span_s.max(1.0)).max(2.0 * SPREAD_HZ / 64.0);

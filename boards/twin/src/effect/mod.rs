@@ -178,7 +178,7 @@ pub fn by_name(name: &str) -> Option<&'static dyn Effect> {
 /// free: any instant is a variant.
 const ONSETS: usize = 15;
 
-/// [s] the onsets to try.
+/// \[s\] the onsets to try.
 pub fn onsets(starts_s: &[f64]) -> impl Iterator<Item = f64> {
     let (from_s, to_s) = (*starts_s.first().unwrap_or(&0.0), *starts_s.last().unwrap_or(&0.0));
     (1..=ONSETS).map(move |k| from_s + (to_s - from_s) * k as f64 / (ONSETS + 1) as f64)
@@ -227,7 +227,7 @@ pub trait Effect: Sync {
     }
 
     /// The values to try of a parameter in which the effect is not smooth (an onset, a time constant, a choice), for a log
-    /// whose cycles begin at these instants [s].
+    /// whose cycles begin at these instants \[s\].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0]
     }

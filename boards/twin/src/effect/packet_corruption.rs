@@ -29,7 +29,7 @@ const PAGE: Page = Page {
 const FAR: f64 = 1.0 / 16.0;
 /// A quarter instead of a third: the gyro's 14 bits reach twice as far as twelve.
 const LEAST_FAR: f64 = 0.25;
-/// [nats] one damaged log in a thousand is refused.
+/// \[nats\] one damaged log in a thousand is refused.
 const REFUSED: f64 = 6.9;
 
 /// Whether samples off their prediction lie too near to it for damage, which knows nothing of it. By Chernoff's bound of the

@@ -43,7 +43,7 @@ impl Effect for PacketLoss {
         Some(f64::NEG_INFINITY)
     }
 
-    /// Onsets [s].
+    /// Onsets \[s\].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         onsets(starts_s).collect()
     }

@@ -34,7 +34,7 @@ impl Effect for SetReset {
         Some(format!("from {variant:.0} s on"))
     }
 
-    /// Onsets [s].
+    /// Onsets \[s\].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         onsets(starts_s).collect()
     }

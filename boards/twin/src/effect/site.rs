@@ -18,7 +18,7 @@ pub struct Site<'a> {
     pub channel: &'a Channel,
     /// Where the unit is.
     pub environment: &'a Environment,
-    /// [s] first and last cycle of the log.
+    /// \[s\] first and last cycle of the log.
     pub log_s: (f64, f64),
 }
 
@@ -35,7 +35,7 @@ impl Site<'_> {
         wanted.map(|(index, _)| index).collect()
     }
 
-    /// [m] place of the channel in b: its own, or that of the accelerometer on the same plate, for only these are described.
+    /// \[m\] place of the channel in b: its own, or that of the accelerometer on the same plate, for only these are described.
     pub fn place_b(&self) -> Vector3<f64> {
         let neighbour = self
             .of_group(&self.channel.group, Kind::Accelerometer)

@@ -13,7 +13,7 @@ use crate::channel::Channel;
 pub struct View<'a> {
     /// The channel.
     pub channel: &'a Channel,
-    /// [s] instants, one a cycle.
+    /// \[s\] instants, one a cycle.
     pub t_s: &'a [f64],
     /// [physical unit] predicted.
     pub predicted: &'a [f64],
@@ -108,7 +108,7 @@ impl View<'_> {
         }
     }
 
-    /// ln probability of a sample by a law that gives it `mass` [ln]; where the law calls it impossible, what noise makes of it,
+    /// ln probability of a sample by a law that gives it `mass` \[ln\]; where the law calls it impossible, what noise makes of it,
     /// if that is less. No law gains by samples that neither it nor noise explains.
     pub(super) fn explained(&self, mass: f64, residual: f64) -> f64 {
         // Of two impossible origins the mixture is as impossible, but for its ln 2.
@@ -191,7 +191,7 @@ const SIZES: [f64; 9] = [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0];
 const SECTIONS: usize = 16;
 
 /// The most likely parameters of an effect that changes the scatter of these channels, which share them, and how much
-/// likelier the log is with it than without [ln].
+/// likelier the log is with it than without \[ln\].
 pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f64>, f64) {
     let nominal: f64 = views.iter().map(View::nominal).sum();
     let Some(symbol) = effect.page().parameters.first() else {
@@ -228,7 +228,7 @@ pub fn most_likely(effect: &dyn Effect, variant: f64, views: &[View]) -> (Vec<f6
     (vec![best.0], best.1)
 }
 
-/// Step [ln] by which a parameter is moved to see how sharply the likelihood falls off.
+/// Step \[ln\] by which a parameter is moved to see how sharply the likelihood falls off.
 const SHARPNESS_STEP: f64 = 0.02;
 
 /// Sigma of a parameter of such an effect: by the observed information about the logarithm of its size, in its own unit, and as

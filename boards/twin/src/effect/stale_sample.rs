@@ -23,7 +23,7 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
-/// [sigma] within which a reading is of what is measured.
+/// \[sigma\] within which a reading is of what is measured.
 const FRESH: f64 = 8.0;
 
 /// ln probability of each sample if it is one that was sent before.

@@ -100,7 +100,7 @@ impl Effect for StuckChannel {
         Some(format!("from {variant:.1} s on"))
     }
 
-    /// Onsets [s]; the first is the start of the log.
+    /// Onsets \[s\]; the first is the start of the log.
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         starts_s.first().copied().into_iter().chain(onsets(starts_s)).collect()
     }

@@ -38,7 +38,7 @@ fn of_any_phase(z: f64, a: f64) -> f64 {
     -PI.ln() - 0.5 * (a * a - inside * inside + 2.0 * a).ln() - 0.5 * (z - inside).powi(2)
 }
 
-/// [s] between samples.
+/// \[s\] between samples.
 fn step_s(view: &View) -> f64 {
     view.t_s.windows(2).map(|pair| pair[1] - pair[0]).next().unwrap_or(1.0)
 }
@@ -140,7 +140,7 @@ impl Effect for Vibration {
         })
     }
 
-    /// Any frequency: the likelihood averages over them, unless the variant says which [Hz]. To inject, 0 is a drawn one.
+    /// Any frequency: the likelihood averages over them, unless the variant says which \[Hz\]. To inject, 0 is a drawn one.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![0.0, WANDERS]
     }

@@ -46,7 +46,7 @@ impl Effect for VibrationRectification {
         })
     }
 
-    /// With the turning rate, then onsets [s].
+    /// With the turning rate, then onsets \[s\].
     fn variants(&self, starts_s: &[f64]) -> Vec<f64> {
         core::iter::once(TURNING).chain(onsets(starts_s)).collect()
     }

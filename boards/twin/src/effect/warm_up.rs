@@ -38,7 +38,7 @@ impl Effect for WarmUp {
         Some(format!("with a time constant of {variant:.0} s"))
     }
 
-    /// Time constants [s].
+    /// Time constants \[s\].
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
         vec![20.0, 40.0, 80.0, 160.0, 320.0]
     }

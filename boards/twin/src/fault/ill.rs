@@ -8,7 +8,7 @@ use emems::calibration::Channel;
 /// What befalls values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ill {
-    /// Added to an axis [SI].
+    /// Added to an axis \[SI\].
     Bias(Channel, f64),
     /// Added to an axis, growing by so much a second [SI/s].
     Ramp(Channel, f64),

@@ -121,7 +121,7 @@ const fn word(
     }
 }
 
-/// [ns] of a size in ms.
+/// \[ns\] of a size in ms.
 fn ms(size: Option<f64>, otherwise: f64) -> u64 {
     (size.unwrap_or(otherwise).max(0.0) * 1e6) as u64
 }

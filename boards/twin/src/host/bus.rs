@@ -23,7 +23,7 @@ use crate::{
     run::End,
 };
 
-/// [ns] nine clock pulses and a STOP by hand, the mux's reset, the peripheral set up again.
+/// \[ns\] nine clock pulses and a STOP by hand, the mux's reset, the peripheral set up again.
 const RECOVERY: Nanos = 200_000;
 
 /// Waits until `at` since power-on.

@@ -20,12 +20,12 @@ use crate::part::Nanos;
 
 #[derive(Default)]
 struct Clock {
-    /// [ns] since the unit's clock started.
+    /// \[ns\] since the unit's clock started.
     now: Nanos,
     alarms_us: BTreeSet<u64>,
-    /// [ns] when the unit's clock started, since power-on.
+    /// \[ns\] when the unit's clock started, since power-on.
     started: Nanos,
-    /// [us] what the unit's clock says more than it should.
+    /// \[us\] what the unit's clock says more than it should.
     ahead_us: i64,
     /// The processor runs in a circle.
     hung: bool,
@@ -62,7 +62,7 @@ pub fn start(started: Nanos) {
     });
 }
 
-/// [ns] since power-on.
+/// \[ns\] since power-on.
 pub fn since_power_on() -> Nanos {
     CLOCK.with_borrow(|clock| clock.started + clock.now)
 }

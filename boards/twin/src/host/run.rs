@@ -21,16 +21,16 @@ use crate::{
     run::{Bench, Fault, Flow, Scheduled},
 };
 
-/// [ns] how often the bench is asked for commands.
+/// \[ns\] how often the bench is asked for commands.
 const STEP: Nanos = 20_000_000;
 
-/// [ns] the independent watchdog's nominal time.
+/// \[ns\] the independent watchdog's nominal time.
 const WATCHDOG: Nanos = 1_000_000_000;
 
 /// What a host run says of itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HostReport {
-    /// [ns] virtual time flown.
+    /// \[ns\] virtual time flown.
     pub flown: Nanos,
     /// Resets and when they struck.
     pub resets: Vec<(Nanos, ResetCause)>,

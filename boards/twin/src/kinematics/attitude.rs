@@ -34,7 +34,7 @@ impl Attitude {
         }
     }
 
-    /// Turned by `angle` [rad] about `axis` of the body as it was before the turn.
+    /// Turned by `angle` \[rad\] about `axis` of the body as it was before the turn.
     ///
     /// With R the turn: `w = R' w_before + axis a'` and, as `d/dt (R' w) = R' w' + (R' w) x (axis a')`,
     /// `w' = R' w_before' + (R' w_before) x (axis a') + axis a''`.

@@ -107,7 +107,7 @@ impl Profile {
         self.knot(within_s, last.value + 0.5 * (last.rate + rate) * within_s, rate)
     }
 
-    /// [s] when the schedule ends.
+    /// \[s\] when the schedule ends.
     pub fn end_s(&self) -> f64 {
         self.last().t_s
     }

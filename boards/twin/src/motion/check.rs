@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::Motion;
 
-/// [s] half the step of the difference quotients.
+/// \[s\] half the step of the difference quotients.
 const H: f64 = 1e-4;
 /// Truncation of the quotients, relative to the largest rate (for `w`) and acceleration (for `w'`) of the motion: both
 /// change on scales of 0.1 s or more, so (H / 0.1)^2 / 6 with a margin for pieces that meet within one step.

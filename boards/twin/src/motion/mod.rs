@@ -62,7 +62,7 @@ pub struct Named {
     world: fn() -> AnyWorld,
 }
 
-/// [s] on the pad before lift-off, long enough for alignment and gyro bias at rest.
+/// \[s\] on the pad before lift-off, long enough for alignment and gyro bias at rest.
 const PAD_WAIT_S: f64 = 30.0;
 
 /// All motions, each at its default site.

@@ -23,9 +23,9 @@ pub enum Axis {
 /// Where the table stands before it turns, and which axis turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// [deg] axis 1.
+    /// \[deg\] axis 1.
     pub inner_deg: f64,
-    /// [deg] axis 2.
+    /// \[deg\] axis 2.
     pub outer_deg: f64,
     /// The axis that turns.
     pub turns: Axis,
@@ -65,17 +65,17 @@ pub struct Plateau {
     pub position: usize,
     /// [rad/s] rate of the table, in b.
     pub rate_nb_b: Vector3<f64>,
-    /// [s] when it begins.
+    /// \[s\] when it begins.
     pub from_s: f64,
-    /// [s] when it ends.
+    /// \[s\] when it ends.
     pub to_s: f64,
 }
 
-/// [s] to move between positions; the longest way is 270 deg.
+/// \[s\] to move between positions; the longest way is 270 deg.
 const MOVE_S: f64 = 3.0;
-/// [s] at rest before and after turning in a position.
+/// \[s\] at rest before and after turning in a position.
 const DWELL_S: f64 = 2.0;
-/// [s] from rest to the rate, and twice that from one sense to the other.
+/// \[s\] from rest to the rate, and twice that from one sense to the other.
 const RAMP_S: f64 = 1.0;
 
 /// The table working through its positions.

@@ -65,14 +65,14 @@ impl Recorded {
         }
     }
 
-    /// [s] its usual step between attitudes: the median.
+    /// \[s\] its usual step between attitudes: the median.
     pub fn step_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.attitude.t_s().windows(2).map(|pair| pair[1] - pair[0]).collect();
         let middle = steps.len() / 2;
         *steps.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// [s] where the instrument lost sight: from the last attitude before to the first after, where these are more than
+    /// \[s\] where the instrument lost sight: from the last attitude before to the first after, where these are more than
     /// one and a half usual steps apart.
     pub fn lost_s(&self) -> Vec<(f64, f64)> {
         let longest = 1.5 * self.step_s();
@@ -80,7 +80,7 @@ impl Recorded {
         neighbours.filter(|(before, after)| after - before > longest).collect()
     }
 
-    /// [s] its first and last attitude.
+    /// \[s\] its first and last attitude.
     pub fn span_s(&self) -> (f64, f64) {
         self.attitude.span_s()
     }

@@ -58,9 +58,9 @@ impl Turn {
     }
 }
 
-/// [s] at rest before the first turn and between turns.
+/// \[s\] at rest before the first turn and between turns.
 const REST_S: f64 = 5.0;
-/// [s] a turn.
+/// \[s\] a turn.
 const TURN_S: f64 = 2.0;
 
 /// A rotation test: a list of turns, one after the other.

@@ -60,17 +60,17 @@ impl Levels {
 struct Tone {
     /// [rad/s]
     omega: f64,
-    /// [rad]
+    /// \[rad\]
     phase: f64,
 }
 
 /// Tones of a component: their sum is near enough to normal.
 const TONES: usize = 16;
-/// [Hz] between these, evenly in the logarithm.
+/// \[Hz\] between these, evenly in the logarithm.
 const BAND_HZ: (f64, f64) = (5.0, 120.0);
-/// [Hz] of the motor.
+/// \[Hz\] of the motor.
 const MOTOR_HZ: f64 = 55.0;
-/// [s] after lift-off: when it is thrust, transonic, and back in air; as [`super::SoundingRocket`].
+/// \[s\] after lift-off: when it is thrust, transonic, and back in air; as [`super::SoundingRocket`].
 const THRUST_S: [(f64, f64); 2] = [(0.0, 12.0), (15.0, 38.2)];
 const TRANSONIC_S: (f64, f64) = (6.0, 9.0);
 const AIR_S: f64 = 53.0;

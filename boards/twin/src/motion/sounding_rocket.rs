@@ -19,7 +19,7 @@ use super::{Attitude, Motion, Pose};
 
 /// [m/s2] the unit of the specific-force schedules below.
 const G0: f64 = 9.80665;
-/// [s] after lift-off: first-stage burn-out, second-stage ignition and burn-out, yo-yo, begin and end of
+/// \[s\] after lift-off: first-stage burn-out, second-stage ignition and burn-out, yo-yo, begin and end of
 /// micro-gravity, parachute, end of the motion.
 const BURN_OUT_1_S: f64 = 12.0;
 const IGNITION_2_S: f64 = 15.0;
@@ -179,7 +179,7 @@ mod tests {
         }
     }
 
-    /// Altitude [m] and vertical speed [m/s], upwards, `flown_s` after lift-off, by integrating the force it feels.
+    /// Altitude \[m\] and vertical speed [m/s], upwards, `flown_s` after lift-off, by integrating the force it feels.
     fn altitudes() -> Vec<(f64, f64, f64)> {
         let (world, step) = (flight(), 0.05);
         let (mut height, mut speed) = (0.0, 0.0);

@@ -41,12 +41,12 @@ impl<const N: usize> Spline<N> {
         Self::natural(self.samples.clone().map(|value| values.next().unwrap_or(value)))
     }
 
-    /// [s] first and last sample.
+    /// \[s\] first and last sample.
     pub fn span_s(&self) -> (f64, f64) {
         self.samples.span_s()
     }
 
-    /// [s] the instants of the samples.
+    /// \[s\] the instants of the samples.
     pub fn t_s(&self) -> &[f64] {
         self.samples.t_s()
     }

@@ -9,11 +9,11 @@ use std::f64::consts::{PI, SQRT_2};
 use super::{Attitude, Motion, Pose};
 use super::{Jet, Profile};
 
-/// [s] at rest before it begins.
+/// \[s\] at rest before it begins.
 const REST_S: f64 = 10.0;
-/// [s] from rest to the full tumble.
+/// \[s\] from rest to the full tumble.
 const BEGIN_S: f64 = 5.0;
-/// (amplitude [rad], angular frequency [rad/s]); peak rates 75, 47 and 88 deg/s, together within the gyros' range.
+/// (amplitude \[rad\], angular frequency [rad/s]); peak rates 75, 47 and 88 deg/s, together within the gyros' range.
 const YAW: (f64, f64) = (PI, 0.42);
 const PITCH: (f64, f64) = (1.2, 0.42 * GOLDEN_RATIO);
 const ROLL: (f64, f64) = (2.6, 0.42 * SQRT_2);

@@ -14,9 +14,9 @@ pub use converter::Measurand;
 /// [counts of 1.8315 mV] the supply, 5.00 V.
 const SUPPLY: u16 = 2730;
 
-/// [ns] after power or reset during which nothing is answered.
+/// \[ns\] after power or reset during which nothing is answered.
 const START_UP_NS: Nanos = 220_000_000;
-/// [ns] chip select must be high between frames (timing specifications, fast mode).
+/// \[ns\] chip select must be high between frames (timing specifications, fast mode).
 const STALL_NS: Nanos = 9_000;
 
 const SUPPLY_OUT: u8 = 0x02;
@@ -85,7 +85,7 @@ impl Adis16265 {
         part
     }
 
-    /// [ns] when its latest frame ended, 0 before the first.
+    /// \[ns\] when its latest frame ended, 0 before the first.
     pub fn latest_frame(&self) -> Nanos {
         self.deselected_at
     }

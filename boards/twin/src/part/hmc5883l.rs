@@ -17,7 +17,7 @@ pub const ADDRESS: u8 = 0x1E;
 
 /// [counts/G] by GN of CRB (gain settings).
 const GAIN: [f64; 8] = [1370.0, 1090.0, 820.0, 660.0, 440.0, 390.0, 330.0, 230.0];
-/// [ns] between measurements by DO of CRA: 0.75, 1.5, 3, 7.5, 15, 30, 75 Hz; the last code is reserved.
+/// \[ns\] between measurements by DO of CRA: 0.75, 1.5, 3, 7.5, 15, 30, 75 Hz; the last code is reserved.
 const PERIOD_NS: [u64; 8] = [
     1_333_333_333,
     666_666_667,
@@ -28,18 +28,18 @@ const PERIOD_NS: [u64; 8] = [
     13_333_333,
     13_333_333,
 ];
-/// [uT] of one gauss.
+/// \[uT\] of one gauss.
 const GAUSS_UT: f64 = 100.0;
-/// [uT] field of the self-test strap (self-test operation). The field measured just before is subtracted.
+/// \[uT\] field of the self-test strap (self-test operation). The field measured just before is subtracted.
 const SELF_TEST_UT: Vector3<f64> = Vector3::new(1.16 * GAUSS_UT, 1.16 * GAUSS_UT, 1.08 * GAUSS_UT);
 /// Sent for an axis beyond the converter (data output registers).
 const OVERFLOW: i16 = -4096;
 
-/// [ns] one measurement.
+/// \[ns\] one measurement.
 const MEASUREMENT_NS: Nanos = 6_000_000;
-/// [ns] power-on to the first measurement (operational examples).
+/// \[ns\] power-on to the first measurement (operational examples).
 const TURN_ON_NS: Nanos = 56_000_000;
-/// [ns] RDY is clear before new data are placed.
+/// \[ns\] RDY is clear before new data are placed.
 const WRITING_NS: Nanos = 250_000;
 
 const CRA: u8 = 0;
@@ -56,7 +56,7 @@ const ALL_SIX: u8 = 0x3F;
 enum Activity {
     /// Measures by its clock, having made measurement `latest`.
     Continuous { clock: ConversionClock, latest: i64 },
-    /// Makes one measurement, complete at this instant [ns].
+    /// Makes one measurement, complete at this instant \[ns\].
     Single { due: Nanos },
     /// Nothing.
     Idle,
@@ -85,7 +85,7 @@ pub struct Hmc5883l {
 }
 
 impl Hmc5883l {
-    /// A part in the field `field_p_ut` [uT], powered at time 0.
+    /// A part in the field `field_p_ut` \[uT\], powered at time 0.
     pub fn new(field_p_ut: Input<Vector3<f64>>, specimen: Specimen<3>) -> Self {
         let mut part = Hmc5883l {
             field_p_ut,

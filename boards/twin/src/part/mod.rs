@@ -13,7 +13,7 @@ pub mod tmp102;
 
 use std::sync::Arc;
 
-/// [ns] since power-on.
+/// \[ns\] since power-on.
 pub type Nanos = u64;
 
 /// A physical quantity at a time [s since power-on]; how truth enters a part.

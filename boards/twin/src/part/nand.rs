@@ -28,13 +28,13 @@ pub use self::{
 };
 use super::Nanos;
 
-/// [ns] a latch cycle (tRC, tWC 50 ns, and what the FSMC adds).
+/// \[ns\] a latch cycle (tRC, tWC 50 ns, and what the FSMC adds).
 pub const CYCLE: Nanos = 60;
-/// [ns] page to register, tR at most.
+/// \[ns\] page to register, tR at most.
 pub const READ: Nanos = 15_000;
-/// [ns] program, typical.
+/// \[ns\] program, typical.
 pub const PROGRAM: Nanos = 200_000;
-/// [ns] erase, typical.
+/// \[ns\] erase, typical.
 pub const ERASE: Nanos = 2_000_000;
 /// Command and address cycles of an operation, status included.
 const OVERHEAD_CYCLES: Nanos = 10;
@@ -81,7 +81,7 @@ pub struct Cells {
     pub befalls: Befalls,
     /// Programs and erases begun.
     pub operations: u64,
-    /// [ns] the chip was busy or being talked to.
+    /// \[ns\] the chip was busy or being talked to.
     pub time: Nanos,
     /// Rules that were broken.
     pub breaks: Vec<Break>,

@@ -20,7 +20,7 @@ fn signed(now: Nanos) -> i64 {
     i64::try_from(now).unwrap_or(i64::MAX)
 }
 
-/// [s] of an instant [ns].
+/// \[s\] of an instant \[ns\].
 pub fn seconds(instant_ns: i64) -> f64 {
     instant_ns as f64 * 1e-9
 }
@@ -28,9 +28,9 @@ pub fn seconds(instant_ns: i64) -> f64 {
 /// How a specimen's clock runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
-    /// [periods] phase at the unit's power-on.
+    /// \[periods\] phase at the unit's power-on.
     pub phase: f64,
-    /// [1] its periods over the nominal ones.
+    /// \[1\] its periods over the nominal ones.
     pub stretch: f64,
 }
 
@@ -61,7 +61,7 @@ impl ConversionClock {
         signed(now).saturating_sub(self.phase_ns).div_euclid(self.period_ns)
     }
 
-    /// [ns] instant at which conversion `k` is complete.
+    /// \[ns\] instant at which conversion `k` is complete.
     pub fn instant_ns(&self, k: i64) -> i64 {
         k.saturating_mul(self.period_ns).saturating_add(self.phase_ns)
     }
@@ -85,7 +85,7 @@ pub struct LowPass<const N: usize> {
 }
 
 impl<const N: usize> LowPass<N> {
-    /// `tau_s` [s] time constant, above zero.
+    /// `tau_s` \[s\] time constant, above zero.
     pub fn new(clock: ConversionClock, tau_s: f64) -> Self {
         let period_s = seconds(clock.period_ns);
         let nodes_per_conversion = (period_s / tau_s).ceil().max(1.0);

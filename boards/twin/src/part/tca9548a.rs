@@ -29,7 +29,7 @@ struct Socket {
     written: u8,
     register: u8,
     read: u32,
-    /// [ns] how long it holds SCL low when it is called.
+    /// \[ns\] how long it holds SCL low when it is called.
     stretch: Nanos,
     scl_held_until: Nanos,
     random: Noise,

@@ -13,11 +13,11 @@ use super::{
 /// 7-bit address with ADD0 to ground.
 pub const ADDRESS: u8 = 0x48;
 
-/// [degC] of one count.
+/// \[degC\] of one count.
 const LSB_C: f64 = 0.0625;
-/// [ns] one conversion.
+/// \[ns\] one conversion.
 const CONVERSION_NS: Nanos = 26_000_000;
-/// [ns] between conversions by CR1, CR0: 0.25, 1, 4, 8 Hz.
+/// \[ns\] between conversions by CR1, CR0: 0.25, 1, 4, 8 Hz.
 const PERIOD_NS: [u64; 4] = [4_000_000_000, 1_000_000_000, 250_000_000, 125_000_000];
 
 const CONFIGURATION: usize = 1;
@@ -41,15 +41,15 @@ pub struct Tmp102 {
     /// Bytes of the present transfer so far, the pointer byte not counted; `None` while that one is due.
     transferred: Option<usize>,
     clock: ConversionClock,
-    /// [ns] conversions before this instant are not of the present setting.
+    /// \[ns\] conversions before this instant are not of the present setting.
     since: Nanos,
-    /// [ns] when the last conversion taken into the temperature register was complete.
+    /// \[ns\] when the last conversion taken into the temperature register was complete.
     converted: Option<i64>,
     one_shot: Option<Nanos>,
 }
 
 impl Tmp102 {
-    /// A part at `temperature_c` [degC], powered at time 0.
+    /// A part at `temperature_c` \[degC\], powered at time 0.
     pub fn new(temperature_c: Input<f64>, specimen: Specimen<1>) -> Self {
         let mut part = Tmp102 {
             temperature_c,

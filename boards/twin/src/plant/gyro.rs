@@ -33,7 +33,7 @@ impl Gyro {
         }
     }
 
-    /// [ns] when its latest frame ended, 0 before the first.
+    /// \[ns\] when its latest frame ended, 0 before the first.
     pub fn latest_frame(&self) -> Nanos {
         self.part.latest_frame()
     }

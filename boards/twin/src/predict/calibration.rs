@@ -17,20 +17,20 @@ use crate::channel::{Channel, Kind};
 /// Terms of the drift.
 const DRIFT_TERMS: usize = 8;
 
-/// [s] step of the difference quotient by the instant: motions change over tenths of a second.
+/// \[s\] step of the difference quotient by the instant: motions change over tenths of a second.
 const INSTANT_STEP_S: f64 = 1e-4;
 
-/// [s] of the second: rounding costs it the square.
+/// \[s\] of the second: rounding costs it the square.
 const BEND_STEP_S: f64 = 2e-3;
 
 /// How well the reference and the field are known, one sigma each; zero for exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
-    /// [rad] attitude of the truth instrument.
+    /// \[rad\] attitude of the truth instrument.
     pub attitude_sigma_rad: f64,
-    /// [m] its position.
+    /// \[m\] its position.
     pub position_sigma_m: f64,
-    /// [uT] the field, and how uniform it is.
+    /// \[uT\] the field, and how uniform it is.
     pub field_sigma_ut: f64,
 }
 

@@ -11,16 +11,16 @@ use nalgebra::Vector3;
 use crate::channel::{Channel, Kind, UnitDescription};
 use crate::geometry;
 
-/// [s] between two reads: 118.8 ms over sixteen.
+/// \[s\] between two reads: 118.8 ms over sixteen.
 const READ_S: f64 = 7.425e-3;
 /// [m/s2] of one count of the LIS331HH at 6 g: 3 mg.
 const DIGIT: f64 = 3e-3 * 9.80665;
-/// [uT] of one gauss; the HMC5883L gives 1090 counts for it.
+/// \[uT\] of one gauss; the HMC5883L gives 1090 counts for it.
 const GAUSS_UT: f64 = 100.0;
-/// [s] a cycle.
+/// \[s\] a cycle.
 const CYCLE_S: f64 = 0.2;
 
-/// Nominal unit, each sensor read at its slot [s] after the start of the cycle, in reading order.
+/// Nominal unit, each sensor read at its slot \[s\] after the start of the cycle, in reading order.
 pub fn emems(slot_s: impl Fn(usize) -> f64) -> UnitDescription {
     let mut channels: Vec<Channel> = Vec::new();
     for (slot, sensor) in SENSORS.into_iter().enumerate() {

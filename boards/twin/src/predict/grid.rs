@@ -74,7 +74,7 @@ impl<const N: usize> Grid<N> {
         }
     }
 
-    /// [s] the instants of the samples.
+    /// \[s\] the instants of the samples.
     pub fn nodes_s(&self) -> impl Iterator<Item = f64> {
         (0..self.values.len()).map(|node| self.from_s + node as f64 * self.step_s)
     }

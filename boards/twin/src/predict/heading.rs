@@ -12,14 +12,14 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 /// Follows the angles from attitude to attitude.
 #[derive(Clone, Debug, Default)]
 pub struct Heading {
-    /// [rad] yaw, pitch, roll.
+    /// \[rad\] yaw, pitch, roll.
     angles: Option<Vector3<f64>>,
-    /// [rad] the first yaw.
+    /// \[rad\] the first yaw.
     start: f64,
 }
 
 impl Heading {
-    /// [rad] turned about the vertical since the first attitude.
+    /// \[rad\] turned about the vertical since the first attitude.
     pub fn follow(&mut self, q_nb: Quaternion<f64>) -> f64 {
         let (roll, pitch, yaw) = UnitQuaternion::from_quaternion(q_nb).euler_angles();
         let told = Vector3::new(yaw, pitch, roll);

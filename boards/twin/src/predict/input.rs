@@ -19,11 +19,11 @@ pub(super) type Filters = Vec<(Kind, f64, Filter)>;
 #[derive(PartialEq)]
 pub(super) struct Look {
     aim: Aim,
-    /// [s] time constant of the second low-pass, or below zero of a lead.
+    /// \[s\] time constant of the second low-pass, or below zero of a lead.
     lag_s: f64,
-    /// [s] time constant of the high-pass.
+    /// \[s\] time constant of the high-pass.
     high_pass_s: Option<f64>,
-    /// [s] when it is read, one instant a cycle.
+    /// \[s\] when it is read, one instant a cycle.
     instants_s: Vec<f64>,
 }
 

@@ -36,13 +36,13 @@ pub struct Scene {
     rate: Grid<3>,
     /// Specific force, angular acceleration, and the products xx yy zz xy xz yz of the rates.
     force: Grid<12>,
-    /// [uT] field in b.
+    /// \[uT\] field in b.
     field: Grid<3>,
-    /// [degC]
+    /// \[degC\]
     temperature: Grid<1>,
     /// Quaternion q_nb and place in n.
     pose: Grid<7>,
-    /// [rad] turned about the vertical.
+    /// \[rad\] turned about the vertical.
     heading: Grid<1>,
 }
 

@@ -104,9 +104,9 @@ pub enum Fault {
     TimeNotIncreasing {
         /// Where.
         line: u64,
-        /// [s] the time there.
+        /// \[s\] the time there.
         t_s: f64,
-        /// [s] the time in the line before.
+        /// \[s\] the time in the line before.
         previous_s: f64,
     },
     /// Some but not all cells of one vector or quaternion are empty.
@@ -152,19 +152,19 @@ pub enum Fault {
     TooCoarse {
         /// Where.
         line: u64,
-        /// [deg] between the neighbours.
+        /// \[deg\] between the neighbours.
         degrees: f64,
     },
     /// A window that leaves nothing.
     #[error("{from_s} to {to_s} s leaves nothing of it; it lasts from {first_s} to {last_s} s")]
     EmptyWindow {
-        /// [s] begin of the window.
+        /// \[s\] begin of the window.
         from_s: f64,
-        /// [s] its end.
+        /// \[s\] its end.
         to_s: f64,
-        /// [s] first sample.
+        /// \[s\] first sample.
         first_s: f64,
-        /// [s] last sample.
+        /// \[s\] last sample.
         last_s: f64,
     },
 }

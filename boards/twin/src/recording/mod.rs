@@ -1,6 +1,6 @@
 //! A real recording of a nine-axis unit as truth.
 //!
-//! In: CSV or CSV.GZ with `t_s`, `gyr_x..z` [rad/s], `acc_x..z` [m/s2, specific force: +g upwards at rest], `mag_x..z` [uT]
+//! In: CSV or CSV.GZ with `t_s`, `gyr_x..z` [rad/s], `acc_x..z` [m/s2, specific force: +g upwards at rest], `mag_x..z` \[uT\]
 //! and optionally `temperature_c`; other columns are ignored, empty cells are no sample. Out: [`Truth`] at any time, so
 //! that the twin projects what a real unit felt onto the four plates. Refuses what [`Fault`] lists.
 //!
@@ -31,7 +31,7 @@ pub use table::{Located, MAX_BYTES, MAX_ROWS, Table};
 
 use crate::truth::{Truth, TruthSource};
 
-/// [degC] of a recording without a temperature: room.
+/// \[degC\] of a recording without a temperature: room.
 const ROOM_C: f64 = 25.0;
 
 const GYRO: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
@@ -55,13 +55,13 @@ pub struct Recording {
 /// What one of a file's units is in ours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// [s]
+    /// \[s\]
     pub time: f64,
     /// [rad/s]
     pub rate: f64,
     /// [m/s2]
     pub force: f64,
-    /// [uT]
+    /// \[uT\]
     pub field: f64,
 }
 

@@ -19,7 +19,7 @@ impl<const N: usize> Series<N> {
         (t_s.len() >= 2 && t_s.len() == values.len() && in_order).then_some(Self { t_s, values })
     }
 
-    /// [s] the instants.
+    /// \[s\] the instants.
     pub fn t_s(&self) -> &[f64] {
         &self.t_s
     }
@@ -29,7 +29,7 @@ impl<const N: usize> Series<N> {
         &self.values
     }
 
-    /// [s] first and last instant.
+    /// \[s\] first and last instant.
     pub fn span_s(&self) -> (f64, f64) {
         (self.t_s[0], self.t_s[self.t_s.len() - 1])
     }

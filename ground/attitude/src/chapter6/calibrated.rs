@@ -40,19 +40,19 @@ use twin::{
 use super::flown;
 use crate::log::Cycle;
 
-/// [s] at rest before a motion begins. Noise is a function of the time since power-on: from here on it is none that a
+/// \[s\] at rest before a motion begins. Noise is a function of the time since power-on: from here on it is none that a
 /// rotation test has, the longer of which takes 89 s, so no test is flown with the noise its parameters were fitted to.
 pub(super) const LATER_S: f64 = 100.0;
 
-/// [deg/s] of the rate table (Table 4.2), and [s] each way.
+/// [deg/s] of the rate table (Table 4.2), and \[s\] each way.
 const RATE_DEG_S: f64 = 200.0;
 const PLATEAU_S: f64 = 10.0;
-/// [s] of a plateau after which the low-pass of a gyro has settled, and how long it is looked at: five whole turns, over
+/// \[s\] of a plateau after which the low-pass of a gyro has settled, and how long it is looked at: five whole turns, over
 /// which the Earth's rate across the axis is zero in the mean.
 const SETTLE_S: f64 = 0.5;
 const TURNS_S: f64 = 9.0;
 
-/// [s] half of what is looked at of a rest, but for the second in which the table would turn about.
+/// \[s\] half of what is looked at of a rest, but for the second in which the table would turn about.
 const HALF_REST_S: f64 = 1.0;
 
 /// Random attitudes.
@@ -233,7 +233,7 @@ impl<M: Motion> Motion for Later<M> {
     }
 }
 
-/// [counts] mean of every channel, in the order of [`CHANNELS`]; `None` for one that was never read.
+/// \[counts\] mean of every channel, in the order of [`CHANNELS`]; `None` for one that was never read.
 struct Means(Vec<Option<f64>>);
 
 impl Means {

@@ -25,10 +25,10 @@ use twin::{
 
 use crate::log::{Cycle, Cycles};
 
-/// [ns] a second.
+/// \[ns\] a second.
 const S: f64 = 1e9;
 
-/// [s] from one rest to the next, and how long a rest lasts, of which half a second at its ends is not looked at.
+/// \[s\] from one rest to the next, and how long a rest lasts, of which half a second at its ends is not looked at.
 const TURN_AND_REST_S: f64 = 7.0;
 const REST_S: f64 = 5.0;
 const MARGIN_S: f64 = 0.5;
@@ -80,7 +80,7 @@ pub fn cycles(motion: impl Motion + 'static, seed: u64) -> Vec<Cycle> {
     listener.heard
 }
 
-/// [s] since power-on at an instant of the unit's clock.
+/// \[s\] since power-on at an instant of the unit's clock.
 pub fn t_s(us: u64) -> f64 {
     (us as f64 * 1e3 + BOOT as f64) * 1e-9
 }
@@ -151,7 +151,7 @@ impl Estimated<'_> {
         sent.all(|(sent, own)| sent == own)
     }
 
-    /// Errors of the rate [deg/s], of TRIAD and of the filter [deg].
+    /// Errors of the rate [deg/s], of TRIAD and of the filter \[deg\].
     pub fn errors(&self) -> [Errors; 3] {
         let (mut rate, mut triad, mut filter) = (Errors::default(), Errors::default(), Errors::default());
         let earth_n = Environment::laboratory().earth_rate_n();

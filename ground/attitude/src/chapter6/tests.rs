@@ -69,7 +69,7 @@ fn no_test_is_flown_with_the_noise_its_parameters_were_fitted_to() {
     }
 }
 
-/// [counts] five sigmas of the least sure bias, a gyro's: 2.68 counts, 45 samples a run, 24 runs.
+/// \[counts\] five sigmas of the least sure bias, a gyro's: 2.68 counts, 45 samples a run, 24 runs.
 const BIAS_COUNTS: f64 = 0.41;
 
 #[test]

@@ -48,7 +48,7 @@ pub struct Bounded {
 /// One averaging time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Averaging time [s].
+    /// Averaging time \[s\].
     pub tau_s: f64,
     /// Power law there, as far as it can be told.
     pub law: Option<PowerLaw>,
@@ -61,7 +61,7 @@ pub struct Row {
 pub struct Analysis {
     /// Its column.
     pub name: String,
-    /// Sampling interval [s].
+    /// Sampling interval \[s\].
     pub step_s: f64,
     /// Samples used.
     pub used: usize,

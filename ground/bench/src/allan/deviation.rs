@@ -74,7 +74,7 @@ impl MeanSquare {
 pub struct Point {
     /// Averaging factor.
     pub factor: usize,
-    /// Averaging time [s].
+    /// Averaging time \[s\].
     pub tau_s: f64,
     disjoint: MeanSquare,
     second: MeanSquare,

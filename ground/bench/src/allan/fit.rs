@@ -6,7 +6,7 @@
 //! The variance of the sum is the sum of the variances (IEEE 952, annex C), linear in the squared coefficients. They
 //! are fitted by least squares, each point weighted by the uncertainty the fit itself predicts for it: weights from the
 //! measured values would favour those that came out low by chance. The uncertainty of the squared coefficients follows from the
-//! [`covariance`] of the points, which share most of their windows; as sums of squares they are nearly chi-squared, with
+//! covariance of the points, which share most of their windows; as sums of squares they are nearly chi-squared, with
 //! the degrees of freedom their uncertainty implies (Satterthwaite), which is where the intervals come from.
 //!
 //! All terms asked for stay in the fit, seen or not, and may come out negative: only then is every coefficient unbiased and

@@ -18,7 +18,7 @@ const SMOOTH: f64 = 0.6;
 /// Range of the means over the sigma of one mean of white samples: 4096 means of white noise have 8.
 const FAR: f64 = 12.0;
 
-/// [s] the slowest filter of the parts (ADIS16265: 64 taps at 256 Hz): means over less of its output are alike without motion.
+/// \[s\] the slowest filter of the parts (ADIS16265: 64 taps at 256 Hz): means over less of its output are alike without motion.
 const SHORTEST_S: f64 = 0.25;
 
 /// Blocks in a record: fewer leave their correlation open.

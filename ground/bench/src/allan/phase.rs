@@ -27,7 +27,7 @@ pub enum Input {
 
 /// The angle on a uniform grid [input unit, times seconds if it was a rate].
 pub struct Phase {
-    /// Sampling interval [s].
+    /// Sampling interval \[s\].
     pub step_s: f64,
     /// Angle at every step.
     pub angle: Vec<f64>,

@@ -1,6 +1,6 @@
 //! A record from a laboratory's file.
 //!
-//! In: a [`Table`] with one column a gyro and, if there is one, a column of times [s]. Out: a [`Series`] for each column.
+//! In: a [`Table`] with one column a gyro and, if there is one, a column of times \[s\]. Out: a [`Series`] for each column.
 //! Empty cells are gaps.
 //!
 //! Refuses columns it does not find, a file without times unless the sampling rate is given, columns that never change,
@@ -17,9 +17,9 @@ const TIMES: [&str; 7] = ["t_s", "t", "time_s", "time", "tempo", "tempo_s", "x_v
 pub struct Selection {
     /// Columns of values; all but the times if empty.
     pub columns: Vec<String>,
-    /// Column of times [s].
+    /// Column of times \[s\].
     pub time: Option<String>,
-    /// Sampling rate [Hz] of a file without times.
+    /// Sampling rate \[Hz\] of a file without times.
     pub rate_hz: Option<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! A record on a uniform grid of time, with its gaps.
 //!
-//! In: times [s] and values of one column. Out: [`Series`], a value for every step of the grid and the ranges of steps
+//! In: times \[s\] and values of one column. Out: [`Series`], a value for every step of the grid and the ranges of steps
 //! that were not measured. A step of time within [`JITTER`] of a whole number of sampling intervals is that many
 //! intervals; more than one of them is a gap.
 //!
@@ -23,7 +23,7 @@ pub const LEAST_VALUES: usize = 16;
 /// Values on a uniform grid; inside `gaps` they were not measured and mean nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Sampling interval [s].
+    /// Sampling interval \[s\].
     pub step_s: f64,
     /// One value a step.
     pub values: Vec<f64>,
@@ -45,9 +45,9 @@ pub enum GridError {
     Backwards {
         /// Row of the later time.
         row: usize,
-        /// Time of the row before [s].
+        /// Time of the row before \[s\].
         before: f64,
-        /// Its own time [s].
+        /// Its own time \[s\].
         after: f64,
     },
     /// A step between two samples of the grid.
@@ -58,9 +58,9 @@ pub enum GridError {
     NotUniform {
         /// Row of the later time.
         row: usize,
-        /// Time since the row before [s].
+        /// Time since the row before \[s\].
         step_s: f64,
-        /// Median interval [s].
+        /// Median interval \[s\].
         interval_s: f64,
     },
     /// More gap than record.
@@ -88,7 +88,7 @@ impl Series {
         })
     }
 
-    /// A record with a time stamp [s] for every value.
+    /// A record with a time stamp \[s\] for every value.
     pub fn stamped(times_s: &[f64], values: &[f64]) -> Result<Self, GridError> {
         check_finite(times_s)?;
         check_finite(values)?;

@@ -31,12 +31,12 @@ pub enum Term {
     Ramp,
     /// Exponentially correlated rate; its coefficient is the standard deviation.
     Markov {
-        /// Correlation time [s].
+        /// Correlation time \[s\].
         time_s: f64,
     },
     /// Periodic rate; its coefficient is the amplitude.
     Sinusoid {
-        /// Frequency [Hz].
+        /// Frequency \[Hz\].
         frequency_hz: f64,
     },
 }

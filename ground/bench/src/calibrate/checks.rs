@@ -12,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 /// calibrations of real units are 1 to 4 % off (Marinho 2017, Eq 4.40). Twice the specification is another part or unit.
 const SCALE: f64 = 0.2;
 
-/// [deg] The thesis' worst axis is 1.3 deg off where it was built in; exchanged ones are 53 deg off at least.
+/// \[deg\] The thesis' worst axis is 1.3 deg off where it was built in; exchanged ones are 53 deg off at least.
 const AXIS_DEG: f64 = 5.0;
 
 /// Scatter beyond this many of the sigmas that the table states: sigmas of runs differ by a factor of two or three (Table 7.4

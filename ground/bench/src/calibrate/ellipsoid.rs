@@ -31,7 +31,7 @@ pub struct Arguments {
     /// The three channels x, y, z, separated by commas
     #[arg(long, value_delimiter = ',', required = true)]
     channels: Vec<String>,
-    /// Strength of the field [uT], or gravity [m/s2], or in a unit of its own: 0.232gauss, 23200nT, 1g
+    /// Strength of the field (uT), or gravity (m/s2), or in a unit of its own: 0.232gauss, 23200nT, 1g
     #[arg(long, value_name = "NUMBER[UNIT]", value_parser = strength)]
     strength: Strength,
     /// Points are the means of stretches at rest of at least this many samples
@@ -190,7 +190,7 @@ fn kind_of(name: &str, sensor: Option<&str>) -> Option<Kind> {
     }
 }
 
-/// [deg] angles between a triad's axes beyond which it is none: what the unit takes at most, and twice its worst (Table 6.1).
+/// \[deg\] angles between a triad's axes beyond which it is none: what the unit takes at most, and twice its worst (Table 6.1).
 const MOST_ANGLE_DEG: f64 = 10.0;
 
 /// Noise of a point as a share of the field: what is left is no sphere. The parts' noise is 0.1 to 1 %.

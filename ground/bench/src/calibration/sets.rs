@@ -39,7 +39,7 @@ pub struct Unit {
     /// Unit file to write
     #[arg(long = "refined", alias = "out", value_name = "FILE")]
     out: PathBuf,
-    /// Temperature the twin's parameters hold at [degC]; without it each channel's reference
+    /// Temperature the twin's parameters hold at (degC); without it each channel's reference
     #[arg(
         long = "temperature-c",
         alias = "temperature",

@@ -22,19 +22,19 @@ pub struct Arguments {
     /// Nominal unit (unit.toml): axes and noise
     #[arg(long, value_name = "FILE")]
     unit: PathBuf,
-    /// Time on the table [min]
+    /// Time on the table (min)
     #[arg(long)]
     minutes: f64,
-    /// Time a run is measured for [s]
+    /// Time a run is measured for (s)
     #[arg(long = "run-s", alias = "run", value_name = "S", default_value_t = 60.0)]
     run: f64,
-    /// Time between two runs [s]
+    /// Time between two runs (s)
     #[arg(long = "between-s", alias = "between", value_name = "S", default_value_t = 20.0)]
     between: f64,
     /// Rate of the runs [deg/s]
     #[arg(long = "rate-deg-s", alias = "rate", value_name = "DEG/S", default_value_t = 200.0)]
     rate: f64,
-    /// Steps of the table's angles [deg]
+    /// Steps of the table's angles (deg)
     #[arg(long = "step-deg", alias = "step", value_name = "DEG", default_value_t = 30.0)]
     step: f64,
     /// What is wanted, separated by commas

@@ -1,7 +1,7 @@
 //! Where a gyro stands in a multi-position test, and what the Earth does to it there.
 //!
 //! In: the angles of a table whose middle axis is horizontal and points east and whose inner axis carries the gyro's
-//! spin axis; the latitude. Out: gravity [g] and the Earth's rate [deg/h] along the gyro's axes `(x, y, spin)`, right-handed.
+//! spin axis; the latitude. Out: gravity \[g\] and the Earth's rate [deg/h] along the gyro's axes `(x, y, spin)`, right-handed.
 //!
 //! With middle angle `b` the spin axis is `cos b` up and `sin b` north; the inner angle `a` turns `x`, `y` about it,
 //! from `x` in the meridian plane. The spin axis is polar, along the Earth's rotation, at `b = 90 deg - latitude`, or
@@ -14,7 +14,7 @@ pub const EARTH_RATE: f64 = 15.041068639;
 /// Gravity and the Earth's rate along the gyro's axes `x`, `y`, spin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// Direction of gravity times its size [g]: `(0, 0, -1)` with the spin axis up.
+    /// Direction of gravity times its size \[g\]: `(0, 0, -1)` with the spin axis up.
     pub gravity: [f64; 3],
     /// Rate the gyro turns at [deg/h].
     pub rate: [f64; 3],
@@ -48,7 +48,7 @@ impl Position {
     }
 }
 
-/// Inner and middle angles [deg] of 24 positions that determine all that can be: the spin axis up, north, down and south
+/// Inner and middle angles \[deg\] of 24 positions that determine all that can be: the spin axis up, north, down and south
 /// with inner steps of a right angle, and eight polar positions with inner angles between those, without which the
 /// product of the two sensitive axes stays unexcited.
 pub fn twenty_four(latitude_deg: f64) -> Vec<(f64, f64)> {

@@ -181,7 +181,7 @@ pub fn turn_on(found: &Spread) -> Section {
     )
 }
 
-/// Decay time constant [s].
+/// Decay time constant \[s\].
 pub fn decay(time_s: f64) -> Section {
     plain(
         "Decay",

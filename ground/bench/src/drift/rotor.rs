@@ -1,7 +1,7 @@
 //! A dry-tuned gyro's rotor: decay time constant, tuning speed, figure of merit.
 //!
 //! In: peaks of the free pick-off oscillation; periods of that oscillation at several spin speeds. Out: time constant
-//! [s], tuning speed [Hz], figure of merit.
+//! \[s\], tuning speed \[Hz\], figure of merit.
 //!
 //! ```text
 //! A(t) = A_0 exp(-t / tau)                          tau = (t2 - t1) / ln(A1 / A2) for two peaks
@@ -34,7 +34,7 @@ pub enum RotorError {
     Undetermined,
 }
 
-/// Decay time constant [s] from peaks `(time [s], amplitude)` of one sign.
+/// Decay time constant \[s\] from peaks `(time [s], amplitude)` of one sign.
 pub fn decay_time(peaks: &[(f64, f64)]) -> Result<f64, RotorError> {
     if peaks.len() < 2 {
         return Err(RotorError::TooFew {
@@ -60,11 +60,11 @@ pub fn decay_time(peaks: &[(f64, f64)]) -> Result<f64, RotorError> {
 /// What periods at several speeds say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// Tuning speed [Hz].
+    /// Tuning speed \[Hz\].
     pub speed_hz: f64,
     /// Figure of merit.
     pub merit: f64,
-    /// Root mean square of what the line leaves, in oscillation frequency [Hz].
+    /// Root mean square of what the line leaves, in oscillation frequency \[Hz\].
     pub residual_hz: f64,
 }
 
@@ -106,7 +106,7 @@ pub fn tuning(speeds: &[(f64, f64)]) -> Result<Tuning, RotorError> {
         .ok_or(RotorError::Undetermined)
 }
 
-/// Figure of merit from two periods [s] at known distances [Hz] from the tuning speed.
+/// Figure of merit from two periods \[s\] at known distances \[Hz\] from the tuning speed.
 pub fn merit(period1_s: f64, detuning1_hz: f64, period2_s: f64, detuning2_hz: f64) -> Result<f64, RotorError> {
     let merit = period1_s * period2_s * (detuning1_hz - detuning2_hz) / (period2_s - period1_s);
     if merit.is_finite() {

@@ -39,15 +39,15 @@ pub struct Interval {
 /// Drift stability, in the record's unit (rate) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stability {
-    /// Deviation of the white noise of one sample [rate].
+    /// Deviation of the white noise of one sample \[rate\].
     pub white: Interval,
-    /// Deviation of a step of the walk over a sampling interval [rate]; its `high` alone means something if it was not seen.
+    /// Deviation of a step of the walk over a sampling interval \[rate\]; its `high` alone means something if it was not seen.
     pub walk_step: Interval,
     /// Whether the walk was seen.
     pub is_walk_seen: bool,
     /// Ramp [rate/s]; zero may lie within.
     pub ramp: Interval,
-    /// Sampling interval [s].
+    /// Sampling interval \[s\].
     pub step_s: f64,
 }
 

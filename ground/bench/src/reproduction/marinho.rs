@@ -89,7 +89,7 @@ fn gyro_positions(sources: &Sources<'_>) -> Result<Reproduced, ReproductionError
     })
 }
 
-/// Equation 4.23 [(deg/s)/count], rows x_e y_e z_e, and the biases of Eqs 4.21 and 4.22 [counts].
+/// Equation 4.23 [(deg/s)/count], rows x_e y_e z_e, and the biases of Eqs 4.21 and 4.22 \[counts\].
 fn eq_4_23() -> (SMatrix<f64, 3, 4>, Vector4<f64>) {
     let matrix = SMatrix::<f64, 3, 4>::from_row_slice(&[
         -0.0180, -0.0181, -0.0176, 0.0559, -0.0005, -0.0442, 0.0451, 0.0002, -0.0516, 0.0260, 0.0254, 0.0001,

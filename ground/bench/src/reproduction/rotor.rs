@@ -9,7 +9,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use super::{Line, Reproduced, ReproductionError, Sources};
 use crate::drift::{rotor, stability::stability};
 
-/// The record's length [samples] and interval [s]: 24 h at 0.2 Hz.
+/// The record's length \[samples\] and interval [s]: 24 h at 0.2 Hz.
 const SAMPLES: usize = 17_280;
 const STEP_S: f64 = 5.0;
 

@@ -24,9 +24,9 @@ pub struct Moved {
     pub channel: String,
     /// Relative change of scale.
     pub scale: Change,
-    /// Change of bias [counts].
+    /// Change of bias \[counts\].
     pub bias: Change,
-    /// Angle between the axes [rad]; its sigma is that of a turn about one axis.
+    /// Angle between the axes \[rad\]; its sigma is that of a turn about one axis.
     pub axis_rad: Change,
     /// Mahalanobis distance of all parameters and their number; `None` where the sets model temperature differently or
     /// a covariance is singular.

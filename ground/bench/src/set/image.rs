@@ -54,11 +54,11 @@ pub enum ImageError {
     Bend {
         /// The channel.
         channel: String,
-        /// Largest relative deviation [%].
+        /// Largest relative deviation \[%\].
         percent: f64,
-        /// From [degC].
+        /// From \[degC\].
         low: f64,
-        /// To [degC].
+        /// To \[degC\].
         high: f64,
     },
     /// No temperature all channels hold at.

@@ -35,7 +35,7 @@ pub struct Pair {
     pub own: (twin::effect::Cause, Vec<f64>),
     /// Its rival.
     pub rival: twin::effect::Cause,
-    /// [nats] they differ by on this log.
+    /// \[nats\] they differ by on this log.
     pub nats: f64,
 }
 

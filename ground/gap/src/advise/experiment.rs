@@ -21,10 +21,10 @@ use crate::{
     thresholds::TOLD_APART,
 };
 
-/// [s] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
+/// \[s\] of every motion of the catalogue that counts: comparable between them, and no longer than a shift.
 const LONGEST_S: f64 = 600.0;
 
-/// [s] step at which a motion is tabulated.
+/// \[s\] step at which a motion is tabulated.
 const STEP_S: f64 = 0.01;
 
 /// A motion that can be ordered.

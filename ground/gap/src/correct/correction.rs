@@ -139,7 +139,7 @@ fn bend(active: &Active, starts_s: &[f64]) -> f64 {
     }
 }
 
-/// [K] by which a parabola over the log's temperatures has the slope of a line: the unit's set has no bent scale.
+/// \[K\] by which a parabola over the log's temperatures has the slope of a line: the unit's set has no bent scale.
 fn skew_k(twin: &Twin) -> f64 {
     let standard_c = twin.environment().temperature_c;
     let above_k = twin.feels(0).into_iter().map(|feel| feel.temperature_c - standard_c);

@@ -32,10 +32,10 @@ const NEAR_ONE_G: f64 = 0.1;
 /// Least over largest eigenvalue of `S'S` from which three axes count as independent: axes within 6 deg of a plane do not.
 const INDEPENDENT: f64 = 0.01;
 
-/// [s] put before all times: the filter's clock has no negative times.
+/// \[s\] put before all times: the filter's clock has no negative times.
 const EPOCH_S: f64 = 1e4;
 
-/// [s] a longer hole is no increment but a gap.
+/// \[s\] a longer hole is no increment but a gap.
 const LONGEST_STEP_S: f64 = 1.0;
 
 /// How a channel answers to what it feels.
@@ -51,9 +51,9 @@ pub struct Response {
     pub bias_per_k2: f64,
     /// Relative change of the sensitivity per kelvin.
     pub scale_per_k: f64,
-    /// [s] how much older a reading is than described.
+    /// \[s\] how much older a reading is than described.
     pub delay_s: f64,
-    /// [m] place in b.
+    /// \[m\] place in b.
     pub lever_m: Vector3<f64>,
 }
 
@@ -75,7 +75,7 @@ impl Response {
 /// What readings say, one entry a row.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
-    /// Force [m/s2], rate [rad/s], field [uT] in b.
+    /// Force [m/s2], rate [rad/s], field \[uT\] in b.
     pub vectors: [Vec<Option<Vector3<f64>>>; 3],
     /// TRIAD's attitude.
     pub triad: Vec<Option<UnitQuaternion<f64>>>,

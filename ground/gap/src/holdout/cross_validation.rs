@@ -29,9 +29,9 @@ const BLOCKS: usize = 10;
 /// What cross-validation says of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// [nats] by how much left-out blocks are better predicted.
+    /// \[nats\] by how much left-out blocks are better predicted.
     pub gain: f64,
-    /// [nats] its standard error.
+    /// \[nats\] its standard error.
     pub error: f64,
 }
 

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{holdout::events::Events, input::hold::Held, thresholds::SMALLEST_EXCESS};
 
-/// [s] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
+/// \[s\] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
 
 /// Bootstrap samples: the 2.5 % quantile then stands on 25 of them.
@@ -33,7 +33,7 @@ pub(super) const SEED: u64 = 0x5eed_0004;
 /// Predictions of every row of the log, channel by channel in physical units, made without the held-out samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Finished<'a> {
-    /// [s] start of each row.
+    /// \[s\] start of each row.
     pub start_s: &'a [f64],
     /// Standard deviation of a sample as the nominal twin has it.
     pub sigmas: &'a [Vec<f64>],
@@ -193,7 +193,7 @@ mod tests {
 
     const ROWS: usize = 3000;
 
-    /// [s]
+    /// \[s\]
     const CYCLE_S: f64 = 0.2;
 
     /// Rounding of sums over some thousand terms.

@@ -137,7 +137,7 @@ mod tests {
         input::log::Series,
     };
 
-    /// [s]
+    /// \[s\]
     const CYCLE_S: f64 = 0.2;
 
     const ROWS: usize = 1000;

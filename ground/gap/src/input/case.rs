@@ -1,6 +1,6 @@
 //! A gap case: one folder with what a unit logged, what it was made to do, and what its designers believed of it.
 //!
-//! In: the folder, or its `case.toml`. Out: [`Case`], whose log is already parted into what may be fitted
+//! In: the folder, or its `case.toml`. Out: [`Subject`], whose log is already parted into what may be fitted
 //! ([`crate::input::windows::Fit`]) and what only judges ([`crate::input::hold::Held`]).
 //!
 //! Refuses, naming file and key: a missing file, a key that is absent or of the wrong type, windows that are empty,
@@ -138,9 +138,9 @@ pub struct MotionKnown {
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Matters {
-    /// [deg] of attitude.
+    /// \[deg\] of attitude.
     pub attitude_deg: Option<f64>,
-    /// [sigma] of the gap.
+    /// \[sigma\] of the gap.
     pub gap_sigma: Option<f64>,
 }
 
@@ -150,20 +150,20 @@ pub struct Matters {
 pub struct Surroundings {
     /// [m/s2] local gravity.
     pub gravity_m_s2: Option<f64>,
-    /// [deg] geographic latitude.
+    /// \[deg\] geographic latitude.
     pub latitude_deg: Option<f64>,
-    /// [uT] geomagnetic field, in n.
+    /// \[uT\] geomagnetic field, in n.
     pub field_n_ut: Option<[f64; 3]>,
-    /// [uT] how well that field is known and how uniform it is.
+    /// \[uT\] how well that field is known and how uniform it is.
     #[serde(default)]
     pub field_sigma_ut: f64,
-    /// [uT] how much it changes during the log.
+    /// \[uT\] how much it changes during the log.
     pub field_wander_sigma_ut: Option<f64>,
-    /// [s] over which it stays alike.
+    /// \[s\] over which it stays alike.
     pub field_correlation_s: Option<f64>,
     /// [uT/m] how much it changes with the place.
     pub field_gradient_sigma_ut_m: Option<f64>,
-    /// [degC] temperature at which the nominal parameters hold.
+    /// \[degC\] temperature at which the nominal parameters hold.
     pub temperature_c: Option<f64>,
     /// Why the earth's rate is left out of the prediction of a rate table, in words; of the format, and not read: without the
     /// attitude against north no such prediction is made.
@@ -174,12 +174,12 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceSigmas {
-    /// [rad] of its attitude.
+    /// \[rad\] of its attitude.
     #[serde(default)]
     pub attitude_sigma_rad: f64,
-    /// [s] over which its error stays alike.
+    /// \[s\] over which its error stays alike.
     pub attitude_correlation_s: Option<f64>,
-    /// [m] of its position.
+    /// \[m\] of its position.
     #[serde(default)]
     pub position_sigma_m: f64,
 }

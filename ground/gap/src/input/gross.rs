@@ -31,7 +31,7 @@ pub struct Contradicted {
 pub struct Repeat {
     /// Its index in the unit.
     pub channel: usize,
-    /// [1] largest relative change of its answer between two repeats of a command.
+    /// \[1\] largest relative change of its answer between two repeats of a command.
     pub change: f64,
 }
 

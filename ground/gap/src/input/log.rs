@@ -84,7 +84,7 @@ pub struct Stream {
 /// A whole log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
-    /// [s] start of each row's cycle, rising.
+    /// \[s\] start of each row's cycle, rising.
     pub start_s: Vec<f64>,
     /// In the unit's channel order.
     pub channels: Vec<Series>,

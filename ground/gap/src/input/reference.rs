@@ -15,14 +15,14 @@ use twin::{
     predict::{Accuracy, Kind, Twin},
 };
 
-/// [Hz] corners to which the record is smoothed, of attitude and position.
+/// \[Hz\] corners to which the record is smoothed, of attitude and position.
 const CORNERS_HZ: [f64; 2] = [20.0, 10.0];
 
 /// Error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated on the
 /// spot, it is 1.3 to 1.7, for small errors and large ones, and 0.6 to 0.9 for specific forces.
 const BELOW: f64 = 1.6;
 
-/// [s] to either side over which an error is as large.
+/// \[s\] to either side over which an error is as large.
 const ALIKE_S: f64 = 0.15;
 
 /// [s^2] how its record answers to motion, as its second derivative: it is filtered, or what it sees bends against the unit,
@@ -39,7 +39,7 @@ pub struct Reference {
     fast: Vec<Vec<f64>>,
     /// What the octave above holds, channel by channel, of unit variance everywhere.
     records: Vec<Rc<[f64]>>,
-    /// [s] between its samples.
+    /// \[s\] between its samples.
     step_s: f64,
 }
 

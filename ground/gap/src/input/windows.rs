@@ -10,7 +10,7 @@ use crate::input::{
     log::{Log, Series},
 };
 
-/// [s] from (in) and to (out).
+/// \[s\] from (in) and to (out).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     /// First instant in it.

@@ -58,7 +58,7 @@ impl Hypothesis {
         }
     }
 
-    /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants [s];
+    /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants \[s\];
     /// `None` where there are none.
     pub fn values_between(&self, starts_s: &[f64]) -> Option<Vec<f64>> {
         let mut values = self.cause.effect.between(starts_s);

@@ -7,13 +7,13 @@ use twin::predict::{Channel, Column, Kind, Twin};
 
 use crate::input::reference::Reference;
 
-/// [s] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
+/// \[s\] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
 const GYRO_PERIOD_S: f64 = 1.0 / 256.0;
 
-/// [s] between a thermometer's, by its own clock (TMP102, SBOS397).
+/// \[s\] between a thermometer's, by its own clock (TMP102, SBOS397).
 const THERMOMETER_PERIOD_S: f64 = 0.25;
 
-/// [s] between the conversions of a channel's part by its own clock; 0 where it has none that is known of. A reading is up
+/// \[s\] between the conversions of a channel's part by its own clock; 0 where it has none that is known of. A reading is up
 /// to half of it older or younger than described, and that evenly, so a stated sigma is a period over the root of 12.
 pub fn conversion_period_s(channel: &Channel) -> f64 {
     let stated = channel.instant_sigma_s.map(|sigma_s| sigma_s * 12f64.sqrt());
@@ -24,7 +24,7 @@ pub fn conversion_period_s(channel: &Channel) -> f64 {
     })
 }
 
-/// [s] how well the instant of a channel is known: as its description says, or as its part lets anyone know it. A
+/// \[s\] how well the instant of a channel is known: as its description says, or as its part lets anyone know it. A
 /// thermometer is described as read at once, and is up to a whole period older.
 pub fn instant_sigma_s(channel: &Channel) -> f64 {
     let spread = match (channel.sensor, channel.instant_sigma_s) {

@@ -40,7 +40,7 @@ pub struct Estimate {
     pub parameters: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// [nats] over the model with all of them zero.
+    /// \[nats\] over the model with all of them zero.
     pub log_evidence: f64,
     /// `s'I^-1 s` with the prior included: how far the misfit falls.
     pub energy_explained: f64,
@@ -87,7 +87,7 @@ impl Screen {
         estimate.log_evidence.is_finite().then_some(estimate)
     }
 
-    /// [nats] over the model without them, of all columns: what [`Screen::estimate`] says, for a third of the work.
+    /// \[nats\] over the model without them, of all columns: what [`Screen::estimate`] says, for a third of the work.
     pub fn log_evidence(&self) -> Option<f64> {
         let all: Vec<usize> = (0..self.prior_sigmas.len()).collect();
         let (factor, mut score) = self.factored(&all)?;
@@ -96,7 +96,7 @@ impl Screen {
         log_evidence.is_finite().then_some(log_evidence)
     }
 
-    /// [nats] over the model without them, of all columns, each part, the columns of one effect, being of any size.
+    /// \[nats\] over the model without them, of all columns, each part, the columns of one effect, being of any size.
     pub fn of_any_size(&self, parts: impl IntoIterator<Item = Range<usize>>) -> Option<f64> {
         let mut settled = self.clone();
         let of_other_sizes = settled.settle(parts);

@@ -9,12 +9,12 @@ use crate::input::windows::Span;
 pub struct Interval {
     /// The stretch, or one of those.
     pub stretch: Span,
-    /// [s] after which it comes again; `None` for once.
+    /// \[s\] after which it comes again; `None` for once.
     pub every_s: Option<f64>,
 }
 
 impl Interval {
-    /// Whether it is on at an instant [s].
+    /// Whether it is on at an instant \[s\].
     pub fn contains(self, t_s: f64) -> bool {
         match self.every_s {
             Some(every_s) => (t_s - self.stretch.from).rem_euclid(every_s) < self.stretch.to - self.stretch.from,

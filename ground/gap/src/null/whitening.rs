@@ -21,14 +21,14 @@ pub enum Process {
     Matern {
         /// Standard deviation.
         sigma: f64,
-        /// [s] over which it stays alike.
+        /// \[s\] over which it stays alike.
         alike_s: f64,
     },
     /// Covariance `sigma^2 exp(-|dt| / alike_s)` (Ornstein-Uhlenbeck).
     Alike {
         /// Standard deviation.
         sigma: f64,
-        /// [s] over which it stays alike.
+        /// \[s\] over which it stays alike.
         alike_s: f64,
     },
     /// A walk from zero.
@@ -106,7 +106,7 @@ pub fn places(processes: &[Process]) -> (Vec<usize>, usize) {
 /// One sample.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// [s] when; not before the sample before it.
+    /// \[s\] when; not before the sample before it.
     pub t_s: f64,
     /// States that it sees ([`places`]), and how much of each.
     pub sees: Vec<(usize, f64)>,

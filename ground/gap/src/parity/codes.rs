@@ -24,7 +24,7 @@ const LEAST: usize = 64;
 /// Axes of a part that are taken together: one repeats too often by chance.
 const AXES: usize = 3;
 
-/// Noise over a code [1] from which a channel cannot stand still by chance: one code then holds at most 0.90 of the samples,
+/// Noise over a code \[1\] from which a channel cannot stand still by chance: one code then holds at most 0.90 of the samples,
 /// [`LEAST`] of them in a row with probability 0.002.
 const RESTLESS: f64 = 0.3;
 
@@ -37,7 +37,7 @@ pub struct Finding {
     pub channels: Vec<usize>,
     /// In words.
     pub what: String,
-    /// [counts] step of the codes that are there, for lost bits.
+    /// \[counts\] step of the codes that are there, for lost bits.
     pub step: Option<i64>,
 }
 
@@ -144,7 +144,7 @@ fn parts(unit: &UnitDescription, kind: Kind) -> Vec<Vec<usize>> {
     unit.groups().into_iter().map(own).collect()
 }
 
-/// [counts] what all codes of each channel lie apart, where that is more than one.
+/// \[counts\] what all codes of each channel lie apart, where that is more than one.
 fn lost_bits(log: &Log, unit: &UnitDescription) -> Vec<Option<i64>> {
     let of = |(channel, series): (&Channel, &Series)| {
         if !sends_codes(channel) || series.values.len() < LEAST {

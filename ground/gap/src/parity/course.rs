@@ -19,22 +19,22 @@ use crate::{
     parity::spline::{Sample, Spline},
 };
 
-/// [s] between the states of the scene; no part has a faster low-pass than some of these.
+/// \[s\] between the states of the scene; no part has a faster low-pass than some of these.
 const STEP_S: f64 = 0.02;
 
-/// [s] before the first and after the last row: low-passes begin at rest.
+/// \[s\] before the first and after the last row: low-passes begin at rest.
 const MARGIN_S: f64 = 1.0;
 
-/// [s] least distance of knots: faster logs resolve no more of a body's motion than this.
+/// \[s\] least distance of knots: faster logs resolve no more of a body's motion than this.
 const KNOT_S: f64 = 0.05;
 
-/// [s] over which the attitude follows gravity and field.
+/// \[s\] over which the attitude follows gravity and field.
 const TURNS_TOWARDS_S: f64 = 5.0;
 
 /// Part of gravity within which the specific force is taken for it.
 const STEADY: f64 = 0.1;
 
-/// How far neighbouring coefficients may be off a line: rates [rad/s], forces [m/s2], fields [uT], temperatures [degC]. Far above
+/// How far neighbouring coefficients may be off a line: rates [rad/s], forces [m/s2], fields \[uT\], temperatures \[degC\]. Far above
 /// the noise of a packet, so that the motion bends as it likes where it is seen.
 const BENDS: [f64; 4] = [1.0, 5.0, 5.0, 0.02];
 
@@ -45,7 +45,7 @@ const FLOORS: [f64; 2] = [1.0, 0.2];
 /// Times the second difference: a derivative may be off by so many times what it changes from knot to knot.
 const WIDER: f64 = 3.0;
 
-/// [s] to either side over which a motion is as lively.
+/// \[s\] to either side over which a motion is as lively.
 const ALIKE_S: f64 = 2.0;
 
 /// The motion as the packets tell it.

@@ -52,7 +52,7 @@ pub struct Name {
     pub channels: Vec<usize>,
     /// Against all others and nothing.
     pub probability: f64,
-    /// [nats]; none of what codes say.
+    /// \[nats\]; none of what codes say.
     pub gain: Option<f64>,
     /// Ratio by parity, at plausible size and at the size found; none of what codes say.
     pub snr: Option<[f64; 2]>,
@@ -72,7 +72,7 @@ pub struct Findings {
     pub rows: usize,
     /// Degrees of freedom a packet that the motion leaves: gyros, accelerometers, magnetometers, thermometers.
     pub free: [f64; 4],
-    /// [sigma] before anything is named, and after.
+    /// \[sigma\] before anything is named, and after.
     pub gap: [f64; 2],
     /// Name and gap of each channel, before.
     pub channels: Vec<(String, f64)>,

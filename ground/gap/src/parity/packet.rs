@@ -146,7 +146,7 @@ pub fn slopes_of(problem: &Problem, channel: usize, packet: usize) -> [f64; UNKN
     )
 }
 
-/// [s] the middle of a packet's slots.
+/// \[s\] the middle of a packet's slots.
 fn middle_s(problem: &Problem) -> f64 {
     let channels = &problem.twin.unit().channels;
     channels.iter().map(|channel| channel.slot_s).sum::<f64>() / channels.len() as f64

@@ -50,7 +50,7 @@ pub struct Chosen {
     pub theta: DVector<f64>,
     /// Theirs.
     pub covariance: DMatrix<f64>,
-    /// [nats] over the model without it.
+    /// \[nats\] over the model without it.
     pub gain: f64,
     /// Ratio at plausible size by parity.
     pub snr: f64,

@@ -12,7 +12,7 @@ const RIDGE: f64 = 1e-12;
 /// A reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const N: usize> {
-    /// [s] when.
+    /// \[s\] when.
     pub t_s: f64,
     /// Along what.
     pub direction: SVector<f64, N>,

@@ -42,7 +42,7 @@ pub struct Cause {
     pub probability: f64,
     /// Its part of the probability that it or any that could stand in its place is there.
     pub of_any: f64,
-    /// [nats] over the model without it.
+    /// \[nats\] over the model without it.
     pub gain: f64,
     /// Its parameters.
     pub parameters: Vec<Sized>,

@@ -111,7 +111,7 @@ pub struct Promised {
     pub confidence: f64,
     /// How far it was believed before.
     believed: f64,
-    /// [nats] what it explained there.
+    /// \[nats\] what it explained there.
     gain: f64,
 }
 

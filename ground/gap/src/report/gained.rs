@@ -4,10 +4,10 @@
 //! Out: words. A percentage is of what lies above the floor. Where that is next to nothing it is a division by chance, so
 //! sigmas are said instead; beyond the floor it is all of the way.
 
-/// [%] width of an interval beyond which its percentage says nothing: all that there is.
+/// \[%\] width of an interval beyond which its percentage says nothing: all that there is.
 const WIDEST: f64 = 100.0;
 
-/// [%] a ceiling below which there is nothing to have a share of.
+/// \[%\] a ceiling below which there is nothing to have a share of.
 const LEAST_CEILING: f64 = 1.0;
 
 /// In words: `97.5 % [95.2, 100.0] of at most 100.0 %`, or the sigmas gained.

@@ -42,7 +42,7 @@ const NEAR: f64 = 0.4;
 pub struct Walk {
     /// Channels, and in each of them the walk [rad/s per sqrt(s)].
     pub channels: Vec<(usize, f64)>,
-    /// [nats] over no walk, prices paid.
+    /// \[nats\] over no walk, prices paid.
     pub gain: f64,
     effect: &'static dyn Effect,
 }
@@ -182,7 +182,7 @@ fn sigmas(size: f64) -> impl Iterator<Item = f64> {
     (0..TERMS).map(move |term| size / place(term))
 }
 
-/// [nats] by which a walk of this size makes a log likelier.
+/// \[nats\] by which a walk of this size makes a log likelier.
 fn gain(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> f64 {
     let sigmas = DVector::from_iterator(TERMS, sigmas(size));
     let own = DMatrix::from_fn(TERMS, TERMS, |row, column| {

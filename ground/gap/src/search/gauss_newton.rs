@@ -19,10 +19,10 @@ use crate::{
 /// Gauss-Newton steps: four suffice for the strongest effect tried; eight leave room.
 const STEPS: usize = 8;
 
-/// [nats] that are not worth another step.
+/// \[nats\] that are not worth another step.
 const CONVERGED: f64 = 0.05;
 
-/// [nats] above which the slopes are worth renewing.
+/// \[nats\] above which the slopes are worth renewing.
 const CURVED: f64 = 1.0;
 
 /// Part of what a set explains that is not worth a step, or new slopes: where effects explain a hundred thousand nats, no
@@ -36,7 +36,7 @@ pub struct Refined {
     pub thetas: Vec<DVector<f64>>,
     /// Of the linear problem there: parameters in the order of the reference's columns, then the set's.
     pub estimate: Estimate,
-    /// [nats] relative to the same reference for every set.
+    /// \[nats\] relative to the same reference for every set.
     pub log_evidence: f64,
     /// Columns there, in the same order.
     pub slopes: Vec<Entries>,
@@ -136,9 +136,9 @@ pub fn model_of(library: &Library, set: &[usize], thetas: &[DVector<f64>]) -> Ve
 /// The problem made linear at some parameters.
 struct Point {
     estimate: Estimate,
-    /// [nats] the evidence of a prior about zero, were these parameters the best.
+    /// \[nats\] the evidence of a prior about zero, were these parameters the best.
     log_evidence: f64,
-    /// [nats] what the linear problem's optimum promises beyond these parameters.
+    /// \[nats\] what the linear problem's optimum promises beyond these parameters.
     to_gain: f64,
 }
 

@@ -22,7 +22,7 @@ use crate::{
 /// Phases into which a period is folded.
 const PHASES: usize = 24;
 
-/// [s] the shortest period; the longest comes three times in the fitted time, so that it is seen to come again.
+/// \[s\] the shortest period; the longest comes three times in the fitted time, so that it is seen to come again.
 const SHORTEST_S: f64 = 4.0;
 const FEWEST: f64 = 3.0;
 
@@ -34,7 +34,7 @@ const ROUNDS: usize = 6;
 
 /// The residuals of the channels that an effect touches.
 struct Folded<'a> {
-    /// [s] instants of the rows of the log.
+    /// \[s\] instants of the rows of the log.
     starts_s: &'a [f64],
     channels: Vec<Touched<'a>>,
     sigmas: &'a [f64],
@@ -113,7 +113,7 @@ impl<'a> Folded<'a> {
         }
     }
 
-    /// [s] instants of a channel's samples.
+    /// \[s\] instants of a channel's samples.
     fn instants_s(&self, channel: &Touched) -> impl Iterator<Item = f64> {
         let rows = channel.frame.series.rows.iter();
         rows.map(|row| self.starts_s[*row as usize])
@@ -193,7 +193,7 @@ impl<'a> Folded<'a> {
         self.screen(&piece)
     }
 
-    /// [nats] what parameters that are fitted to some parts together explain of each.
+    /// \[nats\] what parameters that are fitted to some parts together explain of each.
     fn gains(&self, parts: Vec<Screen>) -> Option<Vec<f64>> {
         let mut whole = Screen::zeros(self.sigmas.to_vec());
         for part in &parts {

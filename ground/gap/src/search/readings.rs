@@ -7,7 +7,7 @@
 //! because a latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its
 //! evidence, after the price of its prior odds, is above nothing by [`EFFECT_MARGIN`] nats; each chosen one is then tried against
 //! all rivals in its place, and dropped if the rest can do without it. An effect that comes and goes is screened with the
-//! stretch of time in which it explains most ([`onset`]): one that is on for a quarter of the log looks like a step of
+//! stretch of time in which it explains most (`intervals`): one that is on for a quarter of the log looks like a step of
 //! another if it has to be on throughout.
 
 mod chosen;

@@ -15,7 +15,7 @@ use crate::null::{model::Model, problem::Problem};
 pub struct Recalibrated {
     /// [physical unit] at every row of the log.
     pub predicted: Vec<f64>,
-    /// [nats] that its calibration is likelier by than the model's.
+    /// \[nats\] that its calibration is likelier by than the model's.
     pub gain: f64,
 }
 

@@ -42,7 +42,7 @@ pub struct Scatter {
     pub channels: Vec<usize>,
     /// Parameters of each of them.
     pub thetas: Vec<Vec<f64>>,
-    /// [nats] over the nominal scatter, prices paid.
+    /// \[nats\] over the nominal scatter, prices paid.
     pub gain: f64,
     /// What each of them was before it, at every row; nothing where it does not say.
     pub beneath: Vec<Vec<Beneath>>,

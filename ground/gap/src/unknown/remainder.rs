@@ -63,7 +63,7 @@ pub struct Remainder {
     pub unit: &'static str,
     /// The same in sigma of a sample of its channels.
     pub sigma: [f64; 3],
-    /// [deg] the same as attitude; `None` where it has no direct effect on that.
+    /// \[deg\] the same as attitude; `None` where it has no direct effect on that.
     pub attitude_deg: Option<[f64; 3]>,
     /// Probability that it is there and above the bar.
     pub matters: f64,
@@ -178,7 +178,7 @@ fn off(problem: &Problem, place: Where, errors: &SlowErrors) -> f64 {
     }
 }
 
-/// [deg] of attitude that one unit makes.
+/// \[deg\] of attitude that one unit makes.
 fn degrees(problem: &Problem, place: Where) -> Option<f64> {
     let environment = problem.twin.environment();
     if place == Where::Rotation {

@@ -18,9 +18,9 @@ const POINTS: usize = 1500;
 pub struct Trace {
     /// Its channel.
     pub name: String,
-    /// ([s], [sigma]) by the nominal twin.
+    /// (\[s\], \[sigma\]) by the nominal twin.
     pub before: Vec<(f64, f64)>,
-    /// ([s], [sigma]) with effect and calibration in.
+    /// (\[s\], \[sigma\]) with effect and calibration in.
     pub after: Vec<(f64, f64)>,
 }
 

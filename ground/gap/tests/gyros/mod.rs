@@ -16,7 +16,7 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
 use written::written;
 
-/// [s] of the log, at [`RATE_HZ`].
+/// \[s\] of the log, at [`RATE_HZ`].
 pub const SECONDS: usize = 240;
 
 pub const RATE_HZ: usize = 5;
@@ -39,7 +39,7 @@ pub fn rate(t_s: f64) -> f64 {
     W / 2.0 * (W * t_s).sin()
 }
 
-/// Three gyros along the axes of b, turning about z; gz reads `error` [rad/s] of the time [s] too much, and its description has
+/// Three gyros along the axes of b, turning about z; gz reads `error` [rad/s] of the time \[s\] too much, and its description has
 /// these keys too.
 pub fn erring(error: impl Fn(f64) -> f64, keys_of_gz: &str) -> TempDir {
     erring_in(11, error, keys_of_gz)

@@ -7,7 +7,7 @@
 //! [`LONGEST_GAP`] are taken as missed packets; any other step is a jump (the unit was powered anew, or two streams
 //! were joined), after which numbers go on by one, since nobody knows how long it took.
 
-/// [s] nominal read cycle, one packet each.
+/// \[s\] nominal read cycle, one packet each.
 pub const CYCLE_S: f64 = 0.2;
 
 /// Missed packets that are still believed: one hour at 5 Hz.

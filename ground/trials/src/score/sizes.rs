@@ -83,7 +83,7 @@ fn error(judged: &Judged, named: &Named) -> Option<f64> {
     (whole > 0.0).then(|| f64::sqrt(off / whole))
 }
 
-/// [%] by which what a verdict states of its causes lets the held-out gap shrink: `p` parameters known to `SNR^2`, the sum of
+/// \[%\] by which what a verdict states of its causes lets the held-out gap shrink: `p` parameters known to `SNR^2`, the sum of
 /// their squares over their variances, leave `p / SNR^2` of the excess energy (gap.md, section 4.6).
 fn predicted_percent(verdict: &Verdict) -> Option<f64> {
     let floor = verdict.gap.floor;

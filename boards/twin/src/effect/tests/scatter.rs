@@ -173,7 +173,7 @@ fn what_is_beneath_an_effect_on_the_scatter_still_tells_a_zero_that_is_off() {
     let twin = twin(DENSE);
     let predicted = twin.predict(&[]);
     let one = |name: &str| Locality::Channel(name.to_owned());
-    /// [sigma] a zero's error.
+    /// \[sigma\] a zero's error.
     const OFF: f64 = 0.3;
     let injected = [
         ("stale-sample", vec![0.1], 0.0, one("m3x"), 0.8),

@@ -11,23 +11,23 @@ use super::super::{
     signal::{ConversionClock, LowPass, Pace, Specimen, quantise, seconds},
 };
 
-/// [s] of the unit's nominal 12.7 Hz bandwidth.
+/// \[s\] of the unit's nominal 12.7 Hz bandwidth.
 pub const TAU_S: f64 = 1.0 / (TAU * 12.7);
 /// [rad/s] of one count at 320 deg/s; half and a quarter of it in the lower ranges (output data table).
 pub const LSB_RAD_S: f64 = 0.07326 * PI / 180.0;
-/// [counts] of full range in every range: 320 deg/s / 0.07326.
+/// \[counts\] of full range in every range: 320 deg/s / 0.07326.
 const FULL_RANGE: i32 = 4368;
-/// [degC] of one count; code 0 is 25 degC.
+/// \[degC\] of one count; code 0 is 25 degC.
 const LSB_C: f64 = 0.1453;
 const ZERO_C: f64 = 25.0;
-/// [ns] time bases of SMPL_PRD: 2048 and 66 samples per second.
+/// \[ns\] time bases of SMPL_PRD: 2048 and 66 samples per second.
 const TIME_BASE_NS: [f64; 2] = [1e9 / 2048.0, 1e9 / 66.0];
 
 /// What is measured, and with which specimen.
 pub struct Measurand {
     /// [rad/s] about the sense axis.
     pub rate: Input<f64>,
-    /// [degC] of the part.
+    /// \[degC\] of the part.
     pub temperature_c: Input<f64>,
     /// Of the gyro; its pace is that of the sample clock.
     pub rate_specimen: Specimen<1>,
@@ -40,7 +40,7 @@ pub struct Converter {
     clock: ConversionClock,
     low_pass: LowPass<1>,
     latest: i64,
-    /// Rate of the last sample [counts], once worked out.
+    /// Rate of the last sample \[counts\], once worked out.
     rate_counts: Option<i32>,
 }
 

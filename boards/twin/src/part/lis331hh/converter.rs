@@ -14,7 +14,7 @@ use super::super::{
 
 /// [m/s2] of one g, for the datasheet's mg.
 pub const STANDARD_GRAVITY: f64 = 9.80665;
-/// [s] of the unit's nominal 25 Hz bandwidth.
+/// \[s\] of the unit's nominal 25 Hz bandwidth.
 pub const TAU_S: f64 = 1.0 / (TAU * 25.0);
 /// [m/s2] deflection by the self-test actuator: the middle of the data sheet's limits (table 3, Vst), 110, 110 and 295
 /// counts of 3 mg.
@@ -30,7 +30,7 @@ pub struct Converter {
     clock: ConversionClock,
     latest: i64,
     low_pass: LowPass<3>,
-    /// With its time constant [s].
+    /// With its time constant \[s\].
     high_pass: Option<(f64, LowPass<3>)>,
 }
 
@@ -94,7 +94,7 @@ fn sensitivity(ctrl_reg4: u8) -> f64 {
     digit_mg * 1e-3 * STANDARD_GRAVITY
 }
 
-/// [ns] between conversions by PM and DR of CTRL_REG1; `None` in power-down (and for the reserved PM = 111).
+/// \[ns\] between conversions by PM and DR of CTRL_REG1; `None` in power-down (and for the reserved PM = 111).
 fn period_ns(ctrl_reg1: u8) -> Option<u64> {
     let period_us = match (ctrl_reg1 >> 5, ctrl_reg1 >> 3 & 3) {
         (1, 0) => 20_000,

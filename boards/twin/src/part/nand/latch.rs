@@ -14,7 +14,7 @@ const ID: [u8; 2] = [0xEC, 0x76];
 const READY: u8 = 0x40;
 const NOT_PROTECTED: u8 = 0x80;
 const FAIL: u8 = 0x01;
-/// [ns] WP# high before a program or erase command, tWW at least.
+/// \[ns\] WP# high before a program or erase command, tWW at least.
 const WRITABLE_AFTER: Nanos = 100;
 
 /// What data cycles give.
@@ -36,7 +36,7 @@ enum Work {
 }
 
 impl Work {
-    /// [ns] to give it up, tRST at most.
+    /// \[ns\] to give it up, tRST at most.
     fn reset(&self) -> Nanos {
         match self {
             Work::Nothing | Work::Read(_) => 5_000,

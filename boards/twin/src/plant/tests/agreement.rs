@@ -9,11 +9,11 @@ use crate::motion::{Motion, RateTable, RotationTest, SoundingRocket, Still, Tumb
 use crate::part::signal::ConversionClock;
 use crate::predict::{Scene, Twin, emems};
 
-/// [counts] half a count of rounding, and the parts' own low-pass: it takes its input as straight between conversions, which is
+/// \[counts\] half a count of rounding, and the parts' own low-pass: it takes its input as straight between conversions, which is
 /// off by h^2 u''/12, 0.03 counts where the rocket spins at three turns a second.
 const ROUNDING: f64 = 0.5 + 0.03;
 
-/// [ns] between conversions as [`configured`] sets them: 400, 75, 256 and 4 Hz.
+/// \[ns\] between conversions as [`configured`] sets them: 400, 75, 256 and 4 Hz.
 const ACCELEROMETER_NS: u64 = 2_500_000;
 const MAGNETOMETER_NS: u64 = 13_333_333;
 const GYRO_NS: u64 = 3_906_250;
@@ -25,7 +25,7 @@ fn clock<const N: usize>(period_ns: u64, of: Spread, stream: Noise) -> Conversio
     ConversionClock::paced(period_ns, specimen.pace)
 }
 
-/// Largest difference [counts] between what the plant's registers say and the prediction, over all 36 channels.
+/// Largest difference \[counts\] between what the plant's registers say and the prediction, over all 36 channels.
 fn worst<M: Motion + Clone + 'static>(motion: M, environment: Environment, from_s: f64, to_s: f64) -> f64 {
     let scene = Scene::new(&motion, &environment, from_s - 5.0, to_s + 5.0, 0.002);
     let mut plant = configured(Plant::ideal(Arc::new(World { motion, environment })));

@@ -7,7 +7,7 @@ use twin::{
 
 use super::*;
 
-/// [s] of a log.
+/// \[s\] of a log.
 const SECONDS: f64 = 60.0;
 
 /// The unit, read at once and without low-passes, so that a row is an instant.

@@ -10,28 +10,28 @@
 use super::{CaseError, CaseFile, Opened};
 use crate::thresholds::{MATTERS_DEG, MATTERS_SIGMA};
 
-/// [s] over which an attitude error stays alike: fits were 4 to 41, 15 in the middle.
+/// \[s\] over which an attitude error stays alike: fits were 4 to 41, 15 in the middle.
 const ATTITUDE_CORRELATION_S: f64 = 20.0;
 
-/// [uT] and [s] of a field error beside a gradient, and of one that has to hold the gradient too.
+/// \[uT\] and \[s\] of a field error beside a gradient, and of one that has to hold the gradient too.
 const FIELD: [(f64, f64); 2] = [(0.15, 10.0), (0.3, 25.0)];
 
 /// [uT/m] each component of the field's gradient in a room.
 const GRADIENT_UT_M: f64 = 1.5;
 
-/// [s] a longer correlation time is a constant in any log.
+/// \[s\] a longer correlation time is a constant in any log.
 const LONGEST_S: f64 = 1e6;
 
 /// How reference and field err slowly; zero sigmas for exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlowErrors {
-    /// [rad] attitude of the reference, each axis.
+    /// \[rad\] attitude of the reference, each axis.
     pub attitude_sigma_rad: f64,
-    /// [s] over which it stays alike (Matern 3/2).
+    /// \[s\] over which it stays alike (Matern 3/2).
     pub attitude_correlation_s: f64,
-    /// [uT] how much the field changes during the log, each axis.
+    /// \[uT\] how much the field changes during the log, each axis.
     pub field_wander_sigma_ut: f64,
-    /// [s] over which that stays alike (Ornstein-Uhlenbeck).
+    /// \[s\] over which that stays alike (Ornstein-Uhlenbeck).
     pub field_correlation_s: f64,
     /// [uT/m] how much it changes with the place, each component.
     pub field_gradient_sigma_ut_m: f64,
@@ -40,9 +40,9 @@ pub struct SlowErrors {
 /// Sizes from which what is not explained matters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bars {
-    /// [deg] of attitude.
+    /// \[deg\] of attitude.
     pub attitude_deg: f64,
-    /// [sigma] by which the gap grows, in the channels that it is in.
+    /// \[sigma\] by which the gap grows, in the channels that it is in.
     pub gap_sigma: f64,
 }
 

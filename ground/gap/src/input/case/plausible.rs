@@ -9,10 +9,10 @@ use twin::predict;
 
 use crate::input::log::Column;
 
-/// [degC] a bias beyond which a thermometer's zero is elsewhere: no part is that far off (TMP102 3 K, ADIS16265 5 K).
+/// \[degC\] a bias beyond which a thermometer's zero is elsewhere: no part is that far off (TMP102 3 K, ADIS16265 5 K).
 const OTHER_ZERO_C: f64 = 10.0;
 
-/// [degC] a room, where no other thermometer says how warm it is.
+/// \[degC\] a room, where no other thermometer says how warm it is.
 const ROOM_C: f64 = 20.0;
 
 /// Share of samples beyond a part's range before the numbers are in doubt. A clipped one stands at the range and none beyond; a

@@ -22,7 +22,7 @@ use crate::input::{
     windows::{Fit, Span},
 };
 
-/// [counts] what the HMC5883L sends for a field beyond its range (datasheet, table 11).
+/// \[counts\] what the HMC5883L sends for a field beyond its range (datasheet, table 11).
 const MAGNETOMETER_OVERFLOW: i16 = -4096;
 
 /// Share of the windows' rows that the reference must reach over: an optical system may find its markers a few seconds
@@ -32,7 +32,7 @@ const LEAST_SEEN: f64 = 0.9;
 /// Rows that are kept at most: 40 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
 const MOST_ROWS: usize = 12_000;
 
-/// [s] beside a gap of such a reference where it still bends towards what is not known.
+/// \[s\] beside a gap of such a reference where it still bends towards what is not known.
 const BESIDE_GAP_S: f64 = 0.5;
 
 /// A case ready to be diagnosed.

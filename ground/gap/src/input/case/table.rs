@@ -1,7 +1,7 @@
 //! A table of steady positions: what was commanded in each, and what every channel put out.
 //!
 //! In: `table.csv`, one row a position: `seq`, the commanded truth in b (`wx_rad_s` .. `fz_m_s2`; what does not apply is
-//! absent), then for each channel its mean [counts], and optionally `NAME_sigma` and `NAME_n`. Out: [`Table`].
+//! absent), then for each channel its mean \[counts\], and optionally `NAME_sigma` and `NAME_n`. Out: [`Table`].
 //!
 //! `NAME_sigma` is the spread of the samples, not of their mean, and how many there were is often not said: it is checked
 //! and not used. The command is taken for the inertial truth; an Earth rate that matters must be in it.

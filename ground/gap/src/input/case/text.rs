@@ -6,7 +6,7 @@ use twin::keys::meant;
 
 use super::CaseError;
 
-/// [bytes] of one unpacked file: forty hours of 36 channels at 5 Hz are 113 MB.
+/// \[bytes\] of one unpacked file: forty hours of 36 channels at 5 Hz are 113 MB.
 const LARGEST: u64 = 512 << 20;
 
 /// The bytes of a file, unpacked where it is a gzip file.

@@ -13,7 +13,7 @@ pub struct Chosen {
     pub theta: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// [nats] over the model without it, prior odds included.
+    /// \[nats\] over the model without it, prior odds included.
     pub gain: f64,
     /// Hypotheses that could stand in its place, itself among them; best first.
     pub rivals: Vec<Rival>,
@@ -24,7 +24,7 @@ pub struct Chosen {
 pub struct Rival {
     /// Its index.
     pub hypothesis: usize,
-    /// [nats] over the model with neither, prior odds included.
+    /// \[nats\] over the model with neither, prior odds included.
     pub gain: f64,
     /// When it would be on; `None` for always.
     pub span: Option<Interval>,

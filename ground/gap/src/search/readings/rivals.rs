@@ -14,7 +14,7 @@ use crate::{
     search::gauss_newton::{Refined, refine},
 };
 
-/// [nats] behind the chosen effect from which a rival is not worth an exact fit.
+/// \[nats\] behind the chosen effect from which a rival is not worth an exact fit.
 const FAR: f64 = 50.0;
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.

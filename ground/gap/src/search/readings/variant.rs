@@ -19,7 +19,7 @@ const HALVINGS: usize = 10;
 /// Values tried by which two of an effect with values between them are apart at least: either may move some way to the other.
 const APART: usize = 5;
 
-/// [nats] that make another value a better one; where both neighbours are as good but for less, no value between is.
+/// \[nats\] that make another value a better one; where both neighbours are as good but for less, no value between is.
 const SHARPER: f64 = 0.1;
 
 /// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step

@@ -16,7 +16,7 @@ use crate::{
     thresholds::{DRAGGED, REFERENCE_TAILS, SCATTER_NEAR},
 };
 
-/// Steps of expectation and maximisation, and what one must bring [nats].
+/// Steps of expectation and maximisation, and what one must bring \[nats\].
 const STEPS: usize = 5;
 const CONVERGED: f64 = 0.5;
 
@@ -64,7 +64,7 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
     found
 }
 
-/// [nats] the log of some channels if nothing scatters otherwise than described.
+/// \[nats\] the log of some channels if nothing scatters otherwise than described.
 fn nominal(views: &[View]) -> f64 {
     views.iter().map(View::nominal).sum()
 }
@@ -77,7 +77,7 @@ fn by_gain(found: &mut [Scatter]) {
 struct Search<'a> {
     problem: &'a Problem<'a>,
     model: &'a Model,
-    /// [s] instants.
+    /// \[s\] instants.
     instants: Vec<Vec<f64>>,
     /// At every row; NaN where nothing was logged.
     measured: Vec<Vec<f64>>,
@@ -93,7 +93,7 @@ struct Search<'a> {
 /// One block of channels under an effect.
 struct Block {
     theta: Vec<f64>,
-    /// [nats] over the nominal scatter with the model's calibration.
+    /// \[nats\] over the nominal scatter with the model's calibration.
     gain: f64,
     beneath: Vec<Vec<Beneath>>,
 }

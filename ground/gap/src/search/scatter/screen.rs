@@ -45,7 +45,7 @@ const CUT: f64 = 2.0;
 /// Median of the absolute value of a standard normal variable.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// [nats] what a part's own clock explains of a log.
+/// \[nats\] what a part's own clock explains of a log.
 pub fn own_clock(view: &View) -> f64 {
     let sigma_s = instant_sigma_s(view.channel);
     let is_said = view.channel.bits.is_some() || view.channel.instant_sigma_s.is_some();

@@ -36,9 +36,9 @@ const OF_CLOCK: f64 = 0.05;
 /// When a part converts by its own clock.
 #[derive(Clone, Debug)]
 pub struct Clock {
-    /// [s] between conversions.
+    /// \[s\] between conversions.
     pub period_s: f64,
-    /// [s] instant of each sample.
+    /// \[s\] instant of each sample.
     pub instants_s: Vec<f64>,
     /// What a second of age adds to each sample, in units of noise.
     pub slopes: Vec<f64>,
@@ -77,7 +77,7 @@ impl Clock {
         beats(1.0 + OFF) > beats(1.0 - OFF)
     }
 
-    /// [s] between samples.
+    /// \[s\] between samples.
     fn step_s(&self) -> f64 {
         self.instants_s.get(1).map_or(0.0, |second| second - self.instants_s[0])
     }

@@ -36,9 +36,9 @@ const QUANTITIES: [Quantity; 3] = [
 pub struct Cell {
     /// Its channel.
     pub channel: String,
-    /// [s] its stretch of time.
+    /// \[s\] its stretch of time.
     pub from_s: f64,
-    /// [s]
+    /// \[s\]
     pub to_s: f64,
     /// Its regime, in words.
     pub regime: String,
@@ -54,7 +54,7 @@ pub(crate) struct Layout {
     cells_of: Vec<Vec<[u32; QUANTITIES.len()]>>,
     /// Samples in each cell.
     counts: Vec<usize>,
-    /// [s] edges of the stretches.
+    /// \[s\] edges of the stretches.
     edges_s: Vec<f64>,
     /// By quantity, where its middle third begins and ends.
     thirds: [[f64; PARTS - 1]; QUANTITIES.len()],

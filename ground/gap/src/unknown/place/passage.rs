@@ -19,15 +19,15 @@ use crate::{
 /// Stretches that the fit windows are cut into.
 const STRETCHES: usize = 60;
 
-/// [nats] half the 95 % quantile of chi-square with one degree.
+/// \[nats\] half the 95 % quantile of chi-square with one degree.
 const PROFILE: f64 = 1.92;
 
 /// When the gap is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
-    /// [s] when it begins; `None` where it is there from the start.
+    /// \[s\] when it begins; `None` where it is there from the start.
     pub onset: Option<Instant>,
-    /// [s] when it ends; `None` where it is there to the end.
+    /// \[s\] when it ends; `None` where it is there to the end.
     pub end: Option<Instant>,
 }
 
@@ -54,9 +54,9 @@ impl Passage {
 /// An instant with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// [s]
+    /// \[s\]
     pub t_s: f64,
-    /// [s]
+    /// \[s\]
     pub interval_s: [f64; 2],
 }
 

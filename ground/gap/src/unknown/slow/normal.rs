@@ -60,7 +60,7 @@ pub(super) struct Pass<'a> {
     pub phases: &'a [f64],
     /// How many courses.
     pub count: usize,
-    /// [s] a stretch.
+    /// \[s\] a stretch.
     pub step_s: f64,
 }
 
