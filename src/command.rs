@@ -6,6 +6,14 @@
 //! [`HALF_WORD_TIMEOUT_US`]. Each byte costs one bounded step.
 //!
 //! What a word may do when is [`crate::mode`]'s business.
+//!
+//! ```
+//! use emems::command::{Command, Heard, Parser};
+//!
+//! let mut parser = Parser::default();
+//! let heard: Vec<Heard> = b"??G_ST".iter().filter_map(|byte| parser.hear(*byte, 0)).collect();
+//! assert_eq!(heard, [Heard::Command(Command::Status)]);
+//! ```
 
 use heapless::Vec;
 

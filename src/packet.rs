@@ -6,6 +6,16 @@
 //!
 //! Two levels: the field table over the bytes, private to this file, and [`Reading`], which can only hold what a packet
 //! can say. [`decode`] accepts exactly what [`encode`] produces and names the first byte that is anything else.
+//!
+//! ```
+//! use emems::{packet, sample::Reading};
+//!
+//! let mut reading = Reading::unread(7);
+//! reading.gyro[2] = -5;
+//! let bytes = packet::encode(&reading);
+//! assert_eq!(&bytes[..9], b"@0007FFFF");
+//! assert_eq!(packet::decode(&bytes), Ok(reading));
+//! ```
 
 use core::{fmt, ops::Range};
 

@@ -15,6 +15,20 @@
 //!
 //! Refuses vectors that are zero or not finite, and directions closer to each other or to opposition than
 //! [`LEAST_ANGLE_DEG`]: the turn about them is not observable.
+//!
+//! ```
+//! use emems::triad::{Sighting, triad};
+//! use nalgebra::{UnitQuaternion, Vector3};
+//!
+//! let q_nb = UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3);
+//! let sighting = |known_n: Vector3<f32>, seen_sd| Sighting { seen_b: q_nb.inverse() * known_n, known_n, seen_sd, known_sd: 1e-3 };
+//! let force = sighting(Vector3::new(0.0, 0.0, -9.81), 0.005);
+//! let field = sighting(Vector3::new(17.0, 0.3, 41.0), 0.02);
+//! let found = triad(&force, &field).unwrap();
+//! assert!(found.q_nb.angle_to(&q_nb) < 1e-5);
+//! // The field, which is known less well, only says the turn about the force.
+//! assert!(found.covariance_b.trace() > 0.02_f32.powi(2));
+//! ```
 
 use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 

@@ -5,6 +5,13 @@
 //! [`io::ErrorKind::FileTooLarge`] that carries a [`TooLarge`]: more bytes than that, and a gzip file that grows by more
 //! than [`Limits::ratio`] when it is unpacked. Deflate packs up to 1032 to 1 (zlib's technical details), so a file of 2 MB
 //! can hold 2 GiB: the reader stops at the first byte beyond the limit and has unpacked no more than that.
+//!
+//! ```
+//! let bytes = packed::read("../data/motion/warmup-a.csv.gz".as_ref(), 1 << 26)?;
+//! assert!(bytes.starts_with(b"t_s,qw,"));
+//! assert!(packed::read("../data/motion/warmup-a.csv.gz".as_ref(), 100).is_err());
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
 use std::{
     fs::File,

@@ -10,6 +10,29 @@
 //!
 //! [`Adis16265::request`] and [`Adis16265::exchange`] are single frames, for gyros on one bus read interleaved; the caller
 //! leaves [`STALL_US`] between frames to the same part. Everything else leaves that time itself.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::{delay::NoopDelay, spi::{Mock, Transaction}};
+//! use emems::sensor::adis16265::{Adis16265, Range};
+//!
+//! # embassy_futures::block_on(async {
+//! let frame = |sent, answered| {
+//!     [
+//!         Transaction::transaction_start(),
+//!         Transaction::transfer_in_place(vec![sent], vec![answered]),
+//!         Transaction::transaction_end(),
+//!     ]
+//! };
+//! // On a board this is an SPI device of its HAL, with 16-bit words. The answer comes one frame after its request.
+//! let mut spi = Mock::new(&[frame(0x0400, 0), frame(0x5600, 0x889B), frame(0x5600, 16_265)].concat());
+//! let rate = Adis16265::new(spi.clone(), NoopDelay::new()).read_rate().await?;
+//! assert_eq!((rate.counts, rate.fresh), (2203, true));
+//! assert!((f32::from(rate.counts) * Range::default().deg_s_per_count() - 161.39).abs() < 0.01);
+//! # spi.done();
+//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # })
+//! # .unwrap();
+//! ```
 
 use embedded_hal_async::{delay::DelayNs, spi::SpiDevice};
 

@@ -5,6 +5,38 @@
 //! the first byte read until all six are: every path here ends with all six read. Refuses another part, settings that
 //! were not kept, codes the part cannot produce, and a lock that does not open; the first set after a change of settings
 //! was measured with the old gain and is withheld.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+//! use emems::sensor::hmc5883l::{ADDRESS, Config, Hmc5883l};
+//!
+//! # embassy_futures::block_on(async {
+//! let reads = |first, bytes: &[u8], data: [u8; 6]| {
+//!     vec![
+//!         Transaction::transaction_start(ADDRESS),
+//!         Transaction::write(ADDRESS, vec![first]),
+//!         Transaction::read(ADDRESS, bytes.to_vec()),
+//!         Transaction::write(ADDRESS, vec![0x03]),
+//!         Transaction::read(ADDRESS, data.to_vec()),
+//!         Transaction::transaction_end(ADDRESS),
+//!     ]
+//! };
+//! // On a board this is the I2C of its HAL; here it answers to the identity, and then with two sets.
+//! let identity = Transaction::write_read(ADDRESS, vec![0x0A], b"H43".to_vec());
+//! let set = [0x00, 0x78, 0xFF, 0x2E, 0xFF, 0xDD];
+//! let mut bus = Mock::new(&[vec![identity], reads(0x09, &[1], set), reads(0x09, &[1], set)].concat());
+//! let mut magnetometer = Hmc5883l::new(bus.clone());
+//! magnetometer.probe().await?;
+//! // The first set may be of settings before.
+//! assert_eq!(magnetometer.read().await?, None);
+//! let sample = magnetometer.read().await?.unwrap();
+//! let field_ut = sample.counts.map(|counts| 100.0 * f32::from(counts) / f32::from(Config::default().gain.counts_per_gauss()));
+//! assert!((field_ut[0] - 11.01).abs() < 0.01);
+//! # bus.done();
+//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # })
+//! # .unwrap();
+//! ```
 
 use embedded_hal_async::i2c::{I2c, Operation};
 

@@ -4,6 +4,30 @@
 //! part's own data-ready and overrun flags. Source: STMicroelectronics LIS331HH datasheet, section 7 (registers), section
 //! 5.1.1 (bit 7 of the sub-address steps it on). Refuses another part, settings that were not kept, a high-pass filter
 //! left on (gravity would disappear), and words the part cannot produce.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+//! use emems::sensor::lis331hh::{ADDRESS, Config, Lis331hh};
+//!
+//! # embassy_futures::block_on(async {
+//! // On a board this is the I2C of its HAL.
+//! let mut bus = Mock::new(&[
+//!     Transaction::write_read(ADDRESS, vec![0x8F], vec![0x32]), // WHO_AM_I
+//!     Transaction::write(ADDRESS, vec![0xA0, 0x27, 0, 0, 0x80, 0]), // CTRL_REG1 to CTRL_REG5
+//!     Transaction::write_read(ADDRESS, vec![0xA0], vec![0x27, 0, 0, 0x80, 0]),
+//!     Transaction::write_read(ADDRESS, vec![0xA7], vec![0x0F, 0x50, 0xEC, 0x20, 0x00, 0xE0, 0xF9]),
+//! ]);
+//! let config = Config::default();
+//! let mut accelerometer = Lis331hh::new(bus.clone());
+//! accelerometer.configure(config).await?;
+//! let sample = accelerometer.read().await?;
+//! let force_mg = sample.counts.map(|counts| f32::from(counts) * config.full_scale.mg_per_count());
+//! assert_eq!(force_mg, [-945.0, 6.0, -294.0]);
+//! # bus.done();
+//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # })
+//! # .unwrap();
+//! ```
 
 use embedded_hal_async::{delay::DelayNs, i2c::I2c};
 

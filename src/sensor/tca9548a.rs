@@ -7,6 +7,28 @@
 //!
 //! What is selected is known only while every transaction succeeds: a failed or abandoned one makes it unknown, since the
 //! part may have been reset, and the next transaction selects again.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+//! use emems::sensor::{tca9548a::{self, Switch}, tmp102::{self, Tmp102}};
+//!
+//! # embassy_futures::block_on(async {
+//! let start = || Transaction::transaction_start(tmp102::ADDRESS);
+//! let end = || Transaction::transaction_end(tmp102::ADDRESS);
+//! // On a board this is the I2C of its HAL.
+//! let mut bus = Mock::new(&[
+//!     Transaction::write(tca9548a::ADDRESS, vec![1 << 3]),
+//!     start(),
+//!     Transaction::write(tmp102::ADDRESS, vec![0x00]),
+//!     Transaction::read(tmp102::ADDRESS, vec![0x19, 0x00]),
+//!     end(),
+//! ]);
+//! let switch = Switch::new(bus.clone());
+//! // A channel is a bus of its own for every driver.
+//! assert_eq!(Tmp102::new(switch.channel(3)).read().await, Ok(400));
+//! # bus.done();
+//! # });
+//! ```
 
 use core::fmt;
 

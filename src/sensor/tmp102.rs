@@ -4,6 +4,21 @@
 //! SBOS397, sections on the temperature register (tables 3 to 6) and the configuration register (table 7). The part has no
 //! identity register; the bits of its configuration that cannot be written stand in for one. Refuses extended (13-bit)
 //! mode, in which every count would be worth the same but sit one bit lower.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+//! use emems::sensor::tmp102::{ADDRESS, CELSIUS_PER_COUNT, Tmp102};
+//!
+//! # embassy_futures::block_on(async {
+//! // On a board this is the I2C of its HAL.
+//! let mut bus = Mock::new(&[Transaction::write_read(ADDRESS, vec![0x00], vec![0x19, 0x00])]);
+//! let counts = Tmp102::new(bus.clone()).read().await?;
+//! assert_eq!(f32::from(counts) * CELSIUS_PER_COUNT, 25.0);
+//! # bus.done();
+//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # })
+//! # .unwrap();
+//! ```
 
 use embedded_hal_async::i2c::I2c;
 

@@ -1,4 +1,12 @@
 //! The twin: physical truth, the parts at register level, and the host board on which the unit runs in virtual time.
+//!
+//! ```
+//! use twin::effect::{LIBRARY, by_name};
+//!
+//! let page = by_name("lever-arm").expect("in the library").page();
+//! println!("{}: {} Confirm: {}", page.name, page.physics, page.confirm_by);
+//! assert!(LIBRARY.iter().all(|effect| !effect.page().equation.is_empty()));
+//! ```
 
 pub mod channel;
 pub mod effect;

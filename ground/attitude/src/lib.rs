@@ -1,4 +1,13 @@
 //! Attitude from a log: the methods on recorded data, beside a reference and beside peers.
+//!
+//! ```
+//! use attitude::{broad, recording};
+//!
+//! let rows = recording::read("../../data/broad/09_undisturbed_fast_rotation_with_breaks_B.csv.gz".as_ref())?;
+//! let error = broad::replay(broad::Mode::FiveHz).score(&rows).expect("an attitude");
+//! assert!(error.total_deg < 1.0);
+//! # Ok::<(), recording::RecordingError>(())
+//! ```
 
 pub mod align;
 pub mod broad;

@@ -12,6 +12,23 @@
 //!
 //! The printed Eq 4.44 names the last two angles the other way round than public code after the same source does:
 //! [`Convention`]. Refused: fewer than ten points, points that are no ellipsoid, and points that leave it open.
+//!
+//! ```
+//! use bench::ellipsoid::Ellipsoid;
+//! use nalgebra::Vector3;
+//!
+//! // A magnetometer of 10 counts a uT, turned every way in a field of 23 uT, with an offset of (5, 0, -7) counts.
+//! let points: Vec<Vector3<f64>> = (0..100)
+//!     .map(|k| {
+//!         let (z, way) = (1.0 - f64::from(k) / 49.5, 2.4 * f64::from(k));
+//!         let across = (1.0 - z * z).max(0.0).sqrt();
+//!         230.0 * Vector3::new(across * way.cos(), across * way.sin(), z) + Vector3::new(5.0, 0.0, -7.0)
+//!     })
+//!     .collect();
+//! let found = Ellipsoid::fit(&points, 23.0).unwrap();
+//! assert!((found.offset - Vector3::new(5.0, 0.0, -7.0)).amax() < 1e-6);
+//! assert!((found.shape[(0, 0)] - 10.0).abs() < 1e-6);
+//! ```
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 

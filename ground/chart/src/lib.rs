@@ -2,6 +2,16 @@
 //!
 //! [`Figure`]s are rows and columns of [`Panel`]s; a panel is two axes and what is drawn between them. [`page::html`]
 //! puts figures, tables and text into one file. Nothing here knows what the numbers mean.
+//!
+//! ```
+//! use chart::{Block, Figure, Layer, Marks, Panel};
+//!
+//! let line = Layer::new("rate", 0, Marks::Line(vec![(0.0, 1.0), (1.0, 3.0)]));
+//! let figure = Figure::of("A turn", 1, &[Panel { layers: vec![line], ..Panel::default() }])?;
+//! let page = chart::html("Flight 1", "recorded today", &[Block::Figure(figure)]);
+//! assert!(page.starts_with("<!") && page.contains("A turn"));
+//! # Ok::<(), chart::ChartError>(())
+//! ```
 
 mod axis;
 pub mod canvas;

@@ -23,6 +23,15 @@
 //!
 //! `tests/rooms.rs` holds the order and the lock: no room needs a later one, and only [`holdout`] opens the held-out samples.
 //! `tests/golden.rs` holds what is said.
+//!
+//! ```
+//! use gap::{diagnose::diagnose, input::case::Subject};
+//!
+//! let subject = Subject::open("../../data/cases/siqueira-table-7-4".as_ref())?;
+//! let diagnosis = diagnose(&subject, &[], &|_, _| {});
+//! assert_eq!(diagnosis.causes[0].effect, "gyro-sine-response");
+//! # Ok::<(), gap::input::case::CaseError>(())
+//! ```
 
 pub mod advise;
 pub mod against;

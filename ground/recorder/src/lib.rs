@@ -7,6 +7,12 @@
 //!
 //! `ground dump` pulls, `ground recover` turns either file into tables and says what is missing, of this epoch and of
 //! older ones that no erase has reached. The formats are the unit's own: `emems::flight_log`.
+//!
+//! ```
+//! // A dump is packets with a frame after each; what is neither is passed over.
+//! let log = recorder::log::read(b"no dump").unwrap();
+//! assert!(log.packets.is_empty() && !recorder::log::is_image(b"no dump"));
+//! ```
 
 pub mod dump;
 pub mod log;
