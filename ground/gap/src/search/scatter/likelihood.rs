@@ -4,11 +4,11 @@
 //! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
 //! and maximisation ([`crate::search::recalibrated`]), also in channels where only the wrong one hid them.
 
-use twin::effect::{Beneath, Effect, LIBRARY, Nature, View, logged_step, most_likely};
+use twin::effect::{Beneath, Effect, LIBRARY, Nature, Texture, View, logged_step, most_likely};
 
 use super::{
     Scatter, blocks,
-    screen::{Oddness, are_odd, is_coloured, is_odd, oddness, own_clock},
+    screen::{Oddness, are_odd, is_coloured, is_odd, is_unsteady, oddness, own_clock},
 };
 use crate::{
     null::{model::Model, problem::Problem},
@@ -253,9 +253,12 @@ impl<'a> Search<'a> {
         self.gathered(effect, variant, price, judged)
     }
 
-    /// Whether an effect may be what these scatter by: one that stands for white noise is not where neighbours are alike.
+    /// Whether an effect may be what these scatter by: one that stands for white noise is not where neighbours are alike, and noise
+    /// of another level not where it comes and goes.
     fn is_possible(&self, effect: &dyn Effect, views: &[View]) -> bool {
-        !(effect.page().texture.is_white() && views.iter().any(is_coloured))
+        let texture = effect.page().texture;
+        !(texture.is_white() && views.iter().any(is_coloured))
+            && !(texture == Texture::Louder && views.iter().any(is_unsteady))
     }
 
     /// An effect in every block in which it gains more than it costs there, or alike in all sensors of a kind.

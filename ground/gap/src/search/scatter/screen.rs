@@ -56,6 +56,34 @@ pub fn own_clock(view: &View) -> f64 {
     })
 }
 
+/// Stretches of a log whose energies are compared: of 16 each has samples enough, and the phases of a flight differ.
+const STRETCHES: usize = 16;
+
+/// [nats] one steady log in a thousand is refused.
+const REFUSED: f64 = 6.9;
+
+/// Whether residuals scatter more in some stretches of the log than in others. A sensor's own noise does not: what comes and goes
+/// with a flight's phases is no other level of it. The sum of the squares of the stretches' energies about their mean, in their
+/// own sigmas (by the residuals' fourth moment), is chi-squared; its tail by Laurent and Massart 2000:
+/// `P(chi2_k > k + 2 sqrt(k x) + 2 x) <= exp(-x)`.
+pub fn is_unsteady(view: &View) -> bool {
+    let squares: Vec<f64> = view.residuals().map(|(_, residual)| residual * residual).collect();
+    let samples = squares.len() as f64;
+    let mean = squares.iter().sum::<f64>() / samples;
+    let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / samples;
+    let length = squares.len().div_ceil(STRETCHES);
+    if length == 0 || variance <= 0.0 {
+        return false;
+    }
+    let stretches = squares.chunks(length);
+    let freedom = stretches.len() as f64 - 1.0;
+    let about = |stretch: &[f64]| {
+        let count = stretch.len() as f64;
+        count * (stretch.iter().sum::<f64>() / count - mean).powi(2) / variance
+    };
+    stretches.map(about).sum::<f64>() > freedom + 2.0 * (freedom * REFUSED).sqrt() + 2.0 * REFUSED
+}
+
 /// Whether neighbouring residuals are alike.
 pub fn is_coloured(view: &View) -> bool {
     let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
@@ -70,4 +98,39 @@ pub fn is_coloured(view: &View) -> bool {
     let energy: f64 = rest.iter().map(|value| value * value).sum();
     let alike: f64 = rest.windows(2).map(|pair| pair[0] * pair[1]).sum();
     alike > COLOURED * energy
+}
+
+#[cfg(test)]
+mod tests {
+    use twin::{part::signal::Noise, predict::UnitDescription};
+
+    use super::*;
+
+    /// Whether noise of this size, sample by sample, is unsteady.
+    fn unsteady(seed: u64, size: impl Fn(usize) -> f64) -> bool {
+        const SAMPLES: usize = 3000;
+        let unit = UnitDescription::open("../../data/unit-emems.toml".as_ref()).expect("a unit");
+        let noise = Noise::new(seed);
+        let measured: Vec<f64> = (0..SAMPLES).map(|k| size(k) * noise.normal(k as u64)).collect();
+        is_unsteady(&View {
+            channel: &unit.channels[0],
+            t_s: &[0.0; SAMPLES],
+            predicted: &[0.0; SAMPLES],
+            measured: &measured,
+            step: 0.0,
+        })
+    }
+
+    #[test]
+    fn noise_that_comes_and_goes_is_no_level() {
+        assert!((0..100).all(|seed| !unsteady(seed, |_| 3.0)), "steady");
+        assert!(
+            (0..100).all(|seed| !unsteady(seed, |k| if k % 50 == 0 { 9.0 } else { 1.0 })),
+            "heavy tails"
+        );
+        assert!(
+            (0..100).all(|seed| unsteady(seed, |k| if k > 2000 { 2.0 } else { 1.0 })),
+            "a louder third"
+        );
+    }
 }
