@@ -53,6 +53,29 @@ fn a_scale_error_is_found_sized_and_shrunk() {
     );
 }
 
+/// An amplifier bends before its limit. A hard clip explains nearly all of it, and what that leaves had names of its own.
+#[test]
+fn a_clip_that_bends_before_its_limit_is_a_saturation_and_nothing_else() {
+    let fastest = (0..20 * SECONDS as usize)
+        .map(|k| rate(0.05 * k as f64).abs())
+        .fold(0.0, f64::max);
+    // A parabola from most - bend to most + bend: not the law that is fitted.
+    let (most, bend) = (0.75 * fastest, 0.2 * fastest);
+    let missing = |rate: f64| {
+        let within = rate.abs() - (most - bend);
+        let short = match within {
+            _ if within <= 0.0 => 0.0,
+            _ if within < 2.0 * bend => within * within / (4.0 * bend),
+            _ => within - bend,
+        };
+        -rate.signum() * short
+    };
+    let (_, diagnosis) = diagnosed_in(&erring(|t_s| missing(rate(t_s)), ""), &[]);
+    let named: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.effect).collect();
+    assert_eq!(named, ["gyro-saturation"], "{}", diagnosis.none_of_these);
+    assert!(diagnosis.shrink.percent > 95.0, "{}", diagnosis.shrink.percent);
+}
+
 #[test]
 fn a_healthy_unit_needs_nothing() {
     let (subject, diagnosis) = diagnosed(0.0);
