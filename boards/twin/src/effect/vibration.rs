@@ -58,6 +58,8 @@ const PAGE: Page = Page {
     common: true,
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[Symbol::positive("a", "1", 1.0)],
+    // In units of the sensor's noise, which an engine does not know.
+    largest: 100.0,
     texture: Texture::Line,
     ..Page::SMOOTH
 };

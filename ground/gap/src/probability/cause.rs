@@ -11,7 +11,7 @@ use crate::{
     null::problem::Problem,
     probability::regime,
     search::{
-        odds::{oversize, probability, probability_of_any},
+        odds::{itself, oversize, probability, probability_of_any},
         readings::{Attribution, Chosen},
         scatter::Scatter,
     },
@@ -137,11 +137,15 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
         }
     }
     let gain = scatter.gain / TEMPERATURE;
+    let sizes = parameters
+        .iter()
+        .map(|sized| sized.value.abs() / sized.parameter.prior_sigma);
+    let excess = sizes.fold(0.0, f64::max) / page.largest;
     Cause {
         effect: page.name,
         locality: subject.names(scatter.channels.iter().copied()).join(" "),
         channels: scatter.channels.clone(),
-        probability: 1.0 / (1.0 + (-gain).exp()),
+        probability: named(gain, excess),
         of_any: 1.0,
         gain: scatter.gain,
         parameters,
@@ -150,8 +154,14 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
         which: scatter.effect.told(scatter.variant),
         confirm_by: page.confirm_by,
         physics: page.physics,
-        is_suspicious: false,
+        is_suspicious: excess > SUSPICIOUS,
     }
+}
+
+/// Probability of an effect on the scatter with this evidence [nats, tempered] and so many times its largest size: beyond that it
+/// stands for something else, as the others do.
+fn named(gain: f64, excess: f64) -> f64 {
+    itself(excess) / (1.0 + (-gain).exp())
 }
 
 /// Energies to shares, most first.
@@ -161,4 +171,16 @@ pub fn share_out(causes: &mut [Cause]) {
         .iter_mut()
         .for_each(|cause| cause.share = if total > 0.0 { cause.share / total } else { 0.0 });
     causes.sort_by(|one, other| other.share.total_cmp(&one.share));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A missing saturation gave a walk of the zero 170 times its usual size, with all the evidence there can be.
+    #[test]
+    fn a_scatter_far_beyond_its_size_has_no_name_whatever_its_evidence() {
+        assert!(named(1e4, 170.0 / 20.0) < 1e-3);
+        assert!(named(1e4, 0.3) > 0.99 && named(-5.0, 0.3) < 0.01);
+    }
 }
