@@ -257,8 +257,9 @@ impl<'a> Search<'a> {
     /// of another level not where it comes and goes.
     fn is_possible(&self, effect: &dyn Effect, views: &[View]) -> bool {
         let texture = effect.page().texture;
-        !(texture.is_white() && views.iter().any(is_coloured))
-            && !(texture == Texture::Louder && views.iter().any(is_unsteady))
+        let is_refuted =
+            |view: &View| texture.is_white() && is_coloured(view) || texture == Texture::Louder && is_unsteady(view);
+        !views.iter().any(is_refuted)
     }
 
     /// An effect in every block in which it gains more than it costs there, or alike in all sensors of a kind.
