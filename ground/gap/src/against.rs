@@ -108,11 +108,12 @@ impl Against {
             false => self.effects.join(", "),
         };
         let mut text = format!("{case}, which neither description has seen; found before: {found}\n");
+        let name = |pair: &Pair| format!("{} [{}]", pair.name, pair.unit);
+        let width = self.pairs.iter().map(|pair| name(pair).len()).max().unwrap_or(0);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{:32} {:>10} {:>10}", "", "described", "corrected");
+        let _ = writeln!(text, "{:width$} {:>10} {:>10}", "", "described", "corrected");
         for pair in &self.pairs {
-            let name = format!("{} [{}]", pair.name, pair.unit);
-            let _ = writeln!(text, "{name:32} {:10.3} {:10.3}", pair.before, pair.after);
+            let _ = writeln!(text, "{:width$} {:10.3} {:10.3}", name(pair), pair.before, pair.after);
         }
         text
     }
