@@ -11,7 +11,8 @@
 //! | `/frames` | `foxglove.FrameTransform` | `n` in `enu`, so that a display whose z is up shows the unit upright; once |
 //! | `/log` | `foxglove.Log` | what the log says, and what is missing or broken in the stream |
 //!
-//! Times are nanoseconds since the packet that would have number 0, as in the tables. The schemas `foxglove.*` are those of
+//! Times are nanoseconds, as in the tables: a packet's number times the cycle; a line of a flight's log has the time since power-on.
+//! The schemas `foxglove.*` are those of
 //! docs.foxglove.dev/docs/sdk/schemas, by name.
 
 use std::{
@@ -32,6 +33,14 @@ use crate::digest::Entry;
 const INFO: u8 = 2;
 const WARNING: u8 = 3;
 
+/// The axes north-east-down in east-north-up, scalar first: half a turn about the line between north and east.
+const NED_IN_ENU: [f64; 4] = [
+    0.0,
+    std::f64::consts::FRAC_1_SQRT_2,
+    std::f64::consts::FRAC_1_SQRT_2,
+    0.0,
+];
+
 /// A file being written.
 pub struct Messages {
     writer: Writer<BufWriter<File>>,
@@ -40,7 +49,6 @@ pub struct Messages {
     latest: Option<(u64, u16)>,
 }
 
-#[derive(Clone, Copy)]
 struct Topic {
     channel: u16,
     sequence: u32,
@@ -64,9 +72,7 @@ impl Messages {
             topics: BTreeMap::new(),
             latest: None,
         };
-        // North-east-down in east-north-up: half a turn about the line between north and east.
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        messages.put("/frames", 0.0, transform(0.0, "enu", "n", [0.0, half, half, 0.0]))?;
+        messages.put("/frames", 0.0, transform(0.0, "enu", "n", NED_IN_ENU))?;
         Ok(messages)
     }
 
@@ -351,8 +357,8 @@ mod tests {
     /// A vector's components in east-north-up from those in n, by the transform that is written.
     #[test]
     fn down_is_down_and_north_is_north_in_a_display() {
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(0.0, half, half, 0.0));
+        let [w, i, j, k] = NED_IN_ENU;
+        let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k));
         let [x, y, z] = [nalgebra::Vector3::x(), nalgebra::Vector3::y(), nalgebra::Vector3::z()];
         assert!((q * x - y).norm() < 1e-12 && (q * y - x).norm() < 1e-12 && (q * z + z).norm() < 1e-12);
     }

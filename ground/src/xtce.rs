@@ -7,7 +7,7 @@
 //! A value of the packet is text, four hexadecimal digits, and XTCE has no encoding for that. So `a1x_text` is a string parameter
 //! of the container, and an algorithm in JavaScript, as Yamcs runs it, gives `a1x`: its raw value is counts, and the
 //! calibrator of its type gives nominal SI. Of a value that was not read, or that a magnetometer marks as overflowed, there is
-//! no `a1x`. The packet has no checksum: the container is chosen by its first byte.
+//! no `a1x`; a code that no part can give, which si.csv leaves out, has one. The packet has no checksum: the container is chosen by its first byte.
 
 use std::fmt::Write;
 
@@ -212,8 +212,7 @@ fn algorithms(xml: &mut String) -> std::fmt::Result {
     for channel in CHANNELS {
         let mut none = format!("text.value != \"{:04X}\"", NOT_READ.cast_unsigned());
         if channel.quantity == Quantity::Field {
-            write!(none, " &amp;&amp; text.value != \"{:04X}\"", OVERFLOW.cast_unsigned())
-                .map_err(|_| std::fmt::Error)?;
+            write!(none, " &amp;&amp; text.value != \"{:04X}\"", OVERFLOW.cast_unsigned())?;
         }
         let text =
             format!("if ({none}) {{ var n = parseInt(text.value, 16); out.value = n >= 32768 ? n - 65536 : n; }}");

@@ -41,13 +41,13 @@ pub struct Means {
     pub site: Site,
     /// Time on the table \[s\].
     pub time_s: f64,
-    /// Time a run is measured for (s).
+    /// Time a run is measured for \[s\].
     pub run_s: f64,
-    /// Time between two runs (s).
+    /// Time between two runs \[s\].
     pub between_s: f64,
     /// Rate of the runs [rad/s], for gyros.
     pub rate_rad_s: f64,
-    /// Steps of the table's angles (deg).
+    /// Steps of the table's angles \[deg\].
     pub step_deg: f64,
     /// Nominal axes in b, one a channel.
     pub axes_b: Vec<Vector3<f64>>,

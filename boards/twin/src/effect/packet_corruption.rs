@@ -24,10 +24,11 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
-/// Part of the range beyond which damage goes at least one time in [`LEAST_FAR`]: of a flipped bit of twelve, the four that turn 256
-/// codes and more of 4096; of another hexadecimal digit or of any value at all more than half.
+/// Part of the range beyond which damage often goes: 256 codes of 4096.
 const FAR: f64 = 1.0 / 16.0;
-/// A quarter instead of a third: the gyro's 14 bits reach twice as far as twelve.
+/// How often at least, of the damage that is seen above the noise. A flipped bit goes least far: on a part of 12 bits three of nine
+/// bits that are seen go beyond [`FAR`], on the gyro, whose range has 8738 codes, two of eight. Another hexadecimal digit goes there
+/// more than half of the time, any value at all seven times of eight.
 const LEAST_FAR: f64 = 0.25;
 /// \[nats\] one damaged log in a thousand is refused.
 const REFUSED: f64 = 6.9;

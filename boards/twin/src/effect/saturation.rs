@@ -16,13 +16,13 @@ pub struct Saturation;
 const LEAST_DEG: f64 = 20.0;
 const LIMITS: i32 = 38;
 
-/// n of a knee of 0: at its limit a reading is 2 % short. One sigma of the knee is a factor e: 11 is as soft as amplifiers are, 80
-/// clips.
+/// n where the knee is 0: at the limit a reading is 2 % short. A knee of 1 divides it by e: 11 is as soft as amplifiers are. A knee of
+/// -1 multiplies it: 80 clips.
 const SHARPNESS: f64 = 30.0;
 
 const PAGE: Page = Page {
     name: "gyro-saturation",
-    physics: "The gyro is set to a smaller range than described: faster turns read as the limit, some of them a little less.",
+    physics: "The gyro is set to a smaller range than described: faster turns read as the limit, and turns near it a little short.",
     equation: "y = n.w (1 + |n.w/R|^n)^(-1/n), n = 30 exp(-knee)",
     source: "ADIS16265 data sheet: 80, 160, 320 deg/s; Rapp 1991 for the knee",
     excited_by: "rates beyond the range",

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Time between two runs (s)
     #[arg(long = "between-s", alias = "between", value_name = "S", default_value_t = 20.0)]
     between: f64,
-    /// Rate of the runs [deg/s]
+    /// Rate of the runs (deg/s)
     #[arg(long = "rate-deg-s", alias = "rate", value_name = "DEG/S", default_value_t = 200.0)]
     rate: f64,
     /// Steps of the table's angles (deg)

@@ -151,7 +151,7 @@ fn each(space: &Space, library: &Library, wanted: &[usize], with: &mut dyn FnMut
     }
 }
 
-/// What an effect without parameters does to the readings.
+/// What an effect that is there or not does to the readings.
 fn on_the_whole(space: &Space, hypothesis: &Hypothesis) -> Entries {
     let model = [Component {
         active: hypothesis.active(&DVector::zeros(hypothesis.parameters.len())),

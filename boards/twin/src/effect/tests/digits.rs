@@ -61,6 +61,38 @@ fn digits_garbled_here_and_there_are_no_stuck_bit() {
     }
 }
 
+/// How much likelier one sample in fifty that is otherwise makes `packet-corruption` in a channel [ln].
+fn damage(name: &str, otherwise: impl Fn(usize, i16) -> i16) -> f64 {
+    let twin = twin(DENSE);
+    let predicted = twin.predict(&[]);
+    let channel = twin.unit().channel(name).unwrap();
+    let lsb = twin.unit().channels[channel].lsb;
+    let mut measured = logged(&twin, &noisy(&twin, &predicted, 6))[channel].clone();
+    for (k, value) in measured.iter_mut().enumerate().step_by(50) {
+        *value = f64::from(otherwise(k / 50, (*value / lsb).round() as i16)) * lsb;
+    }
+    let t_s = twin.instants_s(channel);
+    let view = View {
+        channel: &twin.unit().channels[channel],
+        t_s: &t_s,
+        predicted: &predicted[channel],
+        measured: &measured,
+        step: 0.0,
+    };
+    most_likely(by_name("packet-corruption").unwrap(), 0.0, &[view]).1
+}
+
+#[test]
+fn outliers_that_all_stay_near_are_no_damage_and_any_flipped_bit_is() {
+    for name in ["a3z", "m2x", "g2"] {
+        let flipped = damage(name, |k, code| code ^ (1 << (k % 12)));
+        assert!(flipped > 50.0, "{name}: {flipped}");
+        // Forty counts of four thousand: many times the noise, a hundredth of the range.
+        let near = damage(name, |k, code| code + if k % 2 == 0 { 40 } else { -40 });
+        assert!(near < 1.0, "{name}: {near}");
+    }
+}
+
 #[test]
 fn values_that_a_file_rounds_repeat_by_chance_and_are_not_stale() {
     let twin = twin(DENSE);

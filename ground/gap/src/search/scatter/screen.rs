@@ -59,7 +59,7 @@ pub fn own_clock(view: &View) -> f64 {
 /// Stretches of a log whose energies are compared: of 16 each has samples enough, and the phases of a flight differ.
 const STRETCHES: usize = 16;
 
-/// [nats] one steady log in a thousand is refused.
+/// \[nats\] one steady log in a thousand is refused.
 const REFUSED: f64 = 6.9;
 
 /// Whether residuals scatter more in some stretches of the log than in others. A sensor's own noise does not: what comes and goes
