@@ -60,6 +60,8 @@ fn answer(file: &Path) -> Result<Answer, Box<dyn Error>> {
         strength: effect["strength"].as_f64().unwrap_or(f64::NAN),
         snr_marginal: effect["snr_marginal"].as_f64(),
         sizes: Vec::new(),
+        attitude_deg: None,
+        gap_growth: None,
     };
     Ok(Answer {
         case: text(&answer["case"]),
@@ -67,6 +69,7 @@ fn answer(file: &Path) -> Result<Answer, Box<dyn Error>> {
         seed: answer["seed"].as_u64().unwrap_or_default(),
         effects: list(&answer["effects"]).iter().map(cause).collect(),
         snr_marginal: answer["snr_marginal"].as_f64().unwrap_or(f64::NAN),
+        source: None,
     })
 }
 

@@ -16,6 +16,12 @@ pub struct Cause {
     /// Its own part of [`Answer::snr_marginal`]; an effect at the largest size it is dealt at may be hardly there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snr_marginal: Option<f64>,
+    /// \[deg\] what it does to an attitude alone, where that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude_deg: Option<f64>,
+    /// By which it makes the gap of the sensor that shows it most grow, of what it was, where that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gap_growth: Option<f64>,
     /// Its sizes, where its law has parameters that verdicts state too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<Size>,
@@ -38,7 +44,8 @@ pub struct Size {
 pub struct Answer {
     /// The case.
     pub case: String,
-    /// R0 nothing wrong, R1 one cause, R3 a novel one, R4 two.
+    /// R0 nothing wrong, R0m nothing wrong but the description a little, R1 one cause, R3 a novel one, R4 two, R5 a real case, R6 three
+    /// or four, R7 one in a real recording.
     pub ring: String,
     /// Seed of everything drawn.
     pub seed: u64,
@@ -46,4 +53,7 @@ pub struct Answer {
     pub effects: Vec<Cause>,
     /// Size of what is wrong, in sigmas over the fit window, beyond what calibration errors can imitate.
     pub snr_marginal: f64,
+    /// The recording it is in, of a real one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
 }

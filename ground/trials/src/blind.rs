@@ -19,9 +19,10 @@ use serde::{Deserialize, Serialize};
 use self::files::{entries, files, hash, make, parse, read, stem, write};
 use crate::{
     answer::Answer,
-    deal::{self, DealError},
+    deal::{self, DealError, Ring},
     deck::Hand,
     draw::Draw,
+    injected::{Injected, recording::Recording},
     score::{self, Judged, Line, Verdict},
 };
 
@@ -87,19 +88,30 @@ struct Kept {
     answer: Answer,
 }
 
-/// Deals a hand into `folder`, answers into `answers`; the order is drawn.
+/// Deals a hand into `folder`, answers into `answers`; the order is drawn. Effects are injected into `recordings`.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn deal(folder: &Path, answers: &Path, hand: Hand, seed: u64) -> Result<(), BlindError> {
+pub fn deal(
+    folder: &Path,
+    answers: &Path,
+    hand: Hand,
+    recordings: Vec<Recording>,
+    seed: u64,
+) -> Result<(), BlindError> {
     let mut draw = Draw::new(seed);
     let deck = hand.shuffled(&mut draw);
+    let mut injected = Injected::new(recordings, &mut draw.stream(7));
+    let mut numbers = 0..;
     make(answers)?;
     let progress = ProgressBar::new(deck.len() as u64);
     for (index, card) in deck.into_iter().enumerate() {
         let name = format!("T{:03}", index + 1);
         let own = draw.uniform(0.0, 1e15) as u64;
-        let answer = deal::deal(folder, &name, card, own)?;
+        let answer = match card.ring {
+            Ring::R7 => injected.deal(folder, &name, numbers.next().unwrap_or_default(), own)?,
+            _ => deal::deal(folder, &name, card, own)?,
+        };
         let salt = (0..4)
             .map(|_| format!("{:08x}", draw.uniform(0.0, 4_294_967_296.0) as u32))
             .collect();

@@ -14,7 +14,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{
     blind::{self, BlindError, VERDICT},
+    deal::DealError,
     deck::Hand,
+    injected::recording::{self, Purpose},
     reliability::Reliability,
     score,
 };
@@ -50,6 +52,20 @@ enum Step {
         /// Cases with two effects
         #[arg(long, default_value_t = 20)]
         r4: usize,
+        /// Cases with three or four effects
+        #[arg(long, default_value_t = 0)]
+        r6: usize,
+        /// Cases with an effect put into a recording of a real unit: three of five have one with a name, one something novel, and
+        /// one is healthy
+        #[arg(long, default_value_t = 0)]
+        r7: usize,
+        /// Folder with the recordings for --r7: it has data/broad and practice. Otherwise that of EMEMS_DATA, or the minutes
+        /// that come with the source
+        #[arg(long)]
+        recordings: Option<PathBuf>,
+        /// Which recordings: those to tune on may be looked at, those to judge with are for what is frozen
+        #[arg(long, value_enum, default_value_t = Purpose::Judge)]
+        purpose: Purpose,
         /// Besides, one case with one effect for every effect there is, at a signal to noise ratio of 30 or as large as its
         /// part can be; give --r0 0 --r1 0 --r3 0 --r4 0 for these alone
         #[arg(long)]
@@ -110,6 +126,10 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             r1,
             r3,
             r4,
+            r6,
+            r7,
+            recordings,
+            purpose,
             each,
         } => {
             let hand = Hand {
@@ -117,9 +137,15 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
                 r1: *r1,
                 r3: *r3,
                 r4: *r4,
+                r6: *r6,
+                r7: *r7,
                 each: *each,
             };
-            blind::deal(folder, answers, hand, *seed)
+            let found = match r7 {
+                0 => Vec::new(),
+                _ => recording::all(&shared(recordings.as_deref()), *purpose).map_err(DealError::from)?,
+            };
+            blind::deal(folder, answers, hand, found, *seed)
         }
         Step::Commit { folder, answers } => blind::commit(folder, answers),
         Step::Answer { folder } => answer(folder, diagnose),
@@ -139,6 +165,14 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
         }
         Step::Score { folder } => score(folder),
     }
+}
+
+/// Where real recordings are: as given, or as the environment says, or what a clone of the source has.
+fn shared(given: Option<&Path>) -> PathBuf {
+    let named = given
+        .map(Path::to_owned)
+        .or_else(|| std::env::var_os("EMEMS_DATA").map(PathBuf::from));
+    named.unwrap_or_else(|| PathBuf::from("data"))
 }
 
 fn bar(length: usize) -> ProgressBar {

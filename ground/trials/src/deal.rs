@@ -27,6 +27,7 @@ use crate::{
     disturbance::{self, Disturbance, novel},
     draw::Draw,
     flight::{self, CYCLE_S, Instants},
+    injected::recording::RecordingError,
     motion::{Style, Wander},
     scene::Scene,
     sensitivity::{self, Told},
@@ -41,7 +42,7 @@ const FIT_S: f64 = 300.0;
 const RECORD_S: f64 = 0.02;
 
 /// Marginal signal to noise ratios dealt, least and most.
-const SNR: (f64, f64) = (8.0, 100.0);
+pub(crate) const SNR: (f64, f64) = (8.0, 100.0);
 
 /// The one of a case whose disturbance is given: plain, but not by its mere size.
 const GIVEN_SNR: f64 = 30.0;
@@ -63,6 +64,10 @@ pub enum Ring {
     R3,
     /// Two effects that have names.
     R4,
+    /// Three or four effects that have names.
+    R6,
+    /// One in a recording of a real unit.
+    R7,
 }
 
 /// A case was not dealt.
@@ -76,6 +81,9 @@ pub enum DealError {
         /// Why.
         source: io::Error,
     },
+    /// There is nothing to inject into.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// The unit sent no derived frames.
     #[error("the unit of seed {0} sent no derived frames: its sampling instants cannot be learnt")]
     NoInstants(u64),
@@ -154,6 +162,8 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             strength: *strength,
             snr_marginal: Some(*ratio),
             sizes: sizes.clone(),
+            attitude_deg: None,
+            gap_growth: None,
         })
         .collect();
     Ok(Answer {
@@ -162,6 +172,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         seed,
         effects,
         snr_marginal: ratios.iter().copied().fold(0.0, f64::hypot),
+        source: None,
     })
 }
 
@@ -183,19 +194,23 @@ impl Flown {
 }
 
 fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
-    let mut one_of = |all: &[Disturbance]| all[draw.below(all.len())];
     let named = disturbance::named();
-    match ring {
-        Ring::R0 => Vec::new(),
-        Ring::R1 => vec![one_of(&named)],
-        Ring::R3 => vec![one_of(novel::ALL)],
-        Ring::R4 => {
-            let graded: Vec<Disturbance> = named.into_iter().filter(|disturbance| disturbance.graded).collect();
-            let first = one_of(&graded);
-            let others: Vec<Disturbance> = graded.into_iter().filter(|other| other.name != first.name).collect();
-            vec![first, one_of(&others)]
-        }
-    }
+    let one = |all: &[Disturbance], draw: &mut Draw| all[draw.below(all.len())];
+    let count = match ring {
+        Ring::R0 | Ring::R7 => return Vec::new(),
+        Ring::R1 => return vec![one(&named, draw)],
+        Ring::R3 => return vec![one(novel::ALL, draw)],
+        Ring::R4 => 2,
+        Ring::R6 => 3 + draw.below(2),
+    };
+    let mut graded: Vec<Disturbance> = named.into_iter().filter(|disturbance| disturbance.graded).collect();
+    (0..count)
+        .map(|_| {
+            let chosen = one(&graded, draw);
+            graded.retain(|other| other.name != chosen.name);
+            chosen
+        })
+        .collect()
 }
 
 fn write(folder: &Path, name: &str, style: Style, flown: &Flown, instants: &Instants) -> Result<(), DealError> {

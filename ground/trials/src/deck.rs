@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// How many cases of each ring.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Hand {
     /// Nothing wrong.
     pub r0: usize,
@@ -19,6 +19,10 @@ pub struct Hand {
     pub r3: usize,
     /// Two effects.
     pub r4: usize,
+    /// Three or four effects.
+    pub r6: usize,
+    /// One effect in a recording of a real unit.
+    pub r7: usize,
     /// Besides, one case of one effect for every one that has a name.
     pub each: bool,
 }
@@ -40,6 +44,8 @@ impl Hand {
             (Ring::R1, self.r1),
             (Ring::R3, self.r3),
             (Ring::R4, self.r4),
+            (Ring::R6, self.r6),
+            (Ring::R7, self.r7),
         ];
         let drawn = |(ring, count)| vec![Card { ring, given: None }; count];
         let mut deck: Vec<Card> = rings.into_iter().flat_map(drawn).collect();
@@ -68,6 +74,7 @@ mod tests {
             r3: 0,
             r4: 3,
             each: true,
+            ..Hand::default()
         };
         let deck = hand.shuffled(&mut Draw::new(7));
         let drawn = deck.iter().filter(|card| card.given.is_none()).map(|card| card.ring);

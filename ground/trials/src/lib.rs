@@ -14,6 +14,7 @@ pub mod disturbance;
 pub mod draw;
 pub mod flight;
 pub mod followed;
+pub mod injected;
 pub mod interval;
 pub mod motion;
 pub mod reliability;

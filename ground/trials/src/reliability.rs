@@ -106,8 +106,11 @@ mod tests {
                     strength: 1.0,
                     snr_marginal: None,
                     sizes: Vec::new(),
+                    attitude_deg: None,
+                    gap_growth: None,
                 }],
                 snr_marginal: 20.0,
+                source: None,
             },
             verdict: Some(Verdict {
                 causes: vec![named],

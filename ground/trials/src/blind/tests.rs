@@ -6,13 +6,10 @@ fn what_was_changed_after_its_hash_was_published_is_found() {
     let (folder, answers) = (place.path().join("cases"), place.path().join("answers"));
     let hand = Hand {
         r0: 1,
-        r1: 0,
-        r3: 0,
-        r4: 0,
-        each: false,
+        ..Hand::default()
     };
     make(&folder).expect("a folder");
-    deal(&folder, &answers, hand, 1).expect("dealt");
+    deal(&folder, &answers, hand, Vec::new(), 1).expect("dealt");
     commit(&folder, &answers).expect("committed");
     assert!(matches!(reveal(&folder, &answers), Err(BlindError::Unanswered(_))));
     let verdict = folder.join("T001").join(VERDICT);

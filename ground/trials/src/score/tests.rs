@@ -9,6 +9,8 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
         strength: 1.0,
         snr_marginal: None,
         sizes: Vec::new(),
+        attitude_deg: None,
+        gap_growth: None,
     };
     Judged {
         answer: Answer {
@@ -17,6 +19,7 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
             seed: 0,
             effects: truth.iter().map(cause).collect(),
             snr_marginal: 20.0,
+            source: None,
         },
         verdict: verdict.map(|text| serde_json::from_str(text).expect("a verdict")),
     }
