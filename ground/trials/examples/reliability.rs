@@ -39,6 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             judged.push(Judged {
                 answer,
                 verdict: Some(verdict),
+                channels: None,
             });
         }
     }

@@ -6,9 +6,11 @@
 //! hashes and only then scores. A hash that does not fit is an error that names the case.
 
 mod files;
+pub mod lines;
+pub mod part;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs, io,
     path::{Path, PathBuf},
 };
@@ -16,7 +18,10 @@ use std::{
 use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 
-use self::files::{entries, files, hash, make, parse, read, stem, write};
+use self::{
+    files::{channels, entries, files, hash, make, parse, read, stem, write},
+    part::Part,
+};
 use crate::{
     answer::Answer,
     deal::{self, DealError, Ring},
@@ -28,8 +33,8 @@ use crate::{
 
 /// Hashes of the answers.
 const MANIFEST: &str = "manifest.json";
-/// Hashes of the verdicts.
-const ANSWERED: &str = "answered.json";
+/// Hashes of the verdicts, of all or of a part of them.
+const ANSWERED: &str = "answered";
 /// The revealed answer of a case, in its folder.
 const ANSWER: &str = "answer.json";
 /// The verdict on a case whose effects were left out of the library, in its folder.
@@ -134,13 +139,13 @@ pub fn commit(folder: &Path, answers: &Path) -> Result<(), BlindError> {
     write(&folder.join(MANIFEST), &hashes)
 }
 
-/// Publishes the hashes of the verdicts that stand in the cases' folders.
+/// Publishes the hashes of the verdicts that stand in the folders of a part's cases; tells the file and how many they are.
 ///
 /// # Errors
 /// When an answer is revealed already, or a file cannot be read or written.
-pub fn answer(folder: &Path) -> Result<usize, BlindError> {
+pub fn answer(folder: &Path, part: Part) -> Result<(PathBuf, usize), BlindError> {
     let mut hashes = BTreeMap::new();
-    for case in cases(folder)? {
+    for case in part.of_list(cases(folder)?) {
         let revealed = case.join(ANSWER);
         if revealed.exists() {
             return Err(BlindError::Revealed(revealed));
@@ -150,8 +155,29 @@ pub fn answer(folder: &Path) -> Result<usize, BlindError> {
             hashes.insert(stem(&case), hash(&read(&verdict)?));
         }
     }
-    write(&folder.join(ANSWERED), &hashes)?;
-    Ok(hashes.len())
+    let path = folder.join(part.answered());
+    write(&path, &hashes)?;
+    Ok((path, hashes.len()))
+}
+
+/// The hashes of the verdicts as published, of all parts.
+fn answered(folder: &Path) -> Result<BTreeMap<String, String>, BlindError> {
+    let names = files(folder)?
+        .into_iter()
+        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+    let all: BTreeSet<String> = names.filter_map(|name| Part::siblings(&name)).flatten().collect();
+    let mut hashes = BTreeMap::new();
+    for name in &all {
+        let path = folder.join(name);
+        if !path.exists() {
+            return Err(BlindError::Unanswered(path));
+        }
+        hashes.extend(parse::<BTreeMap<String, String>>(&path)?);
+    }
+    match all.is_empty() {
+        true => Err(BlindError::Unanswered(folder.join(Part::default().answered()))),
+        false => Ok(hashes),
+    }
 }
 
 /// Puts the answers beside the cases, after checking that the verdicts are published and that the answers are those that
@@ -160,10 +186,7 @@ pub fn answer(folder: &Path) -> Result<usize, BlindError> {
 /// # Errors
 /// When the verdicts are not published, or an answer is not the one that was committed to.
 pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
-    let answered = folder.join(ANSWERED);
-    if !answered.exists() {
-        return Err(BlindError::Unanswered(answered));
-    }
+    answered(folder)?;
     let manifest_path = folder.join(MANIFEST);
     let manifest: BTreeMap<String, String> = parse(&manifest_path)?;
     let kept = files(answers)?;
@@ -190,7 +213,7 @@ pub fn reveal(folder: &Path, answers: &Path) -> Result<(), BlindError> {
 /// When a verdict or an answer was changed after its hash was published.
 pub fn judged(folder: &Path) -> Result<Vec<Judged>, BlindError> {
     let manifest: BTreeMap<String, String> = parse(&folder.join(MANIFEST))?;
-    let answered: BTreeMap<String, String> = parse(&folder.join(ANSWERED))?;
+    let answered = answered(folder)?;
     let mut judged = Vec::new();
     for (name, published) in manifest {
         let path = folder.join(&name).join(ANSWER);
@@ -215,6 +238,7 @@ pub fn judged(folder: &Path) -> Result<Vec<Judged>, BlindError> {
         judged.push(Judged {
             answer: kept.answer,
             verdict,
+            channels: channels(&folder.join(&name)),
         });
     }
     Ok(judged)
@@ -251,6 +275,7 @@ pub fn withheld(folder: &Path, judged: &[Judged]) -> Result<Vec<Judged>, BlindEr
             withheld.push(Judged {
                 answer,
                 verdict: Some(parse(&path)?),
+                channels: judged.channels,
             });
         }
     }
@@ -308,6 +333,11 @@ pub fn line(judged: &Judged) -> String {
         answer.snr_marginal,
         truth.join(", ")
     )
+}
+
+/// Whether a folder is one that cases were dealt into and committed to.
+pub fn is_deal(folder: &Path) -> bool {
+    folder.join(MANIFEST).exists()
 }
 
 /// Folders of cases, sorted.

@@ -13,7 +13,7 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{
-    blind::{self, BlindError, VERDICT},
+    blind::{self, BlindError, VERDICT, lines, part::Part},
     deal::DealError,
     deck::Hand,
     injected::recording::{self, Purpose},
@@ -43,6 +43,9 @@ enum Step {
         /// Cases with nothing wrong
         #[arg(long, default_value_t = 20)]
         r0: usize,
+        /// Cases with nothing wrong whose description is a little wrong
+        #[arg(long, default_value_t = 0)]
+        r0m: usize,
         /// Cases with one effect
         #[arg(long, default_value_t = 60)]
         r1: usize,
@@ -83,6 +86,9 @@ enum Step {
     Answer {
         /// Folder of the cases
         folder: PathBuf,
+        /// Only every N-th case from the K-th on, on one of N machines that share the folder; its hashes are answered-K-of-N.json
+        #[arg(long, value_name = "K/N", default_value = "1/1")]
+        part: Part,
     },
     /// Puts the answers beside the cases, if they are those that were committed to
     Reveal {
@@ -98,10 +104,17 @@ enum Step {
         /// Folder of the cases
         folder: PathBuf,
     },
-    /// Scores verdicts against revealed answers, if neither was changed since its hash was published; leaves report.html
+    /// Scores verdicts against revealed answers, if neither was changed since its hash was published; leaves report.html and
+    /// judged.jsonl, a case a line. Scores a folder of such lines too, of any number of deals
     Score {
-        /// Folder of the cases
+        /// Folder of the cases, or with files of JSON lines
         folder: PathBuf,
+        /// Keeps the result for good: NAME.csv, a case a row, and NAME.md in --into; refused where they stand already
+        #[arg(long, value_name = "NAME")]
+        keep: Option<String>,
+        /// Where to keep it
+        #[arg(long, default_value = "ground/gap/trials")]
+        into: PathBuf,
     },
 }
 
@@ -123,6 +136,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             answers,
             seed,
             r0,
+            r0m,
             r1,
             r3,
             r4,
@@ -134,6 +148,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
         } => {
             let hand = Hand {
                 r0: *r0,
+                r0m: *r0m,
                 r1: *r1,
                 r3: *r3,
                 r4: *r4,
@@ -148,7 +163,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             blind::deal(folder, answers, hand, found, *seed)
         }
         Step::Commit { folder, answers } => blind::commit(folder, answers),
-        Step::Answer { folder } => answer(folder, diagnose),
+        Step::Answer { folder, part } => answer(folder, *part, diagnose),
         Step::Reveal { folder, answers } => blind::reveal(folder, answers),
         Step::Baselines { folder } => {
             let revealed = blind::revealed(folder)?;
@@ -163,7 +178,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             progress.finish_and_clear();
             Ok(())
         }
-        Step::Score { folder } => score(folder),
+        Step::Score { folder, keep, into } => score(folder, keep.as_deref(), into),
     }
 }
 
@@ -181,13 +196,29 @@ fn bar(length: usize) -> ProgressBar {
     ProgressBar::new(length as u64).with_style(style)
 }
 
-fn score(folder: &Path) -> Result<(), BlindError> {
-    let mut judged = blind::judged(folder)?;
-    judged.extend(blind::withheld(folder, &judged)?);
+fn score(folder: &Path, keep: Option<&str>, into: &Path) -> Result<(), BlindError> {
+    let (judged, tools) = match blind::is_deal(folder) {
+        true => {
+            let mut judged = blind::judged(folder)?;
+            lines::write(folder, &judged)?;
+            judged.extend(blind::withheld(folder, &judged)?);
+            let tools = blind::tools(folder, &judged)?;
+            (judged, tools)
+        }
+        false => {
+            let judged = lines::read(folder)?;
+            let tools = vec![("diagnosis".to_owned(), score::table(&judged))];
+            (judged, tools)
+        }
+    };
     let lines: Vec<String> = judged.iter().map(blind::line).collect();
-    let tools = blind::tools(folder, &judged)?;
     let table = score::markdown(&tools);
     println!("{}\n\n{table}", lines.join("\n"));
+    if let Some(name) = keep {
+        let kept = score::page::keep(into, name, &judged, &tools);
+        let kept = kept.map_err(|(path, source)| BlindError::File { path, source })?;
+        kept.iter().for_each(|path| println!("{}", path.display()));
+    }
     let stated = Reliability::of(&judged);
     let blocks = [
         Block::Figure(stated.figure()?),
@@ -208,8 +239,9 @@ fn score(folder: &Path) -> Result<(), BlindError> {
     Ok(())
 }
 
-fn answer(folder: &Path, diagnose: &Diagnose) -> Result<(), BlindError> {
-    let open: Vec<PathBuf> = blind::cases(folder)?
+fn answer(folder: &Path, part: Part, diagnose: &Diagnose) -> Result<(), BlindError> {
+    let open: Vec<PathBuf> = part
+        .of_list(blind::cases(folder)?)
         .into_iter()
         .filter(|case| !case.join(VERDICT).exists())
         .collect();
@@ -223,10 +255,7 @@ fn answer(folder: &Path, diagnose: &Diagnose) -> Result<(), BlindError> {
         progress.inc(1);
     }
     progress.finish_and_clear();
-    let answered = blind::answer(folder)?;
-    println!(
-        "{answered} verdicts, their hashes in {}",
-        folder.join("answered.json").display()
-    );
+    let (path, answered) = blind::answer(folder, part)?;
+    println!("{answered} verdicts, their hashes in {}", path.display());
     Ok(())
 }

@@ -28,6 +28,7 @@ use crate::{
     draw::Draw,
     flight::{self, CYCLE_S, Instants},
     injected::recording::RecordingError,
+    loose::Loose,
     motion::{Style, Wander},
     scene::Scene,
     sensitivity::{self, Told},
@@ -68,6 +69,8 @@ pub enum Ring {
     R6,
     /// One in a recording of a real unit.
     R7,
+    /// Nothing but a description that is a little wrong.
+    R0m,
 }
 
 /// A case was not dealt.
@@ -105,6 +108,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     };
     let instants = flight::instants(seed).ok_or(DealError::NoInstants(seed))?;
     let wander = Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1));
+    let loose = (ring == Ring::R0m).then(|| Loose::draw(&mut draw.stream(20)));
     let fly = |struck: &[(usize, f64)], flight: u64| {
         let mut scene = Scene::new(wander.clone(), site, &mut draw.stream(2));
         let struck = struck.iter().map(|(index, strength)| {
@@ -112,6 +116,9 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             (touched, std::mem::take(&mut scene.sizes))
         });
         let touched: Vec<(Vec<usize>, Vec<Size>)> = struck.collect();
+        if let Some(loose) = &loose {
+            loose.apply(&mut scene, &mut draw.stream(21));
+        }
         let quality = Quality {
             flight,
             ..Quality::NOMINAL
@@ -153,7 +160,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         strengths.push((index, strength));
     }
     let flown = fly(&strengths, 0);
-    write(&folder.join(name), name, style, &flown, &instants)?;
+    write(&folder.join(name), name, style, &flown, &instants, loose.as_ref())?;
     let effects = (chosen.iter().zip(&flown.touched).zip(strengths.iter().zip(&ratios)))
         .map(|((disturbance, (touched, sizes)), ((_, strength), ratio))| Cause {
             effect: disturbance.name.into(),
@@ -197,7 +204,7 @@ fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
     let named = disturbance::named();
     let one = |all: &[Disturbance], draw: &mut Draw| all[draw.below(all.len())];
     let count = match ring {
-        Ring::R0 | Ring::R7 => return Vec::new(),
+        Ring::R0 | Ring::R0m | Ring::R7 => return Vec::new(),
         Ring::R1 => return vec![one(&named, draw)],
         Ring::R3 => return vec![one(novel::ALL, draw)],
         Ring::R4 => 2,
@@ -213,7 +220,14 @@ fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
         .collect()
 }
 
-fn write(folder: &Path, name: &str, style: Style, flown: &Flown, instants: &Instants) -> Result<(), DealError> {
+fn write(
+    folder: &Path,
+    name: &str,
+    style: Style,
+    flown: &Flown,
+    instants: &Instants,
+    loose: Option<&Loose>,
+) -> Result<(), DealError> {
     let put = |file: &str, bytes: &[u8]| {
         let path = folder.join(file);
         let written = match file.ends_with(".gz") {
@@ -239,8 +253,12 @@ fn write(folder: &Path, name: &str, style: Style, flown: &Flown, instants: &Inst
     }
     put("measured.txt.gz", &stream)?;
     put("motion.csv.gz", motion_csv(&flown.scene, instants).as_bytes())?;
-    put("unit.toml", unit::toml(instants).as_bytes())?;
-    put("case.toml", case_toml(name, style, &flown.scene.claimed).as_bytes())
+    let declared = loose.map_or([1.0; 2], |loose| [loose.noise, loose.calibration]);
+    put("unit.toml", unit::toml(instants, declared).as_bytes())?;
+    put(
+        "case.toml",
+        case_toml(name, style, &flown.scene.claimed, loose).as_bytes(),
+    )
 }
 
 fn motion_csv(scene: &Scene, instants: &Instants) -> String {
@@ -260,17 +278,18 @@ fn motion_csv(scene: &Scene, instants: &Instants) -> String {
     text
 }
 
-fn case_toml(name: &str, style: Style, claimed: &Environment) -> String {
+fn case_toml(name: &str, style: Style, claimed: &Environment, loose: Option<&Loose>) -> String {
     let about = match style {
         Style::Positions => "Turned slowly from attitude to attitude.",
         Style::Table => "On a three-axis table.",
         Style::Hand => "Carried about by hand.",
     };
     let field = claimed.field_n_ut;
+    let (field_sigma, reference) = loose.map(Loose::case_toml).unwrap_or_default();
     format!(
         "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"packets\"\nabout = \"{about}\"\nunit = \"unit.toml\"\n\
          measured = \"measured.txt.gz\"\nmotion = \"motion.csv.gz\"\n\n[environment]\ngravity_m_s2 = {}\n\
-         latitude_deg = {:.6}\nfield_n_ut = [{:.6}, {:.6}, {:.6}]\ntemperature_c = 25.0\n\n[windows]\n\
+         latitude_deg = {:.6}\nfield_n_ut = [{:.6}, {:.6}, {:.6}]\ntemperature_c = 25.0\n{field_sigma}{reference}\n[windows]\n\
          fit = [[0.0, {FIT_S:.1}]]\nhold = [[{FIT_S:.1}, {DURATION_S:.1}]]\n",
         claimed.gravity,
         claimed.latitude.to_degrees(),

@@ -15,6 +15,8 @@ pub struct Hand {
     pub r0: usize,
     /// One effect.
     pub r1: usize,
+    /// Nothing wrong, described a little wrong.
+    pub r0m: usize,
     /// A novel disturbance.
     pub r3: usize,
     /// Two effects.
@@ -46,6 +48,7 @@ impl Hand {
             (Ring::R4, self.r4),
             (Ring::R6, self.r6),
             (Ring::R7, self.r7),
+            (Ring::R0m, self.r0m),
         ];
         let drawn = |(ring, count)| vec![Card { ring, given: None }; count];
         let mut deck: Vec<Card> = rings.into_iter().flat_map(drawn).collect();

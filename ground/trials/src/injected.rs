@@ -50,6 +50,13 @@ fn is_novel(number: usize) -> Option<bool> {
     [Some(false), Some(false), Some(false), Some(true), None][number % 5]
 }
 
+/// How many cases with a name, novel, or healthy there were before it: each of the three goes through all recordings in turn.
+fn among_its_like(number: usize) -> usize {
+    (0..number)
+        .filter(|before| is_novel(*before) == is_novel(number))
+        .count()
+}
+
 impl Injected {
     /// A deal from recordings.
     pub fn new(recordings: Vec<Recording>, draw: &mut Draw) -> Self {
@@ -74,7 +81,7 @@ impl Injected {
     /// # Errors
     /// When a file cannot be written.
     pub fn deal(&mut self, folder: &Path, name: &str, number: usize, seed: u64) -> Result<Answer, DealError> {
-        let recording = &self.recordings[number % self.recordings.len()];
+        let recording = &self.recordings[among_its_like(number) % self.recordings.len()];
         let mut draw = Draw::new(seed);
         let mut healthy = Scene::new(recording);
         if draw.chance(0.25) {
@@ -292,5 +299,15 @@ mod tests {
                 .count()
         };
         assert_eq!(lines(&read("C")), lines(&original));
+    }
+
+    #[test]
+    fn every_recording_is_healthy_has_a_name_and_has_none_at_times() {
+        for (recordings, what) in [(5, None), (4, Some(true)), (3, Some(false)), (5, Some(false))] {
+            let own = (0..5 * recordings).filter(|number| is_novel(*number) == what);
+            let places: std::collections::BTreeSet<usize> =
+                own.map(|number| among_its_like(number) % recordings).collect();
+            assert_eq!(places.len(), recordings, "{what:?}");
+        }
     }
 }

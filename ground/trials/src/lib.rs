@@ -16,6 +16,7 @@ pub mod flight;
 pub mod followed;
 pub mod injected;
 pub mod interval;
+mod loose;
 pub mod motion;
 pub mod reliability;
 pub mod scene;

@@ -116,6 +116,7 @@ mod tests {
                 causes: vec![named],
                 ..Verdict::default()
             }),
+            channels: None,
         }
     }
 

@@ -6,12 +6,14 @@
 
 use std::{collections::BTreeSet, fmt::Write as _};
 
+pub mod page;
 mod sizes;
+pub(crate) mod statements;
 mod verdict;
 
 pub(crate) use sizes::efficiency;
 use verdict::LARGEST_SET;
-pub use verdict::{Named, Shrink, Stated, Verdict};
+pub use verdict::{Named, Remainder, Shrink, Stated, Verdict};
 
 use crate::{answer::Answer, interval::clopper_pearson};
 
@@ -22,6 +24,8 @@ pub struct Judged {
     pub answer: Answer,
     /// What was said; `None` if nothing was.
     pub verdict: Option<Verdict>,
+    /// Channels of its unit that have an axis, where that is known.
+    pub channels: Option<usize>,
 }
 
 /// Effects of at least this size are expected to be found.
@@ -174,7 +178,7 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
     lines.push(mean(
         "calibration error (ECE)",
         "<= 0.05",
-        vec![expected_calibration_error(one())],
+        vec![expected_calibration_error(first_names(one()))],
     ));
     let mut shrinks: Vec<f64> = one()
         .filter(|judged| judged.answer.snr_marginal >= 15.0)
@@ -191,7 +195,9 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
         ..mean("median held-out shrink [%], SNR >= 15", ">= 95", Vec::new())
     });
     lines.extend(sizes::lines(judged));
-    lines.extend(two_effects(ring("R4").collect()));
+    lines.extend(several_effects("R4", [">= 0.95", ">= 0.90"], ring("R4").collect()));
+    lines.extend(several_effects("R6", [">= 0.90", ">= 0.80"], ring("R6").collect()));
+    lines.extend(statements::lines(judged));
     lines
 }
 
@@ -211,18 +217,20 @@ fn localisation_f1(answer: &Answer, verdict: &Verdict, cell: fn(&str) -> &str) -
     2.0 * both / (touched.len() + named.len()).max(1) as f64
 }
 
-/// Mean distance between stated and observed share of right names, over ten bins of equal mass (gap.md, section 6).
-fn expected_calibration_error<'a>(cases: impl Iterator<Item = &'a Judged>) -> f64 {
-    const BINS: usize = 10;
-    let mut stated: Vec<(f64, bool)> = cases
+/// First names with their probability, and whether they are right.
+fn first_names<'a>(cases: impl Iterator<Item = &'a Judged>) -> Vec<(f64, bool)> {
+    cases
         .filter_map(|judged| {
             let cause = judged.verdict.as_ref()?.causes.first()?;
-            Some((
-                cause.probability,
-                judged.answer.effects.iter().any(|truth| truth.effect == cause.effect),
-            ))
+            let is_right = judged.answer.effects.iter().any(|truth| truth.effect == cause.effect);
+            Some((cause.probability, is_right))
         })
-        .collect();
+        .collect()
+}
+
+/// Mean distance between stated and observed share of what is so, over ten bins of equal mass (gap.md, section 6).
+fn expected_calibration_error(mut stated: Vec<(f64, bool)>) -> f64 {
+    const BINS: usize = 10;
     stated.sort_by(|a, b| a.0.total_cmp(&b.0));
     let bin = stated.len().div_ceil(BINS).max(1);
     let error = |bin: &[(f64, bool)]| {
@@ -234,7 +242,7 @@ fn expected_calibration_error<'a>(cases: impl Iterator<Item = &'a Judged>) -> f6
     stated.chunks(bin).map(error).sum::<f64>() / stated.len().max(1) as f64
 }
 
-fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
+fn several_effects(ring: &str, targets: [&'static str; 2], cases: Vec<&Judged>) -> [Line; 2] {
     let (mut named, mut right) = (0, 0);
     let (mut there, mut found) = (0, 0);
     for judged in &cases {
@@ -255,15 +263,15 @@ fn two_effects(cases: Vec<&Judged>) -> [Line; 2] {
         }
     }
     let line = |what: &str, target, right: usize, trials: usize| Line {
-        what: what.into(),
+        what: format!("{ring}: {what}"),
         trials,
         value: right as f64 / trials.max(1) as f64,
         interval: Some(clopper_pearson(right.min(trials), trials)),
         target,
     };
     [
-        line("two effects: precision", ">= 0.92", right, named),
-        line("two effects: recall", ">= 0.88", found, there),
+        line("precision", targets[0], right, named),
+        line("recall", targets[1], found, there),
     ]
 }
 

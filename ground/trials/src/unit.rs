@@ -76,8 +76,8 @@ pub fn axis_b(channel: Channel) -> Option<Vector3<f64>> {
     }
 }
 
-/// The file.
-pub fn toml(instants: &Instants) -> String {
+/// The file, with sigmas of noise and of calibration declared so many times what they are.
+pub fn toml(instants: &Instants, [noise, calibration]: [f64; 2]) -> String {
     let mut text = format!("name = \"e-MEMS on the host board\"\ncycle_s = {CYCLE_S}\n");
     // Writing to a string cannot fail.
     let mut put = |arguments: std::fmt::Arguments<'_>| {
@@ -98,7 +98,10 @@ pub fn toml(instants: &Instants) -> String {
         }
         put(format_args!(
             "noise_sigma = {}\nbias_sigma = {}\nscale_sigma = {}\naxis_sigma_rad = {}\n",
-            facts.noise, facts.bias, facts.scale, facts.axis_rad
+            noise * facts.noise,
+            calibration * facts.bias,
+            calibration * facts.scale,
+            calibration * facts.axis_rad
         ));
         let [least, most] = facts.range;
         put(format_args!(

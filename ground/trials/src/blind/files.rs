@@ -71,3 +71,13 @@ pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), BlindErro
         source,
     })
 }
+
+/// Channels of a case's unit that have an axis.
+pub(super) fn channels(case: &Path) -> Option<usize> {
+    let text = fs::read_to_string(case.join("unit.toml")).ok()?;
+    Some(
+        text.lines()
+            .filter(|line| line.trim_start().starts_with("axis_b"))
+            .count(),
+    )
+}

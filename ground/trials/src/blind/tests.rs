@@ -14,9 +14,14 @@ fn what_was_changed_after_its_hash_was_published_is_found() {
     assert!(matches!(reveal(&folder, &answers), Err(BlindError::Unanswered(_))));
     let verdict = folder.join("T001").join(VERDICT);
     fs::write(&verdict, r#"{"causes":[],"none_of_these":0.0}"#).expect("written");
-    assert_eq!(answer(&folder).expect("answered"), 1);
+    let half: Part = "1/2".parse().expect("a part");
+    assert_eq!(answer(&folder, half).expect("answered").1, 1);
+    assert!(
+        matches!(reveal(&folder, &answers), Err(BlindError::Unanswered(path)) if path.ends_with("answered-2-of-2.json"))
+    );
+    assert_eq!(answer(&folder, "2/2".parse().expect("a part")).expect("answered").1, 0);
     reveal(&folder, &answers).expect("revealed");
-    assert!(matches!(answer(&folder), Err(BlindError::Revealed(_))));
+    assert!(matches!(answer(&folder, half), Err(BlindError::Revealed(_))));
     let judged = judged(&folder).expect("scored");
     assert_eq!(judged.len(), 1);
     let baseline = folder.join("T001").join("verdict-lasso.json");

@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::recording::Calibrated;
+
 /// case.toml.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CaseText {
@@ -147,8 +149,8 @@ pub fn alternating(times_s: &[f64]) -> Windows {
     windows
 }
 
-/// The unit of BROAD with this zero of its gyros \[rad/s\].
-pub(super) fn of_broad(gyro_bias: [f64; 3]) -> UnitText {
+/// The unit of BROAD in a session.
+pub(super) fn of_broad(calibrated: &Calibrated) -> UnitText {
     let triad =
         |letter: char, sensor: &str, noise: [f64; 3], bias: [f64; 3], sigmas: [f64; 3], range: f64, slot_s: f64| {
             let channel = move |axis: usize| ChannelText {
@@ -164,7 +166,7 @@ pub(super) fn of_broad(gyro_bias: [f64; 3]) -> UnitText {
                 axis_sigma_rad: sigmas[2],
                 range: [-range, range],
                 slot_s,
-                lever_m: if letter == 'a' { [0.001, 0.0, 0.008] } else { [0.0; 3] },
+                lever_m: if letter == 'a' { calibrated.lever_m } else { [0.0; 3] },
             };
             [channel(0), channel(1), channel(2)]
         };
@@ -176,7 +178,7 @@ pub(super) fn of_broad(gyro_bias: [f64; 3]) -> UnitText {
                 'g',
                 "gyro",
                 [0.0019; 3],
-                gyro_bias,
+                calibrated.gyro_bias,
                 [0.000_35, 0.004, 0.004],
                 34.9,
                 -0.0042,
@@ -188,7 +190,7 @@ pub(super) fn of_broad(gyro_bias: [f64; 3]) -> UnitText {
                 none,
                 [0.05, 0.004, 0.004],
                 156.9,
-                -0.0025,
+                -0.0027,
             ),
             triad('m', "magnetometer", [0.7; 3], none, [0.6, 0.01, 0.01], 1200.0, -0.0152),
         ]

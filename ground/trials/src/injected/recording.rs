@@ -45,15 +45,34 @@ struct Known {
 /// A unit between two calibrations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Session {
-    /// Of BROAD, by its zero of the gyros \[rad/s\] and the field of the room in n \[uT\].
-    Broad([f64; 3], [f64; 3]),
+    /// Of BROAD.
+    Broad(Calibrated),
     /// As its own unit.toml has it.
     Own,
 }
 
-/// BROAD's second and third session, by their rest.
-const B: Session = Session::Broad([0.003_490_66, 0.002_094_4, -0.004_014_26], [15.528, 0.065, 40.726]);
-const C: Session = Session::Broad([0.008_552_11, -0.003_316_13, -0.004_363_32], [17.027, 0.258, 41.016]);
+/// What a session of BROAD is calibrated to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Calibrated {
+    /// \[rad/s\] zero of the gyros, at rest.
+    pub(super) gyro_bias: [f64; 3],
+    /// \[m\] from the markers to the accelerometer, by least squares over undisturbed recordings of the session.
+    pub(super) lever_m: [f64; 3],
+    /// \[uT\] the room's field in n.
+    pub(super) field_n_ut: [f64; 3],
+}
+
+/// BROAD's second and third session.
+const B: Session = Session::Broad(Calibrated {
+    gyro_bias: [0.003_490_66, 0.002_094_4, -0.004_014_26],
+    lever_m: [0.0006, -0.002, 0.0075],
+    field_n_ut: [15.528, 0.065, 40.726],
+});
+const C: Session = Session::Broad(Calibrated {
+    gyro_bias: [0.008_552_11, -0.003_316_13, -0.004_363_32],
+    lever_m: [-0.0006, 0.0016, 0.0085],
+    field_n_ut: [17.027, 0.258, 41.016],
+});
 
 /// All. The first session of BROAD (01, 15) is not here: its calibration is off by seven of its sigmas.
 const KNOWN: &[Known] = &[
@@ -204,7 +223,7 @@ pub fn all(folder: &Path, purpose: Purpose) -> Result<Vec<Recording>, RecordingE
 /// `None` where it is not there.
 fn read(folder: &Path, known: &Known) -> Result<Option<Recording>, RecordingError> {
     match known.session {
-        Session::Broad(gyro_bias, field_n_ut) => {
+        Session::Broad(calibrated) => {
             let files = ["data/broad", "broad"]
                 .iter()
                 .filter_map(|place| fs::read_dir(folder.join(place)).ok());
@@ -213,8 +232,7 @@ fn read(folder: &Path, known: &Known) -> Result<Option<Recording>, RecordingErro
                 path.file_name()
                     .is_some_and(|name| name.to_string_lossy().starts_with(known.place))
             });
-            path.map(|path| of_broad(&path, known, gyro_bias, field_n_ut))
-                .transpose()
+            path.map(|path| of_broad(&path, known, &calibrated)).transpose()
         }
         Session::Own => {
             let case = folder.join(known.place);
@@ -266,12 +284,7 @@ fn attitude(row: &[f64], places: &[usize]) -> Option<UnitQuaternion<f64>> {
     UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 0.5)
 }
 
-fn of_broad(
-    path: &Path,
-    known: &Known,
-    gyro_bias: [f64; 3],
-    field_n_ut: [f64; 3],
-) -> Result<Recording, RecordingError> {
+fn of_broad(path: &Path, known: &Known, calibrated: &Calibrated) -> Result<Recording, RecordingError> {
     let (header, rows) = table(path)?;
     let named = |names: &[&str]| {
         columns(&header, names).ok_or_else(|| RecordingError::Form {
@@ -279,7 +292,7 @@ fn of_broad(
             problem: format!("has no columns {}", names.join(", ")),
         })
     };
-    let unit = description::of_broad(gyro_bias);
+    let unit = description::of_broad(calibrated);
     let times_s: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let channels = [
         ["gyr_x", "gyr_y", "gyr_z"],
@@ -300,7 +313,7 @@ fn of_broad(
             place_n: place.x.is_finite().then(|| Vector3::new(place.y, place.x, -place.z)),
         }
     });
-    let case = description::case_of_broad(field_n_ut);
+    let case = description::case_of_broad(calibrated.field_n_ut);
     finished(
         path,
         known,

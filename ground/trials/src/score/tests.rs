@@ -22,6 +22,7 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
             source: None,
         },
         verdict: verdict.map(|text| serde_json::from_str(text).expect("a verdict")),
+        channels: Some(9),
     }
 }
 
@@ -130,8 +131,8 @@ fn two_effects_are_counted_one_by_one() {
         judged("R4", &["gyro-bias", "hard-iron"], Some(both)),
         judged("R4", &["gyro-bias", "lever-arm"], Some(both)),
     ]);
-    assert_eq!(value(&lines, "two effects: precision"), 0.75);
-    assert_eq!(value(&lines, "two effects: recall"), 0.75);
+    assert_eq!(value(&lines, "R4: precision"), 0.75);
+    assert_eq!(value(&lines, "R4: recall"), 0.75);
 }
 
 #[test]
@@ -141,8 +142,8 @@ fn of_two_effects_one_that_is_hardly_there_is_not_missed() {
     for (ratio, recall) in [(2.0, 1.0), (MARGINAL_SNR, 0.5)] {
         case.answer.effects[1].snr_marginal = Some(ratio);
         let lines = table(std::slice::from_ref(&case));
-        assert_eq!(value(&lines, "two effects: recall"), recall);
-        assert_eq!(value(&lines, "two effects: precision"), 1.0);
+        assert_eq!(value(&lines, "R4: recall"), recall);
+        assert_eq!(value(&lines, "R4: precision"), 1.0);
     }
 }
 
@@ -166,4 +167,69 @@ fn the_set_of_ninety_percent_is_the_likeliest_names_that_reach_it() {
     ]);
     // The first name has 0.9 alone.
     assert!((value(&lines, "90 % set holds the truth") - 1.0 / 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_false_name_is_one_beside_a_flag_too() {
+    let flagged = r#"{"causes":[{"effect":"gyro-g2","probability":0.9}],"none_of_these":1.0,"outcome":"partly-named",
+        "remainder":{"matters":0.8}}"#;
+    let lines = table(&[
+        judged("R3", &["slow-tone"], Some(flagged)),
+        judged("R7", &["gyro-g2"], Some(flagged)),
+    ]);
+    assert_eq!(value(&lines, "false name, novel"), 0.0);
+    assert_eq!(value(&lines, "R3: false name, flag or not"), 1.0);
+    assert_eq!(value(&lines, "R7: false name, flag or not"), 0.0);
+    assert_eq!(value(&lines, "R7: top-1"), 1.0);
+}
+
+#[test]
+fn what_is_left_matters_by_what_no_name_covers() {
+    let verdict =
+        r#"{"causes":[{"effect":"gyro-bias","probability":0.9}],"outcome":"named","remainder":{"matters":0.2}}"#;
+    let case = |unsaid: &str, attitude_deg: f64, growth: f64| {
+        let mut case = judged("R7", &["gyro-bias", unsaid], Some(verdict));
+        case.answer.effects[1].attitude_deg = Some(attitude_deg);
+        case.answer.effects[1].gap_growth = Some(growth);
+        case.answer.effects[0].attitude_deg = Some(9.0);
+        case.answer.effects[0].gap_growth = Some(9.0);
+        case
+    };
+    let so = |case: &Judged| statements::matters(&case.answer, case.verdict.as_ref().expect("given"));
+    assert_eq!(so(&case("hard-iron", 0.2, 0.01)), Some(false));
+    assert_eq!(so(&case("hard-iron", 0.6, 0.01)), Some(true));
+    assert_eq!(so(&case("hard-iron", 0.2, 0.06)), Some(true));
+    assert_eq!(so(&case("gyro-bias", 9.0, 9.0)), Some(false));
+    let mut unknown = case("hard-iron", 0.2, 0.01);
+    unknown.answer.effects[1].gap_growth = None;
+    assert_eq!(so(&unknown), None);
+    // Of what is said to matter with 0.2 and does, 0.8 is off.
+    assert!((value(&table(&[case("hard-iron", 0.6, 0.01)]), "Brier of matters") - 0.64).abs() < 1e-12);
+}
+
+#[test]
+fn an_interval_is_held_against_the_windows_kept_back() {
+    let verdict = |after: f64| {
+        format!(
+            r#"{{"gap":{{"floor":1.0}},"shrink":{{"hold_after":{after}}},"remainder":{{"channels":["mx","my","mz"],
+            "sigma":{{"interval_90":[0.5,0.7]}}}}}}"#
+        )
+    };
+    let held = |after: f64| statements::is_held(&judged("R0", &[], Some(&verdict(after))));
+    // A third of nine channels scatters by 0.6 sigma more: sqrt(1 + 0.36 / 3).
+    assert_eq!(held(1.12f64.sqrt()), Some(true));
+    assert_eq!(held(1.0), Some(false));
+    assert_eq!(statements::is_held(&judged("R0", &[], Some(NOTHING))), None);
+}
+
+#[test]
+fn nothing_wrong_is_a_statement_with_a_probability() {
+    let verdict = r#"{"causes":[{"effect":"gyro-bias","probability":0.5}],"remainder":{"matters":0.2}}"#;
+    let all = statements::of(&judged("R0", &[], Some(verdict)));
+    let clean = all
+        .iter()
+        .find(|one| one.what == statements::What::Clean)
+        .expect("stated");
+    assert!((clean.probability - 0.4).abs() < 1e-12 && clean.is_so);
+    assert_eq!(all.len(), 3);
 }

@@ -23,6 +23,36 @@ pub struct Verdict {
     pub none_of_these: f64,
     /// What became of the gap on the hold window.
     pub shrink: Option<Shrink>,
+    /// In a word: `clean`, `recalibrate`, `named`, `partly-named`, `undecided`, `unknown`.
+    pub outcome: Option<String>,
+    /// What is left beneath what is named.
+    pub remainder: Option<Remainder>,
+}
+
+/// What is left beneath what is named.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Remainder {
+    /// Probability that it is there.
+    pub present: f64,
+    /// Probability that it is there and larger than what the case cares about.
+    pub matters: f64,
+    /// Where.
+    pub channels: Vec<String>,
+    /// How large, in sigma of a sample of those.
+    pub sigma: Within,
+    /// \[deg\] how large, as attitude.
+    pub attitude_deg: Option<Within>,
+}
+
+/// A size with its interval.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Within {
+    /// The middle.
+    pub value: f64,
+    /// 5 % and 95 %.
+    pub interval_90: [f64; 2],
 }
 
 /// The gap in sigma.
@@ -69,6 +99,8 @@ pub struct Stated {
 pub struct Shrink {
     /// Before, in sigma.
     pub hold_before: Option<f64>,
+    /// After.
+    pub hold_after: Option<f64>,
     /// Of the gap above its floor.
     pub percent: Option<f64>,
 }
