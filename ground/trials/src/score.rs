@@ -175,11 +175,12 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
     };
     lines.push(mean("localisation F1 (sensors)", ">= 0.90", f1(sensor_of)));
     lines.push(mean("localisation F1 (channels)", "", f1(|channel| channel)));
-    lines.push(mean(
-        "calibration error (ECE)",
-        "<= 0.05",
-        vec![expected_calibration_error(first_names(one()))],
-    ));
+    let first = first_names(one());
+    lines.push(Line {
+        trials: first.len(),
+        value: expected_calibration_error(first),
+        ..mean("calibration error (ECE)", "<= 0.05", Vec::new())
+    });
     let mut shrinks: Vec<f64> = one()
         .filter(|judged| judged.answer.snr_marginal >= 15.0)
         .map(|judged| {
