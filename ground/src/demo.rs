@@ -146,8 +146,8 @@ pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
     let say = |words: &str| eprintln!("{:4.0} s  {words}", began.elapsed().as_secs_f64());
     let mut host = arguments.host;
     if !host {
-        say("building the firmware image");
-        if let Err(error) = board::image() {
+        say("looking for the firmware image, or building it");
+        if let Err(error) = board::release(None) {
             say(&format!("{error}; flying on this computer instead"));
             host = true;
         }

@@ -122,7 +122,7 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
     let flight = if arguments.host {
         board::host(source.site)
     } else {
-        board::image()?
+        board::image(arguments.image.as_deref())?
     };
     let name = format!("{}-{}", source.name, arguments.seed);
     let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
@@ -237,12 +237,12 @@ fn report(
     seen: Seen,
     remarks: Vec<Remark>,
 ) -> Result<Landed, FlyError> {
-    let board = if arguments.host {
-        "host, virtual time"
-    } else {
-        "emulated STM32F4, release image"
+    let board = match &arguments.image {
+        _ if arguments.host => "host, virtual time".into(),
+        Some(file) => format!("emulated STM32F4, {}", file.display()),
+        None => "emulated STM32F4, release image".into(),
     };
-    let mut rows = flight_rows(board, source, arguments.seed, seen.flown, seen.took);
+    let mut rows = flight_rows(&board, source, arguments.seed, seen.flown, seen.took);
     if seen.flown < planned && planned != plan::UNTIL_TOLD {
         rows.push((
             "ended",

@@ -40,6 +40,8 @@ pub enum ImageError {
     Damaged(PathBuf, String),
     /// No static or function of this name.
     NoSymbol(PathBuf, String),
+    /// The sources that this program was built from are no longer where they were.
+    NoSources(PathBuf),
     /// The firmware does not compile; the compiler has said why.
     Compile,
     /// No compiler for the board could be had; what was tried.
@@ -81,6 +83,12 @@ impl fmt::Display for ImageError {
                 "{} has no symbol {name}. Keep its symbols (no `strip` in the profile), and mark the static \
                  `#[unsafe(no_mangle)]`",
                 path.display()
+            ),
+            ImageError::NoSources(root) => write!(
+                formatter,
+                "this program has none within, and the sources to build it from are no longer in {}. Name an image with --image \
+                 FILE, or build the program with one: EMEMS_IMAGE=FILE cargo install-ground",
+                root.display()
             ),
             ImageError::Compile => write!(formatter, "the firmware does not compile; cargo's messages are above"),
             ImageError::NoCompiler(tried) => {

@@ -33,7 +33,7 @@ pub fn build() -> Result<Image, ImageError> {
 /// As [`build`].
 pub fn build_package(package: &str) -> Result<Image, ImageError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let root = root.canonicalize().map_err(|error| ImageError::Read(root, error))?;
+    let root = root.canonicalize().map_err(|_| ImageError::NoSources(root))?;
     let target_dir = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let mut tried = Vec::new();
     if has_target(&mut tried) {

@@ -1,6 +1,9 @@
 //! What flies the unit: its release image on the emulated board, or its code on this computer.
 //!
-//! Both take the same plant, faults and bench. Out: remarks on what befell the unit, as rows of the summary.
+//! The image is the file that was named; else the one that the program was built with (`EMEMS_IMAGE`, see `build.rs`); else it is
+//! built from the sources that the program was built from. Both take the same plant, faults and bench. Out: remarks on what befell the unit, as rows of the summary.
+
+use std::path::Path;
 
 use emems::{estimate::Site, unit::Settings};
 use emulated::{Image, image::ImageError};
@@ -41,13 +44,27 @@ pub fn host(site: Site) -> Flight {
     })
 }
 
-/// The release image on the emulated board; builds it first.
+/// The image that the program was built with; empty for none.
+const WITHIN: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.elf"));
+
+/// The release image: the one in `file`, else the one within, else the sources'.
 ///
 /// # Errors
-/// When it cannot be built.
-pub fn image() -> Result<Flight, BoardError> {
-    let image = emulated::image::build()?;
-    Ok(on_emulated(image))
+/// When it cannot be read or built.
+pub fn release(file: Option<&Path>) -> Result<Image, ImageError> {
+    match file {
+        Some(file) => Image::read(file),
+        None if !WITHIN.is_empty() => Image::new(Path::new("the image in this program"), WITHIN.to_vec()),
+        None => emulated::image::build(),
+    }
+}
+
+/// The release image on the emulated board.
+///
+/// # Errors
+/// See [`release`].
+pub fn image(file: Option<&Path>) -> Result<Flight, BoardError> {
+    Ok(on_emulated(release(file)?))
 }
 
 fn on_emulated(image: Image) -> Flight {

@@ -60,6 +60,9 @@ pub struct Arguments {
     /// Run the unit's code on this computer instead of its image on the emulated board
     #[arg(long)]
     pub host: bool,
+    /// Fly this image: the ELF file that cargo build --release leaves [default: the one in this program, else the sources']
+    #[arg(long, value_name = "FILE", conflicts_with = "host")]
+    pub image: Option<PathBuf>,
     /// Where the flight's folder goes; an existing one is never overwritten
     #[arg(long, value_name = "DIR", default_value = "flights")]
     pub out: PathBuf,
