@@ -4,6 +4,7 @@ use embedded_hal_async::{i2c::I2c, spi::SpiDevice};
 use embedded_io_async::{Read, Write};
 
 use crate::nand::k9f1208::NandBus;
+pub use crate::sensor::tca9548a::RecoverBus;
 
 /// The set of types a board provides. One implementation per board file; none of them is named in `src/`.
 pub trait Board {
@@ -55,18 +56,6 @@ pub struct Parts<B: Board> {
     pub brown_out: BrownOut,
     /// How much of the stack has been used; may take as long as a packet's encoding.
     pub stack_use: fn() -> StackUse,
-}
-
-/// Frees a bus on which a transfer was abandoned.
-///
-/// A dropped transfer leaves the STM32F4's I2C peripheral with a pending START and never recovers by itself
-/// (virtual-board notes; RM0090 section 27.6.1, SWRST). After `recover` the peripheral is reset and configured
-/// again, up to nine SCL pulses have freed a slave that held SDA (I2C specification UM10204, section 3.1.16), and the
-/// TCA9548A's reset line has been pulsed, so no channel is selected.
-#[allow(async_fn_in_trait)]
-pub trait RecoverBus {
-    /// Takes at most 1 ms; says whether both lines are high afterwards.
-    async fn recover(&mut self) -> bool;
 }
 
 /// The two discrete inputs of the vehicle, `true` = asserted, polarity already undone.

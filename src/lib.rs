@@ -45,7 +45,13 @@ pub mod redundancy;
 pub mod resume;
 pub mod retained;
 pub mod sample;
-pub mod sensor;
 pub mod spin;
 pub mod triad;
 pub mod unit;
+
+/// The drivers of the parts, a package of their own.
+pub use emems_drivers as sensor;
+
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

@@ -60,7 +60,7 @@ pub enum SbomError {
 pub fn sbom(arguments: &Arguments) -> Result<(), SbomError> {
     let (package, target) = match arguments.program {
         Program::Image => ("emems", "thumbv7em-none-eabihf"),
-        Program::Ground => ("ground", "host-tuple"),
+        Program::Ground => ("emems-ground", "host-tuple"),
     };
     let lock = std::fs::read_to_string(Path::new("Cargo.lock"))?;
     let within = tree(package, target, "normal,no-proc-macro")?;

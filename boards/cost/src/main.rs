@@ -178,6 +178,6 @@ mod counted {
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!(
-        "This image is for the unit: cargo run --ignore-rust-version --target host-tuple -p emulated --example cost"
+        "This image is for the unit: cargo run --ignore-rust-version --target host-tuple -p emems-emulated --example cost"
     );
 }

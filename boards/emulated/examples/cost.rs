@@ -83,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ],
         ..Options::default()
     };
-    let image = image::build_package("cost")?;
+    let image = image::build_package("emems-cost")?;
     let report = fly_with(
         &options,
         &image,

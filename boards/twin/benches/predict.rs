@@ -1,4 +1,4 @@
-//! What the fast twin costs, by length of the log: `cargo bench --profile dev --ignore-rust-version --target host-tuple -p twin`.
+//! What the fast twin costs, by length of the log: `cargo bench --profile dev --ignore-rust-version --target host-tuple -p emems-twin`.
 //!
 //! The e-MEMS unit, 36 channels, five cycles a second, a tumble tabulated at 100 Hz. "Anew" is a prediction in which every
 //! instant, axis and lever arm is another than the nominal, so that nothing kept from before helps.

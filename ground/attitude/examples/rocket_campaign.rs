@@ -1,6 +1,6 @@
 //! Many units through the sounding rocket's flight: what the attitude was off by in each phase, and what it said.
 //!
-//! `cargo run --ignore-rust-version --target host-tuple -p attitude --example rocket_campaign -- [UNITS] [smooth|rough|rougher] [PAGE.html]`
+//! `cargo run --ignore-rust-version --target host-tuple -p emems-attitude --example rocket_campaign -- [UNITS] [smooth|rough|rougher] [PAGE.html]`
 //! flies so many units (default 100), each with its own parts, clocks and noise, on the host board in virtual time, some two
 //! seconds of processor each, and prints a line a phase. The page has the error and three standard deviations over the flight.
 //!

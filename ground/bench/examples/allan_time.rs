@@ -1,6 +1,6 @@
 //! How long four deviations at octave averaging times take, beside allantools in the same run.
 //!
-//! `cargo run --ignore-rust-version --target host-tuple -p bench --example allan_time [POINTS...]` prints a line for each
+//! `cargo run --ignore-rust-version --target host-tuple -p emems-bench --example allan_time [POINTS...]` prints a line for each
 //! length: the least of five runs, threads started. With `PYTHON` set to an interpreter that has allantools (see
 //! `peers/allan.py`), its time and the largest relative difference of any deviation stand beside.
 

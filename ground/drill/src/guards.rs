@@ -101,9 +101,10 @@ impl Guard {
         let (file, name) = self.test.split_once(": ").unwrap_or((&self.test, ""));
         let target = match file.strip_prefix("host-tests/tests/") {
             Some(file) => vec![
-                "-phost-tests".into(),
+                "-pemems-host-tests".into(),
                 format!("--test={}", file.trim_end_matches(".rs")),
             ],
+            None if file.starts_with("drivers/") => vec!["-pemems-drivers".into(), "--lib".into()],
             None => vec!["-pemems".into(), "--lib".into()],
         };
         (target, format!("{}{name}", module(file)))
@@ -112,7 +113,7 @@ impl Guard {
 
 /// The path of a unit test's module in its crate, with `::` after it; nothing for a test of its own crate.
 fn module(file: &str) -> String {
-    let Some(path) = file.strip_prefix("src/") else {
+    let Some(path) = file.trim_start_matches("drivers/").strip_prefix("src/") else {
         return String::new();
     };
     let path = path.trim_end_matches(".rs").replace('/', "::");
@@ -123,7 +124,10 @@ fn module(file: &str) -> String {
     }
 }
 
-/// What a copy's crate gets, so that its guards can be taken away.
+/// The crates that have guards.
+const LIBRARIES: [&str; 2] = ["src/lib.rs", "drivers/src/lib.rs"];
+
+/// What each of them gets in the copy, so that its guards can be taken away.
 const REMOVED: &str = "
 extern crate std;
 /// Whether the environment takes this guard away.
@@ -189,9 +193,11 @@ pub fn run(root: &Path, only: &[String]) -> Result<(), GuardError> {
         let text = fs::read_to_string(&path).map_err(io(&guard.file))?;
         fs::write(&path, guard.made_removable(number, &text)?).map_err(io(&guard.file))?;
     }
-    let library = copy.join("src/lib.rs");
-    let text = fs::read_to_string(&library).map_err(io("src/lib.rs"))?;
-    fs::write(&library, text + REMOVED).map_err(io("src/lib.rs"))?;
+    for library in LIBRARIES {
+        let path = copy.join(library);
+        let text = fs::read_to_string(&path).map_err(io(library))?;
+        fs::write(&path, text + REMOVED).map_err(io(library))?;
+    }
     let (mut loose, mut tried) = (0, 0);
     for (number, guard) in guards.iter().enumerate() {
         if !only.is_empty() && !only.iter().any(|only| guard.guard.contains(only)) {
@@ -270,6 +276,7 @@ mod tests {
         assert_eq!(module("src/mode/tests.rs"), "mode::tests::");
         assert_eq!(module("src/flight_log/page.rs"), "flight_log::page::tests::");
         assert_eq!(module("src/kalman/tests/hostile.rs"), "kalman::tests::hostile::");
+        assert_eq!(module("drivers/src/adis16265/tests.rs"), "adis16265::tests::");
         assert_eq!(module("host-tests/tests/guards.rs"), "");
     }
 }

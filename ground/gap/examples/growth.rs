@@ -5,7 +5,7 @@
 //! most memory the process has had so far (Linux only), which is why lengths should rise.
 //!
 //! ```sh
-//! cargo run --ignore-rust-version --target host-tuple -p gap --example growth 10 60 300
+//! cargo run --ignore-rust-version --target host-tuple -p emems-gap --example growth 10 60 300
 //! ```
 
 use std::{error::Error, fmt::Write, fs, time::Instant};

@@ -1,6 +1,6 @@
 //! Every input of every corpus, replayed on stable Rust: what once found something finds nothing now.
 //!
-//! A failing input is named: `cargo test -p hostile NAME` runs one target's again. Each target must have a corpus, so that
+//! A failing input is named: `cargo test -p emems-hostile NAME` runs one target's again. Each target must have a corpus, so that
 //! none is replayed in name only.
 
 use std::{

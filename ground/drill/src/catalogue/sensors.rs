@@ -117,8 +117,8 @@ pub(super) const ROWS: [Row; 23] = [
         )]),
         &[
             "host-tests/tests/guards.rs: s6_a_byte_that_is_not_acknowledged_once_costs_no_reading",
-            "src/sensor/lis331hh/tests.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
-            "src/sensor/tmp102.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
+            "drivers/src/lis331hh/tests.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
+            "drivers/src/tmp102.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
         ],
         "",
     ),
@@ -140,7 +140,7 @@ pub(super) const ROWS: [Row; 23] = [
         &[
             "host-tests/tests/guards.rs: s8_a_gyro_that_answers_at_random_is_marked_from_the_second_packet_on",
             "host-tests/tests/guards.rs: s8_a_gyro_that_dies_between_two_cycles_adds_no_zeros_to_its_increments",
-            "src/sensor/adis16265/tests.rs: a_held_line_is_not_a_gyro_but_a_still_one_is",
+            "drivers/src/adis16265/tests.rs: a_held_line_is_not_a_gyro_but_a_still_one_is",
         ],
         "",
     ),
@@ -161,7 +161,7 @@ pub(super) const ROWS: [Row; 23] = [
         None,
         &[
             "host-tests/tests/guards.rs: s10_a_magnetometer_beyond_its_range_says_so",
-            "src/sensor/hmc5883l/tests.rs: a_lock_left_by_a_partial_reading_is_opened_and_the_held_set_not_used",
+            "drivers/src/hmc5883l/tests.rs: a_lock_left_by_a_partial_reading_is_opened_and_the_held_set_not_used",
         ],
         "",
     ),
@@ -186,7 +186,7 @@ pub(super) const ROWS: [Row; 23] = [
         )]),
         &[
             "host-tests/tests/guards.rs: s12_a_part_that_restarts_by_itself_is_found_by_the_verification_in_turn",
-            "src/sensor/lis331hh/tests.rs: verify_finds_a_part_that_restarted",
+            "drivers/src/lis331hh/tests.rs: verify_finds_a_part_that_restarted",
         ],
         "",
     ),
@@ -196,7 +196,7 @@ pub(super) const ROWS: [Row; 23] = [
         None,
         &[
             "src/calibration/tests.rs: exchanged_plates_swapped_axes_and_signs_are_refused",
-            "src/sensor/lis331hh/tests.rs: another_part_is_refused_by_its_identity_and_not_written_to",
+            "drivers/src/lis331hh/tests.rs: another_part_is_refused_by_its_identity_and_not_written_to",
         ],
         "one address twice on a plate is not made on a board: the wired AND of two parts",
     ),

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
-//! use emems::sensor::lis331hh::{ADDRESS, Config, Lis331hh};
+//! use emems_drivers::lis331hh::{ADDRESS, Config, Lis331hh};
 //!
 //! # embassy_futures::block_on(async {
 //! // On a board this is the I2C of its HAL.
@@ -24,7 +24,7 @@
 //! let force_mg = sample.counts.map(|counts| f32::from(counts) * config.full_scale.mg_per_count());
 //! assert_eq!(force_mg, [-945.0, 6.0, -294.0]);
 //! # bus.done();
-//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # Ok::<(), emems_drivers::Error<_>>(())
 //! # })
 //! # .unwrap();
 //! ```

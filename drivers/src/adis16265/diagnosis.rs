@@ -24,7 +24,7 @@ const SOFTWARE_RESET: u8 = 1 << 7;
 
 /// Content of DIAG_STAT. Reading it clears it; what persists is set again by the next sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Diagnosis(pub u16);
 
 /// One bit of [`Diagnosis`].

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
-//! use emems::sensor::hmc5883l::{ADDRESS, Config, Hmc5883l};
+//! use emems_drivers::hmc5883l::{ADDRESS, Config, Hmc5883l};
 //!
 //! # embassy_futures::block_on(async {
 //! let reads = |first, bytes: &[u8], data: [u8; 6]| {
@@ -33,7 +33,7 @@
 //! let field_ut = sample.counts.map(|counts| 100.0 * f32::from(counts) / f32::from(Config::default().gain.counts_per_gauss()));
 //! assert!((field_ut[0] - 11.01).abs() < 0.01);
 //! # bus.done();
-//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # Ok::<(), emems_drivers::Error<_>>(())
 //! # })
 //! # .unwrap();
 //! ```

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
-//! use emems::sensor::tmp102::{ADDRESS, CELSIUS_PER_COUNT, Tmp102};
+//! use emems_drivers::tmp102::{ADDRESS, CELSIUS_PER_COUNT, Tmp102};
 //!
 //! # embassy_futures::block_on(async {
 //! // On a board this is the I2C of its HAL.
@@ -15,7 +15,7 @@
 //! let counts = Tmp102::new(bus.clone()).read().await?;
 //! assert_eq!(f32::from(counts) * CELSIUS_PER_COUNT, 25.0);
 //! # bus.done();
-//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # Ok::<(), emems_drivers::Error<_>>(())
 //! # })
 //! # .unwrap();
 //! ```

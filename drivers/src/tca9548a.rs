@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
-//! use emems::sensor::{tca9548a::{self, Switch}, tmp102::{self, Tmp102}};
+//! use emems_drivers::{tca9548a::{self, Switch}, tmp102::{self, Tmp102}};
 //!
 //! # embassy_futures::block_on(async {
 //! let start = || Transaction::transaction_start(tmp102::ADDRESS);
@@ -35,10 +35,20 @@ use core::fmt;
 use embassy_sync::{blocking_mutex::raw::NoopRawMutex, mutex::Mutex};
 use embedded_hal_async::i2c::{ErrorKind, ErrorType, I2c, Operation};
 
-use crate::board::RecoverBus;
-
 /// Bus address with A2, A1, A0 low.
 pub const ADDRESS: u8 = 0x70;
+
+/// Frees a bus on which a transfer was abandoned.
+///
+/// A dropped transfer leaves the STM32F4's I2C peripheral with a pending START and never recovers by itself
+/// (RM0090 section 27.6.1, SWRST). After `recover` the peripheral is reset and configured
+/// again, up to nine SCL pulses have freed a slave that held SDA (I2C specification UM10204, section 3.1.16), and the
+/// TCA9548A's reset line has been pulsed, so no channel is selected.
+#[allow(async_fn_in_trait)]
+pub trait RecoverBus {
+    /// Takes at most 1 ms; says whether both lines are high afterwards.
+    async fn recover(&mut self) -> bool;
+}
 
 /// The bus and what is known of the control register.
 struct Shared<I2C> {
@@ -138,7 +148,7 @@ impl<I2C: I2c> I2c for Channel<'_, I2C> {
 
 /// Why a transaction through the multiplexer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<E> {
     /// The multiplexer itself did not answer: no part of any plate can be reached.
     Select(E),

@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use embedded_hal_mock::eh1::{delay::NoopDelay, spi::{Mock, Transaction}};
-//! use emems::sensor::adis16265::{Adis16265, Range};
+//! use emems_drivers::adis16265::{Adis16265, Range};
 //!
 //! # embassy_futures::block_on(async {
 //! let frame = |sent, answered| {
@@ -29,7 +29,7 @@
 //! assert_eq!((rate.counts, rate.fresh), (2203, true));
 //! assert!((f32::from(rate.counts) * Range::default().deg_s_per_count() - 161.39).abs() < 0.01);
 //! # spi.done();
-//! # Ok::<(), emems::sensor::Error<_>>(())
+//! # Ok::<(), emems_drivers::Error<_>>(())
 //! # })
 //! # .unwrap();
 //! ```
@@ -123,7 +123,7 @@ impl Config {
 
 /// One output register, taken apart (data sheet, output data registers).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Output {
     /// \[counts\] of the register read: [`Range::deg_s_per_count`], or [`CELSIUS_PER_COUNT`] above 25 degC.
     pub counts: i16,

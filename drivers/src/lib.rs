@@ -1,10 +1,16 @@
-//! Drivers, one part a file: bytes on a bus to counts. Registers are named as in the datasheets.
+#![doc = include_str!("../README.md")]
+//!
+//! # How they are built
+//!
+//! One part a file: bytes on a bus to counts. Registers are named as in the datasheets.
 //!
 //! Every driver of a sensor has the same four doors, each bounded in bus transactions: `probe` asks cheaply whether the
 //! part is there, `configure` writes its settings and reads them back, `verify` reads them back again later (a part that
 //! browned out comes back with its power-on settings), and `read` takes one sample. No driver keeps time; those that must
 //! wait take an [`embedded_hal_async::delay::DelayNs`]. All fail with the same [`Error`], which names part, register and
 //! value, so that whoever reports it need not know which part it came from.
+#![no_std]
+#![forbid(unsafe_code)]
 
 use core::fmt;
 
@@ -16,7 +22,7 @@ pub mod tmp102;
 
 /// A register of a part, as errors name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Register {
     /// The part's name.
     pub part: &'static str,
@@ -34,7 +40,7 @@ impl fmt::Display for Register {
 
 /// Why a sensor could not be read or configured. Values are as wide as the part's registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<E> {
     /// The bus failed in the transaction that starts at this register, or nobody answered.
     Bus(Register, E),
