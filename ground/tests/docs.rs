@@ -211,6 +211,26 @@ fn every_link_leads_somewhere() {
 }
 
 #[test]
+fn the_book_leads_to_no_file_outside_of_it() {
+    let docs = root().join("docs").canonicalize().expect("is there");
+    let mut pages = Vec::new();
+    markdown(&docs, &mut pages);
+    for page in &pages {
+        let folder = page.parent().expect("has a folder");
+        for link in read(&fs::read_to_string(page).expect("is text")).1 {
+            let file = link.split('#').next().unwrap_or_default();
+            // What is not there is another test's.
+            let Ok(target) = folder.join(file).canonicalize() else { continue };
+            assert!(
+                target.starts_with(&docs),
+                "{}: {link} is in no built book; name it without a link",
+                page.display()
+            );
+        }
+    }
+}
+
+#[test]
 fn every_page_of_the_book_is_in_its_summary() {
     let docs = root().join("docs");
     let summary = fs::read_to_string(docs.join("SUMMARY.md")).expect("is there");

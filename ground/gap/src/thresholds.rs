@@ -121,7 +121,7 @@ thresholds! {
     TEMPERATURE: f64 = 2.0, in "1",
         larger: "probabilities nearer to even",
         smaller: "over-confident probabilities",
-        Assumed("a guess; TRIALS.md says how far it holds");
+        Assumed("a guess; docs/gap/trials.md says how far it holds");
     /// Probability from which an alternative is listed.
     LISTED: f64 = 0.005, in "probability",
         larger: "shorter lists",
@@ -254,7 +254,7 @@ thresholds! {
     DOUBTED: f64 = 10.0, in "nats",
         larger: "weak true names are lost",
         smaller: "weak wrong names are said",
-        Fitted("wrong names of the dealt cases had 8 to 26 nats; an effect of ratio 8 has 32 before its prior odds (TRIALS.md)");
+        Fitted("wrong names of the dealt cases had 8 to 26 nats; an effect of ratio 8 has 32 before its prior odds (docs/gap/trials.md)");
     /// Step that multiplies those odds by e.
     DOUBT_STEP: f64 = 3.0, in "nats",
         larger: "a softer threshold",
@@ -269,7 +269,7 @@ thresholds! {
     UNTOLD: f64 = 0.5, in "probability",
         larger: "patches are believed",
         smaller: "rare true effects are doubted",
-        Fitted("on dealt cases two wrong names were such, and no right one (TRIALS.md)");
+        Fitted("on dealt cases two wrong names were such, and no right one (docs/gap/trials.md)");
     /// Share of the time that counts as a regime.
     REGIME_TIME: f64 = 0.3, in "share",
         larger: "vague regimes",

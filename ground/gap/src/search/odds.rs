@@ -51,7 +51,7 @@ pub fn probability_of_any(library: &Library, chosen: &Chosen) -> f64 {
 
 /// Probability that an effect of so many times its largest size is itself and no proxy: at odds that fall with the fourth power,
 /// for evidence has a price for sizes well below the largest. Of 14 names with a quarter to two thirds of it 13 were right, on
-/// trials that were looked at (TRIALS.md).
+/// trials that were looked at (docs/gap/trials.md).
 pub fn itself(excess: f64) -> f64 {
     1.0 / (1.0 + excess.powi(4))
 }
