@@ -45,7 +45,8 @@ pub fn brown_out() -> BrownOut {
     }
 }
 
-/// Starts the clocks and says what they come from. The HAL would wait for a dead crystal for ever, so the crystal is tried before it is asked to.
+/// Starts the clocks and says what they come from. The HAL would wait for a dead crystal for ever, so the crystal is tried before
+/// it is asked to.
 pub fn start() -> (Peripherals, Oscillator) {
     let crystal = hse_starts();
     let mut config = Config::default();

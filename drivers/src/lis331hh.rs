@@ -49,9 +49,9 @@ const ZYXOR: u8 = 0x80;
 /// STATUS_REG: all axes are new.
 const ZYXDA: u8 = 0x08;
 
-/// [counts at 6 g] by how much self-test may move x, y, z (datasheet, mechanical characteristics, Vst at 6 g). Upper limits and all of z are the
-/// datasheet's; its lower limit of x and y is taken from the sister part LIS331DLH (120 of at most 550 mg), whose upper
-/// limit is this one's too.
+/// [counts at 6 g] by how much self-test may move x, y, z (datasheet, mechanical characteristics, Vst at 6 g). Upper limits and
+/// all of z are the datasheet's; its lower limit of x and y is taken from the sister part LIS331DLH (120 of at most 550 mg), whose
+/// upper limit is this one's too.
 const SELF_TEST_COUNTS: [(i16, i16); 3] = [(40, 180), (40, 180), (220, 370)];
 /// \[ms\] five samples at the slowest rate: the new state has passed the filter (datasheet, turn-on time: 1/ODR + 1 ms).
 const SETTLING_MS: u32 = 100;

@@ -7,7 +7,8 @@
 //! A value of the packet is text, four hexadecimal digits, and XTCE has no encoding for that. So `a1x_text` is a string parameter
 //! of the container, and an algorithm in JavaScript, as Yamcs runs it, gives `a1x`: its raw value is counts, and the
 //! calibrator of its type gives nominal SI. Of a value that was not read, or that a magnetometer marks as overflowed, there is
-//! no `a1x`; a code that no part can give, which si.csv leaves out, has one. The packet has no checksum: the container is chosen by its first byte.
+//! no `a1x`; a code that no part can give, which si.csv leaves out, has one. The packet has no checksum: the container is chosen
+//! by its first byte.
 
 use std::fmt::Write;
 

@@ -1,8 +1,8 @@
 //! What one update of an attitude filter costs on the unit's processor, ours beside those of published crates.
 //!
 //! In: nothing; the motion is a tumble computed here, the same exact rates, specific force and field for each; for ours a rest
-//! as well, where it compares more. Out: the static `COSTS`, ticks of the processor's clock for every update of every filter, which the emulated board reads when
-//! `DONE` is one. On that board a tick is an instruction.
+//! as well, where it compares more. Out: the static `COSTS`, ticks of the processor's clock for every update of every filter,
+//! which the emulated board reads when `DONE` is one. On that board a tick is an instruction.
 //!
 //! Every filter has its own defaults. Ours gathers samples and updates once a second (`emems::kalman`), so most of its
 //! steps are cheap and the eight or ten after that are not; the others do the same at every sample.

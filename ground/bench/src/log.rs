@@ -1,8 +1,8 @@
 //! A raw log: every sample of some channels, in counts.
 //!
 //! In: a stream of the unit's packets, however damaged, or a table with a column a channel. Out: one row of samples a
-//! cycle, `NaN` where a value was not read, stood at the end of its part's range, or a packet is missing. Packets are told from tables by their first frame.
-//! Refused: channels the log does not have, and logs without a sample.
+//! cycle, `NaN` where a value was not read, stood at the end of its part's range, or a packet is missing. Packets are told from
+//! tables by their first frame. Refused: channels the log does not have, and logs without a sample.
 
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! A file as it is or packed: gzip is told by its first two bytes, not by its name.
 //!
-//! In: a path or a reader. Out: its bytes, unpacked within the limits of [`packed`]. A gzip stream that ends early is an error of its reader, never an end.
+//! In: a path or a reader. Out: its bytes, unpacked within the limits of [`packed`]. A gzip stream that ends early is an error of
+//! its reader, never an end.
 
 use std::{
     fs::File,

@@ -44,7 +44,8 @@ use session::Session;
 /// `ground console`: talk to the unit over its umbilical, see all sensors live, keep everything it says
 ///
 /// Opens the port at 115200 8N1, and opens it again when it was unplugged. The unit's words are sent as typed, other words are
-/// answered here; `?` shows the keys and the unit's commands. The recording holds the received bytes as they came: `ground decode` reads it.
+/// answered here; `?` shows the keys and the unit's commands. The recording holds the received bytes as they came: `ground decode`
+/// reads it.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ground console /dev/ttyUSB0 --record pad.log\n  echo G_ST | ground console /dev/ttyUSB0 --plain"

@@ -226,8 +226,8 @@ fn contains(text: &str, word: &[u8]) -> bool {
     text.as_bytes().windows(word.len()).any(|letters| letters == word)
 }
 
-/// The mode a reply reports: "mode FLIGHT: lift-off", "G_MV ok: FLIGHT", "G_ST WAIT task none ...", "lift-off: FLIGHT, ...". Refusals ("G_MA no: only in WAIT") and the
-/// unit's help ("G_MT WAIT: ...") name modes too, and report none.
+/// The mode a reply reports: "mode FLIGHT: lift-off", "G_MV ok: FLIGHT", "G_ST WAIT task none ...", "lift-off: FLIGHT, ...".
+/// Refusals ("G_MA no: only in WAIT") and the unit's help ("G_MT WAIT: ...") name modes too, and report none.
 fn mode_reported(reply: &str) -> Option<Mode> {
     let mut words = reply.split(' ');
     let name = match (words.next()?, words.next()?) {

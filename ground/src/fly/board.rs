@@ -1,7 +1,8 @@
 //! What flies the unit: its release image on the emulated board, or its code on this computer.
 //!
 //! The image is the file that was named; else the one that the program was built with (`EMEMS_IMAGE`, see `build.rs`); else it is
-//! built from the sources that the program was built from. Both take the same plant, faults and bench. Out: remarks on what befell the unit, as rows of the summary.
+//! built from the sources that the program was built from. Both take the same plant, faults and bench. Out: remarks on what befell
+//! the unit, as rows of the summary.
 
 use std::path::Path;
 

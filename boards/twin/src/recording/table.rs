@@ -2,8 +2,9 @@
 //!
 //! In: the file and the names of the columns that matter; all others are ignored, whatever they hold. An empty cell is
 //! "no sample". Out: [`Series`] of columns that belong together. Refuses, with line and column, what is no number, NaN and
-//! infinity, numbers beyond [`MOST`], time that stands or goes back, a ragged line, a vector that is empty in part, a damaged gzip, more than
-//! [`MAX_ROWS`] lines or [`MAX_BYTES`], and a gzip bomb ([`packed`]), so that no file can exhaust memory or patience.
+//! infinity, numbers beyond [`MOST`], time that stands or goes back, a ragged line, a vector that is empty in part, a damaged
+//! gzip, more than [`MAX_ROWS`] lines or [`MAX_BYTES`], and a gzip bomb ([`packed`]), so that no file can exhaust memory or
+//! patience.
 
 use std::fs::File;
 use std::io::{self, Read};

@@ -49,8 +49,8 @@ pub fn case(name: &str, motion: &str, field_n_ut: [f64; 3]) -> Case {
     }
 }
 
-/// A log of a nine-axis unit with its optical reference smoothed at these corners \[Hz\], of attitude and position; samples the reference did not see are
-/// left out.
+/// A log of a nine-axis unit with its optical reference smoothed at these corners \[Hz\], of attitude and position; samples the
+/// reference did not see are left out.
 pub fn optical(name: &str, gravity: f64, field_n_ut: [f64; 3], corners_hz: Option<[f64; 2]>) -> Case {
     let folder = file(&format!("practice/{name}"));
     let unit = UnitDescription::open(&folder.join("unit.toml")).unwrap();

@@ -1,8 +1,9 @@
 //! A set over the umbilical: sent, used, read back.
 //!
 //! In: a line to the unit and the bytes the unit carries. Out: what the unit says of the set it now uses, which was read
-//! back and is the same. Words of four bytes (`G_CW`), an order to use and keep them (`G_CL`, confirmed by `G_CK`) and to read (`G_CR`). Lost and
-//! damaged words are sent again, the whole at most [`TRIES`] times; packets and other lines in between are passed over.
+//! back and is the same. Words of four bytes (`G_CW`), an order to use and keep them (`G_CL`, confirmed by `G_CK`) and to read
+//! (`G_CR`). Lost and damaged words are sent again, the whole at most [`TRIES`] times; packets and other lines in between are
+//! passed over.
 //!
 //! Refuses what the unit refuses, in its words; a silent line; a set that reads back differently.
 
