@@ -1,5 +1,6 @@
-//! Link arguments of the firmware, which board file it is built for (`EMEMS_BOARD`, default `obc`), and the calibration set it
-//! starts with (`EMEMS_CALIBRATION`, a file of `ground calibration apply --out`; nominal without).
+//! Link arguments of the firmware, which board of `boards/` it is built for (`EMEMS_BOARD`, default `obc`), and the calibration set
+//! it starts with (`EMEMS_CALIBRATION`, a file of `ground calibration apply --out`; nominal without). Refuses a board without a
+//! file there.
 
 use std::{env, fs, path::Path};
 
@@ -7,10 +8,8 @@ fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-env-changed=EMEMS_BOARD");
-    println!("cargo:rustc-check-cfg=cfg(board, values(\"obc\", \"discovery\"))");
+    board();
     calibration();
-    let board = env::var("EMEMS_BOARD").unwrap_or_else(|_| "obc".into());
-    println!("cargo:rustc-cfg=board=\"{board}\"");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
         println!(
             "cargo:rustc-link-search={}",
@@ -20,6 +19,26 @@ fn main() {
             println!("cargo:rustc-link-arg-bins={argument}");
         }
     }
+}
+
+/// Says for which board `src/main.rs` is compiled: one of the files of `boards/`. A new one is asked for by another `EMEMS_BOARD`.
+fn board() {
+    let files = fs::read_dir("boards").expect("boards/ is there").flatten();
+    let mut boards: Vec<String> = files
+        .filter_map(|file| Some(file.file_name().to_str()?.strip_suffix(".rs")?.to_owned()))
+        .collect();
+    boards.sort();
+    println!(
+        "cargo:rustc-check-cfg=cfg(board, values(\"{}\"))",
+        boards.join("\", \"")
+    );
+    let board = env::var("EMEMS_BOARD").unwrap_or_else(|_| "obc".into());
+    assert!(
+        boards.contains(&board),
+        "EMEMS_BOARD={board}: boards/ has {}",
+        boards.join(", ")
+    );
+    println!("cargo:rustc-cfg=board=\"{board}\"");
 }
 
 /// Puts the bytes of the set where `src/calibration/compiled.rs` takes them from; none for no set.

@@ -220,7 +220,9 @@ fn the_book_leads_to_no_file_outside_of_it() {
         for link in read(&fs::read_to_string(page).expect("is text")).1 {
             let file = link.split('#').next().unwrap_or_default();
             // What is not there is another test's.
-            let Ok(target) = folder.join(file).canonicalize() else { continue };
+            let Ok(target) = folder.join(file).canonicalize() else {
+                continue;
+            };
             assert!(
                 target.starts_with(&docs),
                 "{}: {link} is in no built book; name it without a link",
