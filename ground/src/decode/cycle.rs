@@ -129,13 +129,7 @@ impl Cycle {
 
 #[cfg(test)]
 mod tests {
-    use emems::{
-        derived::{Derived, Health},
-        estimate::Estimate,
-        increments::Integrator,
-        mode::Mode,
-        sample::{NO_SLOT, Reading, SENSOR_COUNT},
-    };
+    use emems::{derived::Derived, sample::Reading};
     use packets::stream::sequence::Step;
 
     use super::*;
@@ -151,16 +145,9 @@ mod tests {
 
     fn frame(counter: u16, start_us: u64) -> Entry {
         Entry::Derived(Box::new(Derived {
-            counter,
             start_us,
-            mode: Mode::Wait,
-            health: Health::default(),
-            start: None,
             cycle_us: 5_000,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
-            increments: Integrator::new(1.0).take(),
-            estimate: Estimate::NOTHING,
-            estimate_us: 0,
+            ..Derived::nothing(counter)
         }))
     }
 
