@@ -20,7 +20,7 @@ use recorder::{dump::DumpError, recover::RecoverError};
 use crate::{
     console,
     decode::DecodeError,
-    fly::{FlyError, source::SourceError},
+    fly::{FlyError, board::BoardError, source::SourceError},
     size::SizeError,
 };
 
@@ -107,7 +107,11 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
         return !matches!(error, RecoverError::Output(_));
     }
     if let Some(error) = error.downcast_ref::<FlyError>() {
-        return matches!(error, FlyError::Source(_) | FlyError::Plan(_));
+        let is_bad_image = |error: &BoardError| matches!(error, BoardError::Image(error) if error.is_of_the_file());
+        return match error {
+            FlyError::Board(error) => is_bad_image(error),
+            error => matches!(error, FlyError::Source(_) | FlyError::Plan(_)),
+        };
     }
     if let Some(error) = error.downcast_ref::<AllanError>() {
         return matches!(error, AllanError::Table(_));

@@ -109,6 +109,12 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
     };
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
+    // An image that cannot be read or built must not leave an empty folder.
+    let flight = if arguments.host {
+        board::host(source.site)
+    } else {
+        board::image(arguments.image.as_deref())?
+    };
     // Without an end the scene is that of the motion, or of an hour.
     let scene_s = match duration {
         plan::UNTIL_TOLD => source.truth.duration_s().unwrap_or(3_600.0),
@@ -118,12 +124,6 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
     for warning in prepared.iter().flat_map(|prepared| &prepared.warnings) {
         eprintln!("warning: {warning}");
     }
-    // An image that cannot be built must not leave an empty folder.
-    let flight = if arguments.host {
-        board::host(source.site)
-    } else {
-        board::image(arguments.image.as_deref())?
-    };
     let name = format!("{}-{}", source.name, arguments.seed);
     let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
     let is_paced = arguments.real_time || arguments.console;

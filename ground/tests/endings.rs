@@ -31,6 +31,8 @@ fn bad_input_is_code_2_with_the_reason_and_no_output() {
         &["recover", &page, "--table", &have],
         &["attitude", &page],
         &["decode", &page, "--no-such-option"],
+        &["fly", "--image", &page],
+        &["fly", "--image", &page, "--host"],
     ] {
         let output = run(words);
         assert_eq!(output.status.code(), Some(2), "{words:?}: {}", said(&output));

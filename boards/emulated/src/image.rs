@@ -50,6 +50,17 @@ pub enum ImageError {
 
 impl std::error::Error for ImageError {}
 
+impl ImageError {
+    /// Whether it is the named file that is at fault, and not the sources or the compiler.
+    pub fn is_of_the_file(&self) -> bool {
+        use ImageError::{Architecture, Damaged, NoSymbol, NotElf, Read};
+        matches!(
+            self,
+            Read(..) | NotElf(_) | Architecture(..) | Damaged(..) | NoSymbol(..)
+        )
+    }
+}
+
 impl fmt::Display for ImageError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
