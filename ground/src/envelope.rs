@@ -1,9 +1,9 @@
 //! A flight of any length in a fixed number of bins: what a plot can show of it.
 //!
 //! In: packets by number, with the interval since the one before where it is known. Out: [`Bin`]s of equal length in
-//! packets, each with the least and most count of every channel, the sensors that failed or stood at the end of their range,
-//! packets missed, and flags. A new packet beyond the last bin merges bins in pairs, so memory is bounded (about 400 KiB) and a
-//! short flight keeps one packet a bin. A peak is never lost, only known less sharply in time.
+//! packets, each with the least and most count of every channel, the sensors that failed or stood at the end of their range, packets missed, and flags.
+//! A new packet beyond the last bin merges bins in pairs, so memory is bounded (about 400 KiB) and a short flight keeps
+//! one packet a bin. A peak is never lost, only known less sharply in time.
 
 use emems::sample::Reading;
 

@@ -1,8 +1,7 @@
 //! One chart: lines over time with gaps, failures and flight events; or bars.
 //!
 //! In: values by bin. Out: drawing on a part of a figure. Lines break where nothing was read. Along the bottom, a strip
-//! shows where a sensor failed, one where packets were missed and one where a sensor stood at the end of its range; micro-gravity
-//! is shaded, lift-off is a vertical line.
+//! shows where a sensor failed, one where packets were missed and one where a sensor stood at the end of its range; micro-gravity is shaded, lift-off is a vertical line.
 
 use std::ops::Range;
 
