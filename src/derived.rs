@@ -36,7 +36,7 @@ use crate::{
     increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::hex_value,
-    sample::{NO_SLOT, NOT_READ, SENSOR_COUNT},
+    sample::{NO_SLOT, SENSOR_COUNT},
 };
 
 pub use health::Health;
@@ -99,37 +99,6 @@ pub struct Derived {
     pub estimate_us: u32,
     /// What it all says of the attitude.
     pub estimate: Estimate,
-}
-
-impl Derived {
-    /// The frame of a cycle in WAIT of which nothing was sampled and nothing is known: what it says beside that is the caller's.
-    pub const fn nothing(counter: u16) -> Self {
-        const SILENT: Channel = Channel {
-            integral_counts_s: 0.0,
-            least: NOT_READ,
-            most: NOT_READ,
-            count: 0,
-        };
-        Derived {
-            counter,
-            start_us: 0,
-            mode: Mode::Wait,
-            health: Health(0),
-            start: None,
-            cycle_us: 0,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
-            increments: Increments {
-                angle_b: [0.0; 3],
-                covered_us: 0,
-                end_us: 0,
-                gyro: [SILENT; 4],
-                forces: [Force::NONE; READINGS],
-                slices: [Slice::NONE; SLICES],
-            },
-            estimate_us: 0,
-            estimate: Estimate::NOTHING,
-        }
-    }
 }
 
 /// Why bytes are not a derived frame.

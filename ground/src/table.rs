@@ -203,7 +203,9 @@ mod tests {
         board::ResetCause,
         crash::CrashCause,
         derived::{Health, Start},
-        increments::Increments,
+        estimate::Estimate,
+        increments::{Channel, Increments, SLICES, Slice},
+        mode::Mode,
         packet,
     };
 
@@ -251,12 +253,25 @@ mod tests {
 
     #[test]
     fn rows_have_as_many_cells_as_their_header() {
-        let nothing = Derived::nothing(1);
+        let silent = Channel {
+            integral_counts_s: 0.0,
+            least: NOT_READ,
+            most: NOT_READ,
+            count: 0,
+        };
         let derived = Derived {
+            counter: 1,
             start_us: 200_000,
+            mode: Mode::Wait,
             health: Health(0x80),
+            start: None,
             cycle_us: 3_700,
+            slots_us: [NO_SLOT; 16],
             increments: Increments {
+                angle_b: [0.0; 3],
+                covered_us: 0,
+                end_us: 0,
+                gyro: [silent; 4],
                 forces: [
                     Force {
                         acc_p: [[7; 3]; 4],
@@ -264,9 +279,10 @@ mod tests {
                     },
                     Force::NONE,
                 ],
-                ..nothing.increments
+                slices: [Slice::NONE; SLICES],
             },
-            ..nothing
+            estimate_us: 0,
+            estimate: Estimate::NOTHING,
         };
         let check = |header: String, row: String| assert_eq!(header.matches(',').count(), row.matches(',').count());
         check(counts_header(), counts_row(0.0, &golden()));

@@ -150,7 +150,11 @@ fn channel(before: i16, now: i16, covered_us: u32) -> Channel {
 
 #[cfg(test)]
 mod tests {
-    use emems::sample::{Errors, NO_SLOT};
+    use emems::{
+        derived::Health,
+        increments::Integrator,
+        sample::{Errors, NO_SLOT},
+    };
 
     use super::*;
 
@@ -203,13 +207,19 @@ mod tests {
 
     fn frame(counter: u16) -> Item {
         let derived = Derived {
+            counter,
             start_us: 1_000_000 + 200_000 * u64::from(counter),
+            mode: emems::mode::Mode::Wait,
+            health: Health::default(),
+            start: None,
             cycle_us: 5_000,
+            slots_us: [NO_SLOT; SENSOR_COUNT],
             increments: Increments {
                 covered_us: 190_000,
-                ..Derived::nothing(counter).increments
+                ..Integrator::new(1.0).take()
             },
-            ..Derived::nothing(counter)
+            estimate: emems::estimate::Estimate::NOTHING,
+            estimate_us: 0,
         };
         Item::Derived {
             offset: 0,

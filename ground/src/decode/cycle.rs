@@ -129,7 +129,13 @@ impl Cycle {
 
 #[cfg(test)]
 mod tests {
-    use emems::{derived::Derived, sample::Reading};
+    use emems::{
+        derived::{Derived, Health},
+        estimate::Estimate,
+        increments::Integrator,
+        mode::Mode,
+        sample::{NO_SLOT, Reading, SENSOR_COUNT},
+    };
     use packets::stream::sequence::Step;
 
     use super::*;
@@ -145,9 +151,16 @@ mod tests {
 
     fn frame(counter: u16, start_us: u64) -> Entry {
         Entry::Derived(Box::new(Derived {
+            counter,
             start_us,
+            mode: Mode::Wait,
+            health: Health::default(),
+            start: None,
             cycle_us: 5_000,
-            ..Derived::nothing(counter)
+            slots_us: [NO_SLOT; SENSOR_COUNT],
+            increments: Integrator::new(1.0).take(),
+            estimate: Estimate::NOTHING,
+            estimate_us: 0,
         }))
     }
 

@@ -2,8 +2,11 @@
 
 use emems::{
     derived::DERIVED_BYTES,
+    estimate::Estimate,
+    increments::Integrator,
     mode::Mode,
     packet::{Expected, PACKET_BYTES, encode},
+    sample::{NO_SLOT, SENSOR_COUNT},
 };
 use proptest::prelude::*;
 
@@ -19,10 +22,16 @@ fn whole(counter: u16) -> Item {
 
 fn derived() -> Derived {
     Derived {
+        counter: 1,
         start_us: 200_000,
         mode: Mode::Flight,
+        health: derived::Health(0),
+        start: None,
         cycle_us: 8000,
-        ..Derived::nothing(1)
+        slots_us: [NO_SLOT; SENSOR_COUNT],
+        increments: Integrator::new(1.0).take(),
+        estimate_us: 0,
+        estimate: Estimate::NOTHING,
     }
 }
 
