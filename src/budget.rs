@@ -41,7 +41,7 @@ impl Budget {
     pub fn limit_us(&self, elapsed_us: u64, waiting: u64, failed: bool) -> u64 {
         // In a short cycle the reserves must leave something to whoever is first.
         let reserve_us = RESERVE_US.min(self.deadline_us / 30);
-        let taken_us = elapsed_us + waiting * reserve_us;
+        let taken_us = elapsed_us.saturating_add(waiting.saturating_mul(reserve_us));
         let left_us = self.deadline_us.saturating_sub(taken_us);
         let own_us = left_us.saturating_sub(RECOVERY_US).max(left_us.min(reserve_us / 2));
         own_us.min(if failed { PROBE_LIMIT_US } else { READ_LIMIT_US })

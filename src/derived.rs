@@ -299,8 +299,10 @@ struct Writer<'a> {
 impl Writer<'_> {
     fn put(&mut self, value: u64, digits: usize) {
         for digit in (0..digits).rev() {
-            self.frame[self.at] = b"0123456789ABCDEF"[(value >> (4 * digit) & 0xF) as usize];
-            self.at += 1;
+            if let Some(place) = self.frame.get_mut(self.at) {
+                *place = b"0123456789ABCDEF"[(value >> (4 * digit) & 0xF) as usize];
+            }
+            self.at = self.at.wrapping_add(1);
         }
     }
 

@@ -92,7 +92,8 @@ impl Estimate {
         let covariance_n = Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd);
         let dcm = dcm_bn(&attitude::from_parts(q_nb)?);
         let covariance_b = dcm * covariance_n * dcm.transpose();
-        let [x, y, z] = [0, 1, 2].map(|axis| ComplexField::sqrt(covariance_b[(axis, axis)].max(0.0)));
+        let variances: [f32; 3] = covariance_b.diagonal().into();
+        let [x, y, z] = variances.map(|variance| ComplexField::sqrt(variance.max(0.0)));
         let [bias_x, bias_y, bias_z] = self.bias_sd;
         Some(record::Estimate {
             q_nb,

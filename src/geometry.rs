@@ -7,7 +7,7 @@
 
 pub mod frame_e;
 
-use nalgebra::{Matrix3, Matrix4x3, RowVector3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Matrix4x3, SMatrix, Vector3};
 
 use crate::redundancy;
 
@@ -38,7 +38,14 @@ pub fn dcm_bp(plate: usize) -> Matrix3<f32> {
 /// `[M1; M2; M3; M4]^T` of section 3.3. Each plate is a rotation, so the stack `H` has `H^T H = 4 I` and its pseudo-inverse
 /// is `H^T / 4`: the mean of the four plates.
 pub fn triad_axes_b() -> [Vector3<f32>; TRIAD_AXES] {
-    core::array::from_fn(|k| dcm_bp(k / 3).column(k % 3).into_owned())
+    core::array::from_fn(|k| {
+        let [x_b, y_b, z_b] = axes_b(k / 3);
+        match k % 3 {
+            0 => x_b,
+            1 => y_b,
+            _ => z_b,
+        }
+    })
 }
 
 /// \[m\] place of a plate's accelerometer in b, from the unit's centre of rotation.
@@ -50,10 +57,20 @@ pub fn accelerometer_place_b(plate: usize) -> Vector3<f32> {
     dcm_bp(plate) * Vector3::new(0.016, -0.009, -distance)
 }
 
+/// Axes of a plate in b.
+fn axes_b(plate: usize) -> [Vector3<f32>; 3] {
+    <[[f32; 3]; 3]>::from(dcm_bp(plate)).map(Vector3::from)
+}
+
+/// Sense axis in b of a plate's gyro.
+pub fn gyro_axis_b(plate: usize) -> Vector3<f32> {
+    let [_, _, z_b] = axes_b(plate);
+    -z_b
+}
+
 /// Sense axes of the four gyros in b, one a row: `gyro = gyro_axes_b() * omega_b`.
 pub fn gyro_axes_b() -> Matrix4x3<f32> {
-    let axis = |plate: usize| -> RowVector3<f32> { -dcm_bp(plate).column(2).transpose() };
-    Matrix4x3::from_rows(&[axis(0), axis(1), axis(2), axis(3)])
+    Matrix4x3::from_rows(&[0, 1, 2, 3].map(|plate| gyro_axis_b(plate).transpose()))
 }
 
 /// Least-squares rate from the gyros whose bit in `present` is set (bit 0 is plate 1): `omega_b = matrix * gyro`, with

@@ -139,7 +139,8 @@ impl Integrator {
         }
         if let Some(rate_from_counts) = self.rate_from_counts {
             self.rotate(rate_from_counts * mean_counts * dt_s);
-            self.sum.covered_us += (fast.at_us - last.at_us) as u32;
+            let lasted_us = fast.at_us.saturating_sub(last.at_us) as u32;
+            self.sum.covered_us = self.sum.covered_us.saturating_add(lasted_us);
         }
     }
 

@@ -122,11 +122,17 @@ pub fn matrix(axes_b: &[Vector3<f32>; 4], wanted: u16) -> Option<(SMatrix<f32, 3
     let Solution {
         covariance_b, known, ..
     } = solve(axes_b, &[0.0; 4], &[1.0; 4], wanted);
-    let mut matrix = SMatrix::<f32, 3, 4>::zeros();
-    for (k, axis_b) in axes_b.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
-        matrix.set_column(k, &(covariance_b * axis_b));
-    }
-    (known == Known::All).then_some((matrix, covariance_b))
+    let mut left = wanted;
+    let columns = axes_b.map(|axis_b| {
+        let is_wanted = left & 1 == 1;
+        left >>= 1;
+        if is_wanted {
+            covariance_b * axis_b
+        } else {
+            Vector3::zeros()
+        }
+    });
+    (known == Known::All).then(|| (SMatrix::from_columns(&columns), covariance_b))
 }
 
 #[cfg(test)]

@@ -73,17 +73,25 @@ pub struct Errors(pub u16);
 impl Errors {
     /// Marks the sensor in reading-order `slot`.
     pub fn insert(&mut self, slot: usize) {
-        self.0 |= 1 << slot;
+        self.0 |= Errors::bit(slot);
     }
 
     /// Clears the sensor in reading-order `slot`.
     pub fn remove(&mut self, slot: usize) {
-        self.0 &= !(1 << slot);
+        self.0 &= !Errors::bit(slot);
     }
 
     /// Whether the sensor in reading-order `slot` failed.
     pub fn contains(self, slot: usize) -> bool {
-        self.0 >> slot & 1 == 1
+        self.0 & Errors::bit(slot) != 0
+    }
+
+    /// None where the reading order has no such slot.
+    fn bit(slot: usize) -> u16 {
+        u32::try_from(slot)
+            .ok()
+            .and_then(|slot| 1_u16.checked_shl(slot))
+            .unwrap_or(0)
     }
 }
 

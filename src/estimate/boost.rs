@@ -184,7 +184,7 @@ impl Estimator {
         self.bias_sd = [3, 4, 5].map(|k| nalgebra::ComplexField::sqrt(known.covariance[(k, k)].max(0.0)));
         let at_stop = increments.slices.iter().any(|slice| stopped(slice).0 > 0);
         self.boost.quiet = if known.rate_b.norm() < ENDS && !at_stop {
-            self.boost.quiet + 1
+            self.boost.quiet.saturating_add(1)
         } else {
             0
         };

@@ -89,7 +89,7 @@ impl Averager {
             self.forget();
             self.counter = counter;
         }
-        self.taken += 1;
+        self.taken = self.taken.saturating_add(1);
         if let Some(change_b) = self.change(reading, set) {
             let nominal_b = Vector3::from(reading.angle_b);
             let covered_us = reading.covered_us.max(1) as f32;

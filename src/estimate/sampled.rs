@@ -23,15 +23,17 @@ impl Estimator {
         }
         let slots_us = sample.slots_of(kind);
         let (mean_us, variance) = if solution.used == ALL_AXES {
-            let sum_us: u64 = slots_us.iter().map(|slot_us| u64::from(*slot_us)).sum();
+            let sum_us = slots_us
+                .iter()
+                .fold(0, |sum: u64, slot_us| sum.saturating_add((*slot_us).into()));
             (sum_us / 4, self.white[usize::from(kind == Kind::Magnetometer)])
         } else {
             let (mut sum_us, mut sensors) = (0_u64, 0_u64);
             let mut used = solution.used;
             for slot_us in slots_us {
                 if used & 0b111 != 0 && *slot_us != NO_SLOT {
-                    sum_us += u64::from(*slot_us);
-                    sensors += 1;
+                    sum_us = sum_us.saturating_add((*slot_us).into());
+                    sensors = sensors.saturating_add(1);
                 }
                 used >>= 3;
             }

@@ -273,10 +273,10 @@ impl Triads {
             self.undecided = true;
             return;
         }
-        let sensor = worst / 3 * 3..worst / 3 * 3 + 3;
-        let pulled = sensor.clone().filter(|k| *k != worst && alarms[*k] >= 1.0).count();
-        let gone = sensor.clone().filter(|k| self.watches[*k].excluded()).count();
-        let all = pulled + gone > 0;
+        let sensor = (0..TRIAD_AXES).filter(|k| k / 3 == worst / 3);
+        let all = sensor
+            .clone()
+            .any(|k| k != worst && alarms[k] >= 1.0 || self.watches[k].excluded());
         for k in sensor.filter(|k| *k == worst || all) {
             if !self.watches[k].excluded() {
                 self.watches[k].exclude(Verdict::Disagreeing);

@@ -178,7 +178,8 @@ impl Watch {
     pub(super) fn reconsider(&mut self, added: &Added) {
         let agrees = self.trace.over_squared(SOUND, added, self.relative) < 1.0;
         self.sound_for = if agrees { self.sound_for.saturating_add(1) } else { 0 };
-        if self.sound_for >= (LONG as u16) << self.relapses.saturating_sub(1) {
+        let wanted = (LONG as u16).checked_shl(self.relapses.saturating_sub(1).into());
+        if self.sound_for >= wanted.unwrap_or(u16::MAX) {
             self.verdict = Verdict::Sound;
             self.strikes = 0;
         } else if self.trace.full() && self.verdict.is_unnamed() && !agrees {

@@ -86,13 +86,14 @@ impl Slicer {
         if self.intervals == 0 {
             self.restart(last.at_us);
         }
-        self.intervals += 1;
+        self.intervals = self.intervals.saturating_add(1);
         for (plate, (before, after)) in last.counts.into_iter().zip(now.counts).enumerate() {
             if before == NOT_READ || after == NOT_READ {
                 self.missed |= 1 << plate;
                 continue;
             }
-            self.halves[plate] += i32::from(before) + i32::from(after);
+            let both = i32::from(before).wrapping_add(after.into());
+            self.halves[plate] = self.halves[plate].saturating_add(both);
             for counts in [before, after] {
                 if counts.unsigned_abs() >= RANGE_COUNTS.unsigned_abs() {
                     self.beyond[plate] = counts.signum();
@@ -113,12 +114,13 @@ impl Slicer {
                 *quarters = if self.missed >> plate & 1 == 1 {
                     NOT_READ
                 } else if self.beyond[plate] != 0 {
-                    self.beyond[plate] * BEYOND
+                    self.beyond[plate].wrapping_mul(BEYOND)
                 } else {
-                    (2 * self.halves[plate] / self.intervals) as i16
+                    let twice = self.halves[plate].saturating_mul(2);
+                    twice.checked_div(self.intervals).unwrap_or(0) as i16
                 };
             }
-            self.count += 1;
+            self.count = self.count.saturating_add(1);
         }
         self.restart(at_us);
     }

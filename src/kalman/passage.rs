@@ -124,8 +124,10 @@ impl Passage {
         let [bias, matrix] = self.walks;
         match *row {
             Row::Velocity(axis) => {
-                column.driven[VELOCITY + axis] += self.velocity_variance;
-                column.driven[1 - axis] += if axis == 0 { -both } else { both };
+                let [north, east, .., to_north, to_east] = &mut column.driven;
+                let (velocity, tilt) = if axis == 0 { (to_north, east) } else { (to_east, north) };
+                *velocity += self.velocity_variance;
+                *tilt += if axis == 0 { -both } else { both };
             }
             Row::Driver(k) => column.drivers[k] += if k < GYRO_MATRIX { bias } else { matrix },
             // No row of the whole sees the velocity.

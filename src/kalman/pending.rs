@@ -83,7 +83,7 @@ impl Pending {
 
     /// Keeps what was put in that place.
     pub fn keep(&mut self) {
-        self.scalars += 1;
+        self.scalars = self.scalars.saturating_add(1);
     }
 
     /// All of a window of this passage.
@@ -141,7 +141,7 @@ impl Pending {
             scalars -= 2;
         }
         if let Stage::Scalars(first) = self.stage {
-            let last = (first + scalars).min(self.scalars);
+            let last = usize::saturating_add(first, scalars).min(self.scalars);
             for two in self.seen.get(first..last).unwrap_or_default().chunks(2) {
                 match two {
                     [one, other] => covariance.update(one, other),

@@ -82,7 +82,10 @@ impl Row<'_> {
     /// What it sees of this one.
     pub fn of(&self, state: &State) -> f32 {
         match *self {
-            Row::Velocity(axis) => state.driven[VELOCITY + axis],
+            Row::Velocity(axis) => {
+                let [.., to_north, to_east] = state.driven;
+                if axis == 0 { to_north } else { to_east }
+            }
             Row::Driver(k) => state.drivers[k],
             Row::Of(row) => row.dot(state),
         }

@@ -187,8 +187,8 @@ impl Window {
             *sum -= gained;
             *integral += *sum * lasted_s;
         };
-        for (axis, (drive, integral)) in self.drive.iter_mut().zip(&mut self.drive_integral).enumerate() {
-            let row = [0, 1, 2].map(|column| dcm_nb[(axis, column)]);
+        let rows = <[[f32; 3]; 3]>::from(dcm_nb.transpose());
+        for ((drive, integral), row) in self.drive.iter_mut().zip(&mut self.drive_integral).zip(rows) {
             let (bias, matrix) = drive.split_at_mut(3);
             let (bias_integral, matrix_integral) = integral.split_at_mut(3);
             for (both, part) in bias.iter_mut().zip(bias_integral).zip(row) {

@@ -67,14 +67,16 @@ impl Spin {
             .enumerate()
             .filter(|(_, force)| !force.is_none())
         {
-            let since_us = u64::from(force.covered_us) + u64::from(force.after_us);
+            let since_us = u64::from(force.covered_us).saturating_add(force.after_us.into());
             note(began_us.saturating_add(since_us), delays.acc_s, Event::Force(k));
         }
         let slots_us = sample.slots_of(Kind::Accelerometer);
         let (sum_us, slots) = slots_us
             .iter()
             .filter(|slot_us| **slot_us != NO_SLOT)
-            .fold((0, 0), |(sum, count), slot_us| (sum + u64::from(*slot_us), count + 1));
+            .fold((0_u64, 0_u64), |(sum, count), slot_us| {
+                (sum.saturating_add((*slot_us).into()), count.saturating_add(1))
+            });
         if let Some(mean_us) = u64::checked_div(sum_us, slots) {
             note(sample.start_us.saturating_add(mean_us), delays.acc_s, Event::Forces);
         }
@@ -104,7 +106,8 @@ impl Spin {
                 Event::Forces => self.take_force(set, &sample.reading.acc_p),
                 Event::Field(plate) => {
                     if let Some(taken) = self.take_field(set, measured, plate) {
-                        of_field[usize::from(taken)] += 1;
+                        let count = &mut of_field[usize::from(taken)];
+                        *count = count.saturating_add(1);
                     }
                 }
             }

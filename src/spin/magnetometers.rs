@@ -77,7 +77,7 @@ impl Spin {
 
     /// A gate that stays shut opens the angle about the spin, and then all.
     pub(super) fn mind_the_gate(&mut self, [refused, taken]: [u8; 2]) {
-        if refused + taken == 0 {
+        if refused == 0 && taken == 0 {
             return;
         }
         if taken >= refused {
