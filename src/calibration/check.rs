@@ -10,7 +10,7 @@ use nalgebra::{ComplexField, Matrix3, Vector3};
 
 use super::{Axis, Channel, Set};
 use crate::{
-    geometry::{PLATES, gyro_axes_b, triad_axes_b},
+    geometry::{PLATES, gyro_axis_b, triad_axes_b},
     sample::{Kind, Sensor},
 };
 
@@ -116,11 +116,11 @@ impl core::error::Error for Refusal {}
 pub(super) fn check(set: &Set) -> Result<(), Refusal> {
     numbers(set)?;
     conditions(set)?;
-    let (triads_b, gyros_b) = (triad_axes_b(), gyro_axes_b());
+    let triads_b = triad_axes_b();
     for (channel, axis) in set.channels() {
         let n = usize::from(channel.0);
         let nominal_b = match channel.kind() {
-            Kind::Gyro => gyros_b.row(channel.plate()).transpose(),
+            Kind::Gyro => gyro_axis_b(channel.plate()),
             _ => triads_b[n % triads_b.len()],
         };
         one(set, channel, axis, &nominal_b)?;

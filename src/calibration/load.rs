@@ -64,7 +64,8 @@ impl Arriving {
     /// The set, if it is whole, sound, for these ranges and of this unit.
     pub fn set(&self, ranges: Ranges, unit: u32) -> Result<Set, NotLoaded> {
         if let Some(first) = self.heard.iter().position(|heard| !heard) {
-            let count = self.heard.iter().filter(|heard| !**heard).count();
+            let missing = self.heard.iter().filter(|heard| !**heard);
+            let count = missing.fold(0, |count: usize, _| count.saturating_add(1));
             return Err(NotLoaded::Missing { count, first });
         }
         Set::load(self.words.as_flattened(), ranges, unit).map_err(NotLoaded::Refused)

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Axis, Channel, Refusal, Uncertainty, bytes, check, method};
+use super::{Axis, CHANNELS, Channel, Refusal, Uncertainty, bytes, check, method};
 use crate::{
-    geometry::{PLATES, TRIAD_AXES, accelerometer_place_b, gyro_axes_b, triad_axes_b},
+    geometry::{PLATES, TRIAD_AXES, accelerometer_place_b, gyro_axis_b, triad_axes_b},
     sample::Kind,
     sensor::{adis16265::Range, hmc5883l::Gain, lis331hh::FullScale},
     unit::Settings,
@@ -105,7 +105,6 @@ impl Set {
     pub fn nominal(ranges: Ranges) -> Self {
         let axes_b = triad_axes_b();
         let triad = |kind, noise| axes_b.map(|axis_b| method::mt(axis_b, ranges.nominal_scale(kind), noise));
-        let gyro_axes_b = gyro_axes_b();
         let gyro_scale = ranges.nominal_scale(Kind::Gyro);
         Set {
             identity: Identity {
@@ -138,7 +137,7 @@ impl Set {
             place_sigma: 2e-3,
             acc: triad(Kind::Accelerometer, 0.045),
             mag: triad(Kind::Magnetometer, 0.2),
-            gyro: core::array::from_fn(|plate| method::mt(gyro_axes_b.row(plate).transpose(), gyro_scale, 0.00344)),
+            gyro: core::array::from_fn(|plate| method::mt(gyro_axis_b(plate), gyro_scale, 0.00344)),
         }
     }
 
@@ -189,6 +188,6 @@ impl Set {
     /// Every axis with its number.
     pub fn channels(&self) -> impl Iterator<Item = (Channel, &Axis)> {
         let axes = self.acc.iter().chain(&self.mag).chain(&self.gyro);
-        axes.enumerate().map(|(n, axis)| (Channel(n as u8), axis))
+        (0..CHANNELS as u8).zip(axes).map(|(n, axis)| (Channel(n), axis))
     }
 }

@@ -154,9 +154,9 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Never uses a block again.
-    pub(super) async fn retire(&mut self, block: u16) -> Result<(), LogError> {
+    pub(super) fn retire(&mut self, block: u16) -> impl Future<Output = Result<(), LogError>> {
         self.remember_bad(block);
-        self.save().await
+        self.save()
     }
 
     /// A bad block beyond those that can be remembered costs a look at it in each start, and no record: the maker's mark is

@@ -100,8 +100,9 @@ impl<N: Nand> FlightLog<N> {
         let newest = self.newest_set(buffer)?;
         let (before, number) = newest.map_or((self.log_end(), 0), |(block, piece)| (block, piece.number));
         let number = number.checked_add(1).ok_or(LogError::Worn)?;
-        for step in 1..=SET_BLOCKS {
-            let block = self.log_end() + (before - self.log_end() + step) % SET_BLOCKS;
+        // From the block behind the newest one on, in turn.
+        let behind = before.saturating_add(1)..self.chip.blocks();
+        for block in behind.chain(self.log_end()..=before) {
             if newest.is_some_and(|(newest, _)| newest == block) || !self.may_hold_set(block)? {
                 continue;
             }
@@ -127,9 +128,10 @@ impl<N: Nand> FlightLog<N> {
     /// Whether all pages hold.
     async fn fill_with_set(&mut self, block: u16, number: u32, content: &[u8]) -> Result<bool, LogError> {
         let count = pieces(content.len());
-        for page in 0..2 * count {
+        for page in 0..count.saturating_mul(2) {
             let at = PageAddress { block, page };
-            let bytes = encode(number, page % count, content);
+            let piece = page.checked_sub(count).unwrap_or(page);
+            let bytes = encode(number, piece, content);
             page::compose(&mut self.page, &bytes, &bytes);
             let tag = self.tag(Kind::Set);
             page::address(&mut self.page, at, tag);
@@ -192,7 +194,7 @@ impl<N: Nand> FlightLog<N> {
         let count = pieces(set.length);
         for piece in 0..count {
             let mut whole = false;
-            for page in [piece, piece + count] {
+            for page in [piece, piece.saturating_add(count)] {
                 let at = PageAddress { block, page };
                 self.chip.read(at, &mut self.back)?;
                 if self.piece_read() != Some(Piece { piece, ..set }) {

@@ -117,8 +117,10 @@ pub fn encode(superblock: &Superblock) -> RecordBytes {
     put(16, &superblock.first_block.to_le_bytes());
     put(BLOCK_BEFORE, &superblock.block_before.to_le_bytes());
     put(18, &(superblock.bad.0.len() as u16).to_le_bytes());
-    for (at, block) in (LIST..).step_by(2).zip(&superblock.bad.0) {
+    let mut at = LIST;
+    for block in &superblock.bad.0 {
         put(at, &block.to_le_bytes());
+        at = at.wrapping_add(2);
     }
     let crc = CRC.checksum(&bytes[..CHECKED]);
     bytes[CHECKED..].copy_from_slice(&crc.to_le_bytes());
