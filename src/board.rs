@@ -78,7 +78,7 @@ pub trait Retained {
     /// Reads as many bytes as there is room for, from `at` on.
     fn read(&self, at: usize, bytes: &mut [u8]);
     /// Writes bytes from `at` on, in this order.
-    fn write(&mut self, at: usize, bytes: &[u8]);
+    fn write(&self, at: usize, bytes: &[u8]);
 }
 
 /// Why the unit started.

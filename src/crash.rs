@@ -87,7 +87,7 @@ impl CrashRecord {
     }
 
     /// Keeps it for the next start.
-    pub fn keep(&self, memory: &mut impl Retained) {
+    pub fn keep(&self, memory: &impl Retained) {
         CRASH.keep(memory, &self.encode());
     }
 

@@ -40,7 +40,7 @@ pub struct Resume {
 
 impl Resume {
     /// Keeps it.
-    pub fn keep(&self, memory: &mut impl Retained) {
+    pub fn keep(&self, memory: &impl Retained) {
         let mode = match self.mode {
             Mode::Wait => 1,
             Mode::Flight => 2,
@@ -92,7 +92,7 @@ impl Starts {
     }
 
     /// One more start; keeps and returns it. The first thing a unit does: whatever it does next may end in a reset.
-    pub fn count(memory: &mut impl Retained) -> Self {
+    pub fn count(memory: &impl Retained) -> Self {
         let before = Starts::recall(memory).unwrap_or_default();
         let starts = Starts {
             since_power_on: before.since_power_on.saturating_add(1),
@@ -103,7 +103,7 @@ impl Starts {
     }
 
     /// Keeps it.
-    pub fn keep(&self, memory: &mut impl Retained) {
+    pub fn keep(&self, memory: &impl Retained) {
         let [a, b] = self.since_power_on.to_le_bytes();
         let [c, d] = self.without_health.to_le_bytes();
         STARTS.keep(memory, &[a, b, c, d]);
@@ -130,7 +130,7 @@ pub struct Pulse {
 
 impl Pulse {
     /// Keeps it.
-    pub fn keep(&self, memory: &mut impl Retained) {
+    pub fn keep(&self, memory: &impl Retained) {
         let mut bytes = [0; 16];
         bytes[..8].copy_from_slice(&self.at_us.to_le_bytes());
         bytes[8..].copy_from_slice(&self.fed_us.to_le_bytes());
@@ -165,11 +165,11 @@ pub const POWER_CUT: Outage = Outage {
 /// What a reset missed since `kept_us` of the run before. A pin that is held low is not known of: it counts as if it were not.
 pub fn outage(kept_us: u64, reset: ResetCause, pulse: Pulse, crash: Option<&CrashRecord>) -> Outage {
     let alive_us = pulse.at_us.max(kept_us);
-    let next_us = alive_us + PULSE_US;
-    let half_a_pulse = (alive_us + PULSE_US / 2, PULSE_US as f32 * 0.5e-6);
+    let next_us = alive_us.saturating_add(PULSE_US);
+    let half_a_pulse = (alive_us.saturating_add(PULSE_US / 2), PULSE_US as f32 * 0.5e-6);
     let (struck_us, sd_s) = match reset {
         ResetCause::Watchdog => {
-            let bites_us = pulse.fed_us + WATCHDOG_US;
+            let bites_us = pulse.fed_us.saturating_add(WATCHDOG_US);
             // One part waits for ever and the others go on until it bites; or nobody goes on.
             if bites_us > next_us {
                 (bites_us, WATCHDOG_SD_S)
@@ -178,15 +178,20 @@ pub fn outage(kept_us: u64, reset: ResetCause, pulse: Pulse, crash: Option<&Cras
             }
         }
         ResetCause::Software => match crash {
-            Some(crash) if (alive_us..next_us + WATCHDOG_US).contains(&crash.uptime_us) => (crash.uptime_us, 0.001),
+            Some(crash) if (alive_us..next_us.saturating_add(WATCHDOG_US)).contains(&crash.uptime_us) => {
+                (crash.uptime_us, 0.001)
+            }
             _ => half_a_pulse,
         },
         ResetCause::Pin => half_a_pulse,
         // The memory outlasted a dip of the supply.
-        ResetCause::PowerOn => (alive_us + (POWER_CUT.lasted_s * 1e6) as u64, POWER_CUT.sd_s),
+        ResetCause::PowerOn => (
+            alive_us.saturating_add((POWER_CUT.lasted_s * 1e6) as u64),
+            POWER_CUT.sd_s,
+        ),
     };
     Outage {
-        lasted_s: (struck_us - kept_us + START_US) as f32 * 1e-6,
+        lasted_s: struck_us.saturating_sub(kept_us).saturating_add(START_US) as f32 * 1e-6,
         sd_s,
     }
 }
@@ -200,26 +205,27 @@ fn recall<const N: usize>(place: Place, memory: &impl Retained) -> Option<[u8; N
 mod tests {
     extern crate std;
 
+    use core::cell::RefCell;
     use std::{vec, vec::Vec};
 
     use super::*;
     use crate::retained::RETAINED_BYTES;
 
-    struct Memory(Vec<u8>);
+    struct Memory(RefCell<Vec<u8>>);
 
     impl Retained for Memory {
         fn read(&self, at: usize, bytes: &mut [u8]) {
-            bytes.copy_from_slice(&self.0[at..at + bytes.len()]);
+            bytes.copy_from_slice(&self.0.borrow()[at..at + bytes.len()]);
         }
 
-        fn write(&mut self, at: usize, bytes: &[u8]) {
-            self.0[at..at + bytes.len()].copy_from_slice(bytes);
+        fn write(&self, at: usize, bytes: &[u8]) {
+            self.0.borrow_mut()[at..at + bytes.len()].copy_from_slice(bytes);
         }
     }
 
     #[test]
     fn what_the_unit_was_doing_is_kept_and_starts_are_counted() {
-        let mut memory = Memory(vec![0; RETAINED_BYTES]);
+        let memory = Memory(RefCell::new(vec![0; RETAINED_BYTES]));
         assert_eq!(Resume::recall(&memory), None);
         let in_flight = Resume {
             mode: Mode::Flight,
@@ -233,16 +239,16 @@ mod tests {
             ..Resume::default()
         };
         for resume in [in_flight, awaiting] {
-            resume.keep(&mut memory);
+            resume.keep(&memory);
             assert_eq!(Resume::recall(&memory), Some(resume));
         }
         let pulse = Pulse {
             at_us: 0x0102_0304_0506_0708,
             fed_us: 9,
         };
-        pulse.keep(&mut memory);
+        pulse.keep(&memory);
         for number in 1..4 {
-            let starts = Starts::count(&mut memory);
+            let starts = Starts::count(&memory);
             assert_eq!((starts.since_power_on, starts.without_health), (number, number));
         }
         assert_eq!(Pulse::recall(&memory), Some(pulse));
@@ -250,9 +256,9 @@ mod tests {
             without_health: 0,
             ..Starts::recall(&memory).expect("kept")
         };
-        healthy.keep(&mut memory);
-        assert_eq!(Starts::count(&mut memory).without_health, 1);
-        assert_eq!(Starts::count(&mut memory).since_power_on, 5);
+        healthy.keep(&memory);
+        assert_eq!(Starts::count(&memory).without_health, 1);
+        assert_eq!(Starts::count(&memory).since_power_on, 5);
     }
 
     #[test]
@@ -291,9 +297,9 @@ mod tests {
 
     #[test]
     fn a_mode_a_flag_or_a_length_that_does_not_exist_is_refused_whatever_its_checksum() {
-        let mut memory = Memory(vec![0; RETAINED_BYTES]);
+        let memory = Memory(RefCell::new(vec![0; RETAINED_BYTES]));
         for content in [&[3, 0, 0, 0][..], &[1, 8, 0, 0], &[1, 0, 0], &[1, 0, 0, 0, 0]] {
-            STATE.keep(&mut memory, content);
+            STATE.keep(&memory, content);
             assert_eq!(Resume::recall(&memory), None, "{content:?}");
         }
     }

@@ -70,7 +70,7 @@ impl Place {
     }
 
     /// Keeps `content`, as much of it as fits: both copies, one after the other.
-    pub fn keep(&self, memory: &mut impl Retained, content: &[u8]) {
+    pub fn keep(&self, memory: &impl Retained, content: &[u8]) {
         let content = content.get(..self.fits()).unwrap_or(content);
         let mut head = [0; HEAD];
         head[..2].copy_from_slice(&(content.len() as u16).to_le_bytes());
@@ -78,14 +78,15 @@ impl Place {
         digest.update(content);
         let crc = digest.finalize().to_le_bytes();
         for at in self.copies() {
+            let place = at.wrapping_add(HEAD);
             memory.write(at, &head);
-            memory.write(at + HEAD, content);
-            memory.write(at + HEAD + content.len(), &crc);
+            memory.write(place, content);
+            memory.write(place.wrapping_add(content.len()), &crc);
         }
     }
 
     /// Keeps nothing any more.
-    pub fn forget(&self, memory: &mut impl Retained) {
+    pub fn forget(&self, memory: &impl Retained) {
         for at in self.copies() {
             memory.write(at, &FORGOTTEN.to_le_bytes());
         }
@@ -110,12 +111,14 @@ impl Place {
         }
         let content = buffer.get_mut(..length)?;
         let mut digest = self.digest(&head);
-        for (number, chunk) in content.chunks_mut(CHUNK).enumerate() {
-            memory.read(at + HEAD + number * CHUNK, chunk);
+        let mut place = at.wrapping_add(HEAD);
+        for chunk in content.chunks_mut(CHUNK) {
+            memory.read(place, chunk);
+            place = place.wrapping_add(chunk.len());
             digest.update(chunk);
         }
         let mut crc = [0; TAIL];
-        memory.read(at + HEAD + length, &mut crc);
+        memory.read(place, &mut crc);
         (crc == digest.finalize().to_le_bytes()).then_some(length)
     }
 
@@ -127,7 +130,7 @@ impl Place {
     }
 
     fn copies(&self) -> [usize; 2] {
-        [self.at, self.at + self.room]
+        [self.at, self.at.wrapping_add(self.room)]
     }
 }
 
@@ -135,34 +138,35 @@ impl Place {
 mod tests {
     extern crate std;
 
+    use core::cell::{Cell, RefCell};
     use std::{vec, vec::Vec};
 
     use super::*;
 
     /// Memory whose writes end after so many bytes, as at a reset.
     struct Memory {
-        bytes: Vec<u8>,
-        writes: usize,
+        bytes: RefCell<Vec<u8>>,
+        writes: Cell<usize>,
     }
 
     impl Memory {
         fn after_power_on(fill: u8) -> Self {
             Memory {
-                bytes: vec![fill; RETAINED_BYTES],
-                writes: usize::MAX,
+                bytes: RefCell::new(vec![fill; RETAINED_BYTES]),
+                writes: Cell::new(usize::MAX),
             }
         }
     }
 
     impl Retained for Memory {
         fn read(&self, at: usize, bytes: &mut [u8]) {
-            bytes.copy_from_slice(&self.bytes[at..at + bytes.len()]);
+            bytes.copy_from_slice(&self.bytes.borrow()[at..at + bytes.len()]);
         }
 
-        fn write(&mut self, at: usize, bytes: &[u8]) {
-            let count = bytes.len().min(self.writes);
-            self.bytes[at..at + count].copy_from_slice(&bytes[..count]);
-            self.writes -= count;
+        fn write(&self, at: usize, bytes: &[u8]) {
+            let count = bytes.len().min(self.writes.get());
+            self.bytes.borrow_mut()[at..at + count].copy_from_slice(&bytes[..count]);
+            self.writes.set(self.writes.get() - count);
         }
     }
 
@@ -175,19 +179,19 @@ mod tests {
 
     #[test]
     fn every_part_keeps_what_it_was_given_beside_the_others() {
-        let mut memory = Memory::after_power_on(0xA5);
+        let memory = Memory::after_power_on(0xA5);
         for (number, place) in PLACES.into_iter().enumerate() {
-            place.keep(&mut memory, &vec![number as u8; place.fits() - number]);
+            place.keep(&memory, &vec![number as u8; place.fits() - number]);
         }
         for (number, place) in PLACES.into_iter().enumerate() {
             assert_eq!(
                 recalled(place, &memory),
                 Some(vec![number as u8; place.fits() - number])
             );
-            place.forget(&mut memory);
+            place.forget(&memory);
             assert_eq!(recalled(place, &memory), None);
         }
-        SET.keep(&mut memory, &[]);
+        SET.keep(&memory, &[]);
         assert_eq!(recalled(SET, &memory), Some(vec![]), "nothing is content, too");
     }
 
@@ -204,10 +208,10 @@ mod tests {
         let (old, new) = (vec![0x11; 40], vec![0x22; 33]);
         let mut seen = [0; 2];
         for writes in 0..2 * (HEAD + new.len() + TAIL) + 1 {
-            let mut memory = Memory::after_power_on(0);
-            STATE.keep(&mut memory, &old);
-            memory.writes = writes;
-            STATE.keep(&mut memory, &new);
+            let memory = Memory::after_power_on(0);
+            STATE.keep(&memory, &old);
+            memory.writes.set(writes);
+            STATE.keep(&memory, &new);
             let found = recalled(STATE, &memory).expect("one copy is whole");
             assert!(found == old || found == new, "{writes} bytes written");
             seen[usize::from(found == new)] += 1;
@@ -219,22 +223,21 @@ mod tests {
     fn a_damaged_copy_is_passed_over_and_two_are_refused() {
         let content = [7; 20];
         for bit in 0..8 * (HEAD + content.len() + TAIL) {
-            let mut memory = Memory::after_power_on(0);
-            STATE.keep(&mut memory, &content);
+            let memory = Memory::after_power_on(0);
+            STATE.keep(&memory, &content);
             let [first, second] = STATE.copies();
-            memory.bytes[first + bit / 8] ^= 1 << (bit % 8);
+            memory.bytes.borrow_mut()[first + bit / 8] ^= 1 << (bit % 8);
             assert_eq!(recalled(STATE, &memory), Some(content.to_vec()), "bit {bit}");
-            memory.bytes[second + bit / 8] ^= 1 << (bit % 8);
+            memory.bytes.borrow_mut()[second + bit / 8] ^= 1 << (bit % 8);
             assert_eq!(recalled(STATE, &memory), None, "bit {bit} of both");
         }
     }
 
     #[test]
     fn the_content_of_one_part_is_not_that_of_another() {
-        let mut memory = Memory::after_power_on(0);
-        STATE.keep(&mut memory, &[1, 2, 3]);
-        let copied = memory.bytes[..128].to_vec();
-        memory.bytes[128..256].copy_from_slice(&copied);
+        let memory = Memory::after_power_on(0);
+        STATE.keep(&memory, &[1, 2, 3]);
+        memory.bytes.borrow_mut().copy_within(..128, 128);
         assert_eq!(recalled(STARTS, &memory), None);
     }
 }

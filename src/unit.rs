@@ -24,7 +24,7 @@ mod telemetry;
 mod umbilical;
 mod vote;
 
-use core::{cell::RefCell, pin::pin};
+use core::pin::pin;
 
 use embassy_futures::join;
 
@@ -108,20 +108,20 @@ impl Settings {
 }
 
 /// Runs the unit for ever.
-pub async fn run<B: Board>(mut parts: Parts<B>, settings: Settings) -> ! {
-    let starts = Starts::count(&mut parts.retained);
+pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
+    let memory = parts.retained;
+    let starts = Starts::count(&memory);
     let start = Start {
         reset: parts.reset,
         starts,
-        resume: Resume::recall(&parts.retained),
-        crash: CrashRecord::recall(&parts.retained),
+        resume: Resume::recall(&memory),
+        crash: CrashRecord::recall(&memory),
         oscillator: parts.oscillator,
         brown_out: parts.brown_out,
         stack_use: parts.stack_use,
     };
     let shared = Shared::new(settings, start);
-    calibration::recall(&shared, &parts.retained);
-    let memory = RefCell::new(parts.retained);
+    calibration::recall(&shared, &memory);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();

@@ -129,7 +129,7 @@ impl<Scl: self::Scl, Sda: self::Sda> embedded_hal_async::i2c::I2c for SensorBus<
 impl<Scl: self::Scl, Sda: self::Sda> RecoverBus for SensorBus<Scl, Sda> {
     /// At most 0.4 ms: nine STOPs of 20 us, each with its clock edge stretched to the limit. All of it is waited for in
     /// place, since a recovery that is itself abandoned would leave no driver.
-    async fn recover(&mut self) -> bool {
+    fn recover(&mut self) -> impl Future<Output = bool> {
         // Gates the peripheral's clock and takes the pins off it.
         self.driver = None;
         // SAFETY: no driver has the pins now, and these two are gone before the next one is made.
@@ -165,7 +165,7 @@ impl<Scl: self::Scl, Sda: self::Sda> RecoverBus for SensorBus<Scl, Sda> {
         drop((scl, sda));
         // Resets the peripheral twice, by RCC and by SWRST, and sets every register.
         self.driver = Some(self.wires.driver());
-        idle
+        super::over(idle)
     }
 }
 

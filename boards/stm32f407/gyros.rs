@@ -25,6 +25,8 @@ use embassy_sync::mutex::Mutex;
 use embedded_hal_async::spi::{ErrorKind, ErrorType, SpiBus};
 use static_cell::StaticCell;
 
+use super::over;
+
 /// One gyro: the shared bus and its own chip select.
 pub type Gyro = SpiDevice<'static, NoopRawMutex, GyroBus, Output<'static>>;
 
@@ -109,37 +111,39 @@ impl ErrorType for GyroBus {
     type Error = ErrorKind;
 }
 
+/// Words are waited for in place: each of these is over when it returns.
 impl SpiBus<u16> for GyroBus {
-    async fn read(&mut self, words: &mut [u16]) -> Result<(), ErrorKind> {
+    fn read(&mut self, words: &mut [u16]) -> impl Future<Output = Result<(), ErrorKind>> {
         words.fill(0);
-        self.transfer_in_place(words).await
+        self.transfer_in_place(words)
     }
 
-    async fn write(&mut self, words: &[u16]) -> Result<(), ErrorKind> {
-        words.iter().try_for_each(|word| self.exchange(*word).map(|_| ()))
+    fn write(&mut self, words: &[u16]) -> impl Future<Output = Result<(), ErrorKind>> {
+        over(words.iter().try_for_each(|word| self.exchange(*word).map(|_| ())))
     }
 
-    async fn transfer(&mut self, read: &mut [u16], write: &[u16]) -> Result<(), ErrorKind> {
-        for index in 0..read.len().max(write.len()) {
+    fn transfer(&mut self, read: &mut [u16], write: &[u16]) -> impl Future<Output = Result<(), ErrorKind>> {
+        let longer = read.len().max(write.len());
+        over((0..longer).try_for_each(|index| {
             let answer = self.exchange(write.get(index).copied().unwrap_or(0))?;
             if let Some(word) = read.get_mut(index) {
                 *word = answer;
             }
-        }
-        Ok(())
+            Ok(())
+        }))
     }
 
-    async fn transfer_in_place(&mut self, words: &mut [u16]) -> Result<(), ErrorKind> {
-        for word in words {
+    fn transfer_in_place(&mut self, words: &mut [u16]) -> impl Future<Output = Result<(), ErrorKind>> {
+        over(words.iter_mut().try_for_each(|word| {
             *word = self.exchange(*word)?;
-        }
-        Ok(())
+            Ok(())
+        }))
     }
 
-    async fn flush(&mut self) -> Result<(), ErrorKind> {
+    fn flush(&mut self) -> impl Future<Output = Result<(), ErrorKind>> {
         // The sleeps above may have taken an event that was the executor's: give it back, or a woken task sleeps on.
         asm::sev();
         let idle = (0..READS).any(|_| !pac::SPI1.sr().read().bsy());
-        if idle { Ok(()) } else { Err(ErrorKind::Other) }
+        over(if idle { Ok(()) } else { Err(ErrorKind::Other) })
     }
 }

@@ -40,7 +40,7 @@ impl Retained for ResetSafeRam {
         }
     }
 
-    fn write(&mut self, at: usize, bytes: &[u8]) {
+    fn write(&self, at: usize, bytes: &[u8]) {
         let first = KEPT.0.get().cast::<u8>();
         for (index, byte) in (at..RETAINED_BYTES).zip(bytes) {
             // SAFETY: as for `read`; volatile, because nothing in this run may ever read it back.
@@ -52,7 +52,7 @@ impl Retained for ResetSafeRam {
 /// Leaves a crash record for the next start.
 pub fn keep_crash(record: &CrashRecord) {
     // It never returns to who holds the other one.
-    record.keep(&mut ResetSafeRam(()));
+    record.keep(&ResetSafeRam(()));
 }
 
 /// Why the chip started (RM0090 section 7.3.21); clears the flags, which add up otherwise.

@@ -8,7 +8,7 @@
 //! for the identity, PROD_ID, and the first frame of the next reading checks it: each reading proves at no cost that a
 //! gyro, and not a floating or held line, answers. The rate is sampled at its request, not at its answer.
 //!
-//! [`Adis16265::request`] and [`Adis16265::exchange`] are single frames, for gyros on one bus read interleaved; the caller
+//! [`Adis16265::exchange`] is a single frame, for gyros on one bus read interleaved; the caller
 //! leaves [`STALL_US`] between frames to the same part. Everything else leaves that time itself.
 //!
 //! ```
@@ -166,11 +166,6 @@ impl<SPI: SpiDevice<u16>, D: DelayNs> Adis16265<SPI, D> {
     pub fn new(spi: SPI, stall: D) -> Self {
         let requested = None;
         Adis16265 { spi, stall, requested }
-    }
-
-    /// Asks for a register, one frame; the answer to an earlier request is lost, but checked if it was PROD_ID.
-    pub async fn request(&mut self, register: Register) -> Result<(), Error<SPI::Error>> {
-        self.exchange(register).await.map(|_| ())
     }
 
     /// Takes the answer to the last request and asks for `next`, one frame.

@@ -9,14 +9,14 @@
 //! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
 //! for the estimation alone ([`forces`]). What fails then is left out and nothing is concluded from it: the next cycle will see.
 
-use core::{cell::RefCell, fmt::Display};
+use core::fmt::Display;
 
 use embassy_time::{Duration, Instant};
 
 use super::{
-    clock::{TimedOut, next_on_grid, now},
+    clock::{TimedOut, after, next_on_grid, now},
     gyros::Gyros,
-    plates::{Plates, Taken},
+    plates::{Plates, Taken, put},
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -51,20 +51,29 @@ enum Standing {
     Reading,
 }
 
+/// A sensor and its place in the reading order.
+type Slot = (usize, Sensor);
+
+/// All of them.
+fn slots() -> impl Iterator<Item = Slot> + Clone {
+    (0..SENSOR_COUNT).zip(SENSORS.iter().copied())
+}
+
 /// Reads for ever.
 pub async fn run<B: Board>(
     shared: &Shared,
     votes: &Votes,
     switch: &Switch<B::SensorBus>,
     gyros: &Gyros<'_, B::Gyro>,
-    memory: &RefCell<B::Retained>,
+    memory: &B::Retained,
 ) {
+    let period = Duration::from_millis(shared.settings.period_ms);
     let mut acquisition = Acquisition::<B> {
         shared,
         switch,
         plates: Plates::new(switch, shared.settings),
         gyros,
-        budget: Budget::of_period(shared.settings.period_ms * 1000),
+        budget: Budget::of_period(period.as_micros()),
         standing: [Standing::Lost; SENSOR_COUNT],
         health: Health::default(),
     };
@@ -74,8 +83,8 @@ pub async fn run<B: Board>(
     }
     // The gyros first: what they do not see of a reset in flight is missing in the attitude.
     for first in [true, false] {
-        let is_due = |slot: &usize| (SENSORS[*slot].kind == Kind::Gyro) == first;
-        for slot in (0..SENSOR_COUNT).filter(is_due) {
+        let is_due = |slot: &Slot| (slot.1.kind == Kind::Gyro) == first;
+        for slot in slots().filter(is_due) {
             acquisition
                 .configure(slot, acquisition.budget.limit_us(0, 0, false))
                 .await;
@@ -83,21 +92,23 @@ pub async fn run<B: Board>(
     }
     let resume = shared.start.resume.unwrap_or_default();
     let mut counter = resume.next_counter;
-    let period = Duration::from_millis(shared.settings.period_ms);
     let close = Duration::from_micros(acquisition.budget.close_us);
     // The first set of a magnetometer after its configuration is withheld: a cycle that is not sent takes it.
     let mut start = next_on_grid(period / 4, Duration::MIN);
     votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
     acquisition.cycle(counter, start).await;
-    start += period / 4;
-    let (mut verified, mut healthy) = (0, false);
+    start = start.saturating_add(period / 4);
+    let mut to_verify = slots().cycle();
+    let mut healthy = false;
     loop {
         votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
         let cycle = acquisition.cycle(counter, start).await;
-        votes.waiting(Voter::Acquire, shared.clock.until(start + close)).await;
+        votes
+            .waiting(Voter::Acquire, shared.clock.until(start.saturating_add(close)))
+            .await;
         counter = counter.wrapping_add(1);
         shared.publish_cycle(cycle);
-        let state = *shared.state.borrow();
+        let state = shared.state.get();
         let resume = Resume {
             mode: state.mode,
             recording: state.recording,
@@ -105,25 +116,27 @@ pub async fn run<B: Board>(
             awaits_log: state.awaits_log,
             next_counter: counter,
         };
-        resume.keep(&mut *memory.borrow_mut());
+        resume.keep(memory);
         if !healthy && start >= HEALTHY {
             healthy = true;
             let starts = Starts {
                 without_health: 0,
                 ..shared.start.starts
             };
-            starts.keep(&mut *memory.borrow_mut());
+            starts.keep(memory);
         }
-        start += period;
+        start = start.saturating_add(period);
         let limit_us = acquisition.budget.limit_us(0, 0, true);
-        if now() + Duration::from_micros(2 * limit_us) < start {
-            acquisition.verify(verified, limit_us).await;
-            verified = (verified + 1) % SENSOR_COUNT;
+        if after(Duration::from_micros(limit_us.saturating_mul(2))) < start
+            && let Some(slot) = to_verify.next()
+        {
+            acquisition.verify(slot, limit_us).await;
         }
         if period >= Duration::from_millis(forces::SHORTEST_PERIOD_MS) {
             let apart = period / (READINGS as u32 + 1);
-            for reading in (1..=READINGS as u32).rev() {
-                let at = start - apart * reading;
+            for reading in (1..=READINGS as u64).rev() {
+                let before = Duration::from_ticks(apart.as_ticks().saturating_mul(reading));
+                let at = start.saturating_sub(before);
                 // A cycle with silent sensors may have taken longer.
                 if now() <= at {
                     votes.waiting(Voter::Acquire, shared.clock.until(at)).await;
@@ -149,22 +162,24 @@ impl<B: Board> Acquisition<'_, '_, B> {
     async fn cycle(&mut self, counter: u16, start: Instant) -> Cycle {
         let mut reading = Reading::unread(counter);
         let mut slots_us = [NO_SLOT; SENSOR_COUNT];
-        for (slot, slot_us) in slots_us.iter_mut().enumerate() {
+        let mut waiting = SENSOR_COUNT as u64;
+        for (slot, slot_us) in slots().zip(&mut slots_us) {
+            let (number, _) = slot;
             let elapsed_us = now().saturating_duration_since(start).as_micros();
-            let waiting = (SENSOR_COUNT - 1 - slot) as u64;
-            let lost = self.standing[slot] == Standing::Lost;
-            let failed = lost || self.standing[slot] == Standing::Doubted;
+            waiting = waiting.saturating_sub(1);
+            let lost = self.standing(number) == Standing::Lost;
+            let failed = lost || self.standing(number) == Standing::Doubted;
             let limit_us = self.budget.limit_us(elapsed_us, waiting, failed);
-            if self.shared.testing.get() == Some(slot) {
+            if self.shared.testing.get() == Some(number) {
                 // Its output is not of this world; it is configured again when the test is over.
-                self.standing[slot] = Standing::Lost;
+                self.stand(number, Standing::Lost);
             } else if limit_us == 0 {
                 self.health = self.health.with(Health::DEADLINE);
             } else if lost {
                 self.configure(slot, limit_us).await;
             } else if self.read(slot, limit_us, &mut reading).await {
                 *slot_us = elapsed_us as u32;
-                reading.errors.remove(slot);
+                reading.errors.remove(number);
             }
         }
         (reading.lift_off, reading.micro_g) = self.shared.discretes.get();
@@ -182,39 +197,39 @@ impl<B: Board> Acquisition<'_, '_, B> {
     }
 
     /// Reads a sensor into the reading; whether it gave a good sample.
-    async fn read(&mut self, slot: usize, limit_us: u64, reading: &mut Reading) -> bool {
+    async fn read(&mut self, slot: Slot, limit_us: u64, reading: &mut Reading) -> bool {
         let limit = Duration::from_micros(limit_us);
-        let sensor = SENSORS[slot];
+        let (number, sensor) = slot;
         if sensor.kind == Kind::Gyro {
             let taken = self.shared.clock.within(limit, self.gyros.read(sensor.plate)).await;
             let Some((rate, temperature)) = self.settle(slot, taken).await else {
                 return false;
             };
-            self.standing[slot] = Standing::Reading;
-            reading.gyro[sensor.plate] = rate;
-            reading.gyro_temperature[sensor.plate] = temperature;
+            self.stand(number, Standing::Reading);
+            put(&mut reading.gyro, sensor.plate, rate);
+            put(&mut reading.gyro_temperature, sensor.plate, temperature);
             return true;
         }
-        let (until, mut tries) = (now() + limit, 0);
+        let (until, mut is_repeated) = (after(limit), false);
         let taken = loop {
             let taken = self.shared.clock.by(until, self.plates.read(sensor)).await;
-            tries += 1;
             // A byte that one disturbance has spoilt is sent again; a part that is gone does not acknowledge that either.
-            if tries == 2 || !matches!(taken, Ok(Err(_))) {
+            if is_repeated || !matches!(taken, Ok(Err(_))) {
                 break taken;
             }
+            is_repeated = true;
         };
-        let is_doubted = taken.is_err() && self.standing[slot] == Standing::Reading;
+        let is_doubted = taken.is_err() && self.standing(number) == Standing::Reading;
         let Some(taken): Option<Taken> = self.settle(slot, taken).await else {
             if is_doubted {
-                self.standing[slot] = Standing::Doubted;
+                self.stand(number, Standing::Doubted);
             }
             return false;
         };
-        if self.standing[slot] != Standing::Reading && !taken.fresh {
+        if self.standing(number) != Standing::Reading && !taken.fresh {
             return false;
         }
-        self.standing[slot] = Standing::Reading;
+        self.stand(number, Standing::Reading);
         self.health = self.health.with_if(Health::MAGNETOMETER_OVERFLOW, taken.overflow);
         taken.put(sensor, reading);
         true
@@ -225,17 +240,17 @@ impl<B: Board> Acquisition<'_, '_, B> {
         let limit = Duration::from_micros(limit_us);
         let mut acc_p = [[NOT_READ; 3]; PLATES];
         let (mut sum_us, mut sensors) = (0, 0);
-        for (slot, sensor) in SENSORS.into_iter().enumerate() {
-            let is_known = self.standing[slot] == Standing::Reading && self.shared.testing.get() != Some(slot);
+        for (number, sensor) in slots() {
+            let is_known = self.standing(number) == Standing::Reading && self.shared.testing.get() != Some(number);
             if sensor.kind != Kind::Accelerometer || !is_known {
                 continue;
             }
             let asked = now();
             match self.shared.clock.within(limit, self.plates.read(sensor)).await {
                 Ok(Ok(taken)) if taken.fresh => {
-                    acc_p[sensor.plate] = taken.counts;
-                    sum_us += asked.as_micros();
-                    sensors += 1;
+                    put(&mut acc_p, sensor.plate, taken.counts);
+                    sum_us = asked.as_micros().saturating_add(sum_us);
+                    sensors = u64::saturating_add(sensors, 1);
                 }
                 Ok(_) => {}
                 Err(TimedOut) => {
@@ -253,9 +268,9 @@ impl<B: Board> Acquisition<'_, '_, B> {
     }
 
     /// Identifies and configures a sensor that is lost.
-    async fn configure(&mut self, slot: usize, limit_us: u64) {
+    async fn configure(&mut self, slot: Slot, limit_us: u64) {
         let limit = Duration::from_micros(limit_us);
-        let sensor = SENSORS[slot];
+        let (number, sensor) = slot;
         let known = match sensor.kind {
             Kind::Gyro => {
                 let done = self
@@ -271,15 +286,15 @@ impl<B: Board> Acquisition<'_, '_, B> {
             }
         };
         if known {
-            self.standing[slot] = Standing::Configured;
+            self.stand(number, Standing::Configured);
         }
     }
 
     /// Compares a sensor's settings with what was written.
-    async fn verify(&mut self, slot: usize, limit_us: u64) {
+    async fn verify(&mut self, slot: Slot, limit_us: u64) {
         let limit = Duration::from_micros(limit_us);
-        let sensor = SENSORS[slot];
-        if self.standing[slot] == Standing::Lost || self.shared.testing.get() == Some(slot) {
+        let (number, sensor) = slot;
+        if self.standing(number) == Standing::Lost || self.shared.testing.get() == Some(number) {
             return;
         }
         let kept = match sensor.kind {
@@ -299,7 +314,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
     }
 
     /// The value, if there is one; otherwise the sensor is lost, and after a timeout the bus is freed.
-    async fn settle<T, E: Display>(&mut self, slot: usize, outcome: Result<Result<T, E>, TimedOut>) -> Option<T> {
+    async fn settle<T, E: Display>(&mut self, slot: Slot, outcome: Result<Result<T, E>, TimedOut>) -> Option<T> {
         match outcome {
             Ok(Ok(value)) => return Some(value),
             Ok(Err(error)) => self.lose(slot, &error),
@@ -309,9 +324,9 @@ impl<B: Board> Acquisition<'_, '_, B> {
     }
 
     /// A sensor that was cut off in the middle of a transfer.
-    async fn abandon(&mut self, slot: usize) {
+    async fn abandon(&mut self, slot: Slot) {
         self.lose(slot, &"no answer in time");
-        if SENSORS[slot].kind != Kind::Gyro {
+        if slot.1.kind != Kind::Gyro {
             self.recover().await;
         }
     }
@@ -325,10 +340,18 @@ impl<B: Board> Acquisition<'_, '_, B> {
         self.switch.recover().await;
     }
 
-    fn lose(&mut self, slot: usize, why: &dyn Display) {
-        if self.standing[slot] != Standing::Lost {
-            self.standing[slot] = Standing::Lost;
-            let sensor: Sensor = SENSORS[slot];
+    /// What is known of the sensor at this place of the reading order.
+    fn standing(&self, number: usize) -> Standing {
+        self.standing.get(number).copied().unwrap_or(Standing::Lost)
+    }
+
+    fn stand(&mut self, number: usize, standing: Standing) {
+        put(&mut self.standing, number, standing);
+    }
+
+    fn lose(&mut self, (number, sensor): Slot, why: &dyn Display) {
+        if self.standing(number) != Standing::Lost {
+            self.stand(number, Standing::Lost);
             self.shared.say(format_args!("{sensor} lost: {why}"));
         }
     }

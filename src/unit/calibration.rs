@@ -6,15 +6,15 @@
 //! Words that are taken are not answered: 284 answers would only lengthen the line's queue, and what
 //! was lost is named when the set is to be used.
 
-use core::{
-    cell::RefCell,
-    fmt::{self, Write as _},
-};
+use core::fmt::{self, Write as _};
 
 use super::shared::Shared;
 use crate::{
     board::Retained,
-    calibration::{ENCODED_BYTES, Ranges, Set, load::NotLoaded},
+    calibration::{
+        ENCODED_BYTES, Ranges, Set,
+        load::{Arriving, NotLoaded, WORDS},
+    },
     command::Command,
     flight_log::record::Name,
     retained::SET,
@@ -24,19 +24,18 @@ use crate::{
 const LINE_BYTES: usize = 32;
 
 /// Carries out a calibration command.
-pub async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, command: Command) {
+pub async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving, command: Command) {
     match command {
         Command::SetWord { place, bytes } => {
-            if !shared.arriving.borrow_mut().take(place, bytes) {
+            if !arriving.take(place, bytes) {
                 shared.say(format_args!("G_CW no: a set has no place {place:04X}"));
             }
         }
-        Command::LoadSet => load(shared, memory),
+        Command::LoadSet => load(shared, memory, arriving),
         Command::ForgetSet => forget(shared, memory),
         _ => {
-            let bytes = shared.calibration.borrow().encode();
-            for (line, bytes) in bytes.chunks(LINE_BYTES).enumerate() {
-                let place = line * LINE_BYTES / 4;
+            let bytes = shared.calibration.get().encode();
+            for (place, bytes) in (0..WORDS).step_by(LINE_BYTES / 4).zip(bytes.chunks(LINE_BYTES)) {
                 shared.tell(format_args!("G_CR {place:04X} {}", Hex(bytes))).await;
             }
         }
@@ -44,18 +43,18 @@ pub async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, command: C
 }
 
 /// The set that was sent, if it may be used.
-pub fn sent(shared: &Shared) -> Result<Set, NotLoaded> {
-    let unit = shared.calibration.borrow().identity.unit;
-    shared.arriving.borrow().set(Ranges::of(&shared.settings), unit)
+pub fn sent(shared: &Shared, arriving: &Arriving) -> Result<Set, NotLoaded> {
+    let unit = shared.calibration.get().identity.unit;
+    arriving.set(Ranges::of(&shared.settings), unit)
 }
 
-fn load(shared: &Shared, memory: &RefCell<impl Retained>) {
-    match sent(shared) {
+fn load(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving) {
+    match sent(shared, arriving) {
         Ok(set) => {
             shared.use_set(&set, name(&set));
             shared.set_to_keep.set(true);
-            shared.arriving.take();
-            SET.keep(&mut *memory.borrow_mut(), &set.encode());
+            *arriving = Arriving::default();
+            SET.keep(memory, &set.encode());
             shared.say(format_args!(
                 "G_CL ok: set {} of unit {}",
                 set.identity.set, set.identity.unit
@@ -65,11 +64,11 @@ fn load(shared: &Shared, memory: &RefCell<impl Retained>) {
     }
 }
 
-fn forget(shared: &Shared, memory: &RefCell<impl Retained>) {
+fn forget(shared: &Shared, memory: &impl Retained) {
     let set = Set::compiled_in(Ranges::of(&shared.settings));
     shared.use_set(&set, compiled_name(shared));
     shared.set_to_keep.set(true);
-    SET.keep(&mut *memory.borrow_mut(), &[]);
+    SET.keep(memory, &[]);
     shared.say(format_args!("G_CX ok: set {} as compiled in", set.identity.set));
 }
 
@@ -89,7 +88,7 @@ pub fn recall(shared: &Shared, memory: &impl Retained) {
 
 /// Takes a set that was kept, unless it is not this unit's any more: then the one compiled in goes on, and it is said.
 pub fn take_kept(shared: &Shared, kept: &[u8]) {
-    let unit = shared.calibration.borrow().identity.unit;
+    let unit = shared.calibration.get().identity.unit;
     match Set::load(kept, Ranges::of(&shared.settings), unit) {
         Ok(set) => shared.use_set(&set, name(&set)),
         Err(why) => shared.say(format_args!("calibration kept is not used: {why}")),
@@ -98,8 +97,8 @@ pub fn take_kept(shared: &Shared, kept: &[u8]) {
 
 /// The set in use as the recorder is to keep it: `None` for the one compiled in.
 pub fn to_keep(shared: &Shared) -> Option<[u8; ENCODED_BYTES]> {
-    let loaded = *shared.set_name.borrow() != compiled_name(shared);
-    loaded.then(|| shared.calibration.borrow().encode())
+    let loaded = shared.set_name() != compiled_name(shared);
+    loaded.then(|| shared.calibration.get().encode())
 }
 
 /// Number and checksum, which tell sets apart that were given one number.

@@ -8,7 +8,8 @@
 
 use core::{
     cell::Cell,
-    future::{Future, poll_fn},
+    convert::Infallible,
+    future::{Future, pending, poll_fn},
     pin::{Pin, pin},
     task::{Context, Poll},
 };
@@ -34,7 +35,18 @@ pub fn now() -> Instant {
 pub fn next_on_grid(interval: Duration, phase: Duration) -> Instant {
     let interval = interval.as_ticks().max(1);
     let since = now().as_ticks().saturating_sub(phase.as_ticks());
-    Instant::from_ticks((since / interval + 1) * interval) + phase
+    let next = (since / interval).saturating_add(1).saturating_mul(interval);
+    Instant::from_ticks(next).saturating_add(phase)
+}
+
+/// The instant `delay` from now.
+pub fn after(delay: Duration) -> Instant {
+    now().saturating_add(delay)
+}
+
+/// Waits for ever, as a part does that cannot work: its vote is missing, and the watchdog restarts the unit.
+pub async fn never() -> ! {
+    match pending::<Infallible>().await {}
 }
 
 /// Time was up.
@@ -51,8 +63,8 @@ impl Clock {
     }
 
     /// Runs the parts that wait on this clock.
-    pub async fn drive<F: Future>(&self, mut parts: Pin<&mut F>) -> F::Output {
-        poll_fn(|context| {
+    pub fn drive<F: Future>(&self, mut parts: Pin<&mut F>) -> impl Future<Output = F::Output> {
+        poll_fn(move |context| {
             self.now.set(now());
             self.next.set(Instant::MAX);
             let polled = parts.as_mut().poll(context);
@@ -63,7 +75,6 @@ impl Clock {
             }
             polled
         })
-        .await
     }
 
     /// The reading of this poll.
@@ -72,21 +83,20 @@ impl Clock {
     }
 
     /// Waits until `at`.
-    pub async fn until(&self, at: Instant) {
-        poll_fn(|_| {
+    pub fn until(&self, at: Instant) -> impl Future<Output = ()> {
+        poll_fn(move |_| {
             if self.has_come(at) {
                 Poll::Ready(())
             } else {
                 Poll::Pending
             }
         })
-        .await
     }
 
     /// What `future` gives, if it does within `limit` from now on.
     pub fn within<F: Future>(&self, limit: Duration, future: F) -> Within<'_, F> {
         // Not the reading of this poll: the parts polled before may have taken their time.
-        self.by(now() + limit, future)
+        self.by(after(limit), future)
     }
 
     /// What `future` gives, if it does before `until`.
@@ -133,8 +143,15 @@ impl<F: Future> Future for Within<'_, F> {
 }
 
 impl DelayNs for &Clock {
-    async fn delay_ns(&mut self, ns: u32) {
-        self.until(now() + Duration::from_micros(u64::from(ns).div_ceil(1000)))
-            .await;
+    fn delay_ns(&mut self, ns: u32) -> impl Future<Output = ()> {
+        self.until(after(Duration::from_micros(u64::from(ns).div_ceil(1000))))
+    }
+
+    fn delay_us(&mut self, us: u32) -> impl Future<Output = ()> {
+        self.until(after(Duration::from_micros(us.into())))
+    }
+
+    fn delay_ms(&mut self, ms: u32) -> impl Future<Output = ()> {
+        self.until(after(Duration::from_millis(ms.into())))
     }
 }

@@ -9,15 +9,13 @@
 //! unit was turned through meanwhile. After a power cut in FLIGHT it goes on from the log's newest record, unless the first
 //! second of readings tells better.
 
-use core::cell::RefCell;
-
 use embassy_futures::{
     select::{Either, select},
     yield_now,
 };
 
 use super::{
-    clock::now,
+    clock::{never, now},
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -32,19 +30,19 @@ use crate::{
 };
 
 /// Derives for ever.
-pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &RefCell<impl Retained>) {
+pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &impl Retained) {
     let Some(mut cycles) = shared.cycle_reader() else {
-        return;
+        never().await
     };
     let mut kept = [0; KEPT_BYTES];
     if shared.set_loaded.take() {
-        estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
+        estimator.renew(&shared.calibration.get(), &shared.settings.site);
     }
     if shared.safe.get() {
         // It may be what ended the starts before; and once it is older than one start, nobody knows how old it is.
-        ATTITUDE.forget(&mut *memory.borrow_mut());
+        ATTITUDE.forget(memory);
     } else {
-        go_on(shared, estimator, &*memory.borrow(), &mut kept);
+        go_on(shared, estimator, memory, &mut kept);
     }
     loop {
         let next = select(cycles.next_message_pure(), shared.force.wait());
@@ -58,7 +56,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             }
         };
         votes.waiting(Voter::Estimate, yield_now()).await;
-        let state = *shared.state.borrow();
+        let state = shared.state.get();
         let health = cycle
             .health
             .with_if(Health::RECORDER_REFUSED, shared.recorder_refused.get())
@@ -73,7 +71,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             continue;
         }
         if shared.set_loaded.take() {
-            estimator.renew(&shared.calibration.borrow(), &shared.settings.site);
+            estimator.renew(&shared.calibration.get(), &shared.settings.site);
         }
         if let Some(found) = shared.attitude_found.take() {
             estimator.resume_near(&found, POWER_CUT);
@@ -89,7 +87,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             estimate_us,
             estimate,
         ));
-        keep(estimator, &mut *memory.borrow_mut(), &mut kept);
+        keep(estimator, memory, &mut kept);
     }
 }
 
@@ -105,7 +103,7 @@ fn go_on(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kep
     }
 }
 
-fn keep(estimator: &mut Estimator, memory: &mut impl Retained, kept: &mut [u8; KEPT_BYTES]) {
+fn keep(estimator: &mut Estimator, memory: &impl Retained, kept: &mut [u8; KEPT_BYTES]) {
     if estimator.keep(kept) {
         ATTITUDE.keep(memory, kept);
     } else {

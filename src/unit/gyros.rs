@@ -4,7 +4,7 @@
 //! asked one after the other and answer in the same order: the part needs a pause between its frames, and the other
 //! three fill it.
 
-use core::cell::{Cell, RefCell};
+use core::cell::Cell;
 
 use embassy_sync::{blocking_mutex::raw::NoopRawMutex, mutex::Mutex};
 use embassy_time::{Duration, Instant};
@@ -12,13 +12,15 @@ use embedded_hal_async::spi::SpiDevice;
 
 use super::{
     Settings,
-    clock::{Clock, next_on_grid, now},
+    clock::{Clock, after, next_on_grid, now},
+    plates::put,
     shared::Shared,
     vote::{Voter, Votes},
 };
 use crate::{
     board::Board,
     derived::Health,
+    geometry::PLATES,
     increments::Fast,
     resume::Pulse,
     sample::NOT_READ,
@@ -28,11 +30,11 @@ use crate::{
     },
 };
 
-/// \[ms\] the longest all four may take.
-const FAST_LIMIT_MS: u64 = 2;
+/// The longest all four may take.
+const FAST_LIMIT: Duration = Duration::from_millis(2);
 
-/// \[ms\] between looks at a running self-test.
-const TEST_POLL_MS: u64 = 10;
+/// Between looks at a running self-test.
+const TEST_POLL: Duration = Duration::from_millis(10);
 
 /// Pause between two frames of one part.
 const STALL: Duration = Duration::from_micros(STALL_US as u64);
@@ -45,8 +47,8 @@ pub struct Gyros<'a, SPI> {
     parts: Mutex<NoopRawMutex, [Adis16265<SPI, &'a Clock>; 4]>,
     clock: &'a Clock,
     config: adis16265::Config,
-    /// Bit set: the gyro of that plate is configured and answers.
-    answering: Cell<u8>,
+    /// The gyro of each plate is configured and answers.
+    answering: Cell<[bool; PLATES]>,
     /// When the last frame outside a fast sample ended.
     last_frame: Cell<Instant>,
     health: Cell<Health>,
@@ -59,7 +61,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
             parts: Mutex::new(selects.map(|select| Adis16265::new(select, clock))),
             clock,
             config: settings.gyro(),
-            answering: Cell::new(0),
+            answering: Cell::default(),
             last_frame: Cell::new(Instant::MIN),
             health: Cell::default(),
         }
@@ -82,7 +84,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
         self.answers(plate, false);
         self.parts.lock().await[plate].start_self_test().await?;
         loop {
-            self.clock.until(now() + Duration::from_millis(TEST_POLL_MS)).await;
+            self.clock.until(after(TEST_POLL)).await;
             if let Some(diagnosis) = self.parts.lock().await[plate].self_test_result().await? {
                 return Ok(diagnosis);
             }
@@ -106,27 +108,31 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     async fn fast(&self) -> (Instant, [i16; 4]) {
         let mut parts = self.parts.lock().await;
         let answering = self.answering.get();
-        let is_answering = |plate: &usize| answering >> plate & 1 == 1;
-        self.clock.until(self.last_frame.get() + STALL).await;
+        self.clock.until(self.last_frame.get().saturating_add(STALL)).await;
         let asked = now();
-        for plate in (0..4).filter(is_answering) {
-            let request = parts[plate].request(adis16265::GYRO_OUT).await;
-            let _ = self.settle(plate, request);
+        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(answering)) {
+            if answers {
+                let request = part.exchange(adis16265::GYRO_OUT).await;
+                let _ = self.settle(plate, request);
+            }
         }
         // Four frames are longer than the pause; fewer may not be.
-        if answering != 0xF {
-            self.clock.until(asked + STALL).await;
+        if answering.contains(&false) {
+            self.clock.until(asked.saturating_add(STALL)).await;
         }
         let mut counts = [NOT_READ; 4];
-        for plate in (0..4).filter(is_answering) {
+        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(answering)) {
+            if !answers {
+                continue;
+            }
             // What is asked for here is taken by the next reading's first frame, which so checks who answers.
-            let answer = parts[plate].exchange(adis16265::PROD_ID).await;
+            let answer = part.exchange(adis16265::PROD_ID).await;
             // A dead line's word; a live part sends it only when it has nothing new.
             let is_live = |word: &u16| !matches!(*word, 0 | u16::MAX);
             if let Some(word) = self.settle(plate, answer).ok().filter(is_live) {
                 let rate = Output::rate(word);
                 self.note(rate);
-                counts[plate] = rate.counts;
+                put(&mut counts, plate, rate.counts);
             }
         }
         (asked, counts)
@@ -151,28 +157,29 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     }
 
     fn answers(&self, plate: usize, answering: bool) {
-        let others = self.answering.get() & !(1 << plate);
-        self.answering.set(others | u8::from(answering) << plate);
+        let mut all = self.answering.get();
+        put(&mut all, plate, answering);
+        self.answering.set(all);
     }
 }
 
 /// Samples fast for ever, and leaves in retained memory that the unit is alive: after a reset it tells when that struck.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>, memory: &RefCell<B::Retained>) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>, memory: &B::Retained) {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
-    let limit = Duration::from_millis(FAST_LIMIT_MS);
     // A cycle starts on the grid of the period and asks the gyros 3 ms later. Three quarters of an interval off the grid
     // the two do not meet, and there is a conversion (3.9 ms) between them: a part that has nothing new may send what a
     // dead line sends.
+    let phase = Duration::from_ticks(interval.as_ticks().saturating_mul(3) / 4);
     // Samples that were missed are not made up for: they would all be of now.
     loop {
-        let tick = next_on_grid(interval, interval * 3 / 4);
+        let tick = next_on_grid(interval, phase);
         votes.waiting(Voter::Gyros, shared.clock.until(tick)).await;
         let pulse = Pulse {
             at_us: now().as_micros(),
             fed_us: shared.fed_us.get(),
         };
-        pulse.keep(&mut *memory.borrow_mut());
-        if let Ok((at, counts)) = shared.clock.within(limit, gyros.fast()).await {
+        pulse.keep(memory);
+        if let Ok((at, counts)) = shared.clock.within(FAST_LIMIT, gyros.fast()).await {
             shared.integrator.borrow_mut().add(Fast {
                 at_us: at.as_micros(),
                 counts,

@@ -28,6 +28,6 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discret
             shared.say(format_args!("lift-off: FLIGHT, recording"));
         }
         votes.waiting(Voter::Inputs, shared.clock.until(poll)).await;
-        poll += interval;
+        poll = poll.saturating_add(interval);
     }
 }

@@ -4,6 +4,7 @@ use embedded_hal_async::i2c::I2c;
 
 use super::Settings;
 use crate::{
+    geometry::PLATES,
     sample::{Kind, NOT_READ, Reading, Sensor},
     sensor::{
         Error,
@@ -32,19 +33,31 @@ impl Taken {
     /// Puts the counts where a reading has them.
     pub fn put(&self, sensor: Sensor, reading: &mut Reading) {
         match sensor.kind {
-            Kind::Accelerometer => reading.acc_p[sensor.plate] = self.counts,
-            Kind::Magnetometer => reading.mag_p[sensor.plate] = self.counts,
-            Kind::Thermometer => reading.temperature[sensor.plate] = self.counts[0],
+            Kind::Accelerometer => put(&mut reading.acc_p, sensor.plate, self.counts),
+            Kind::Magnetometer => put(&mut reading.mag_p, sensor.plate, self.counts),
+            Kind::Thermometer => put(&mut reading.temperature, sensor.plate, self.counts[0]),
             Kind::Gyro => {}
         }
     }
 }
 
+/// Puts a value at its place, if there is one.
+pub fn put<T>(places: &mut [T], at: usize, value: T) {
+    if let Some(place) = places.get_mut(at) {
+        *place = value;
+    }
+}
+
+/// The I2C parts of a plate.
+struct Plate<'a, I2C> {
+    accelerometer: Lis331hh<Channel<'a, I2C>>,
+    magnetometer: Hmc5883l<Channel<'a, I2C>>,
+    thermometer: Tmp102<Channel<'a, I2C>>,
+}
+
 /// The accelerometers, magnetometers and thermometers of plates 1 to 4.
 pub struct Plates<'a, I2C> {
-    accelerometers: [Lis331hh<Channel<'a, I2C>>; 4],
-    magnetometers: [Hmc5883l<Channel<'a, I2C>>; 4],
-    thermometers: [Tmp102<Channel<'a, I2C>>; 4],
+    plates: [Plate<'a, I2C>; PLATES],
     acceleration: lis331hh::Config,
     field: hmc5883l::Config,
     temperature: tmp102::Rate,
@@ -53,57 +66,65 @@ pub struct Plates<'a, I2C> {
 impl<'a, I2C: I2c> Plates<'a, I2C> {
     /// The parts behind a multiplexer, plate 1 on channel 0.
     pub fn new(switch: &'a Switch<I2C>, settings: Settings) -> Self {
-        let channels = [0, 1, 2, 3];
+        let plate = |channel| Plate {
+            accelerometer: Lis331hh::new(switch.channel(channel)),
+            magnetometer: Hmc5883l::new(switch.channel(channel)),
+            thermometer: Tmp102::new(switch.channel(channel)),
+        };
         Plates {
-            accelerometers: channels.map(|plate| Lis331hh::new(switch.channel(plate))),
-            magnetometers: channels.map(|plate| Hmc5883l::new(switch.channel(plate))),
-            thermometers: channels.map(|plate| Tmp102::new(switch.channel(plate))),
+            plates: [0, 1, 2, 3].map(plate),
             acceleration: settings.accelerometer(),
             field: settings.magnetometer(),
             temperature: tmp102::Rate::default(),
         }
     }
 
-    /// Identifies and configures a part.
+    /// Identifies and configures a part; nothing for what is none of these.
     pub async fn configure(&mut self, sensor: Sensor) -> Result<(), PlateError<I2C>> {
-        let plate = sensor.plate;
+        let Some(plate) = self.plates.get_mut(sensor.plate) else {
+            return Ok(());
+        };
         match sensor.kind {
-            Kind::Accelerometer => self.accelerometers[plate].configure(self.acceleration).await,
-            Kind::Magnetometer => self.magnetometers[plate].configure(self.field).await,
-            Kind::Thermometer => self.thermometers[plate].configure(self.temperature).await,
+            Kind::Accelerometer => plate.accelerometer.configure(self.acceleration).await,
+            Kind::Magnetometer => plate.magnetometer.configure(self.field).await,
+            Kind::Thermometer => plate.thermometer.configure(self.temperature).await,
             Kind::Gyro => Ok(()),
         }
     }
 
     /// Finds a part that has lost its settings.
     pub async fn verify(&mut self, sensor: Sensor) -> Result<(), PlateError<I2C>> {
-        let plate = sensor.plate;
+        let Some(plate) = self.plates.get_mut(sensor.plate) else {
+            return Ok(());
+        };
         match sensor.kind {
-            Kind::Accelerometer => self.accelerometers[plate].verify(self.acceleration).await,
-            Kind::Magnetometer => self.magnetometers[plate].verify(self.field).await,
-            Kind::Thermometer => self.thermometers[plate].verify(self.temperature).await,
+            Kind::Accelerometer => plate.accelerometer.verify(self.acceleration).await,
+            Kind::Magnetometer => plate.magnetometer.verify(self.field).await,
+            Kind::Thermometer => plate.thermometer.verify(self.temperature).await,
             Kind::Gyro => Ok(()),
         }
     }
 
     /// Takes a part's newest sample.
     pub async fn read(&mut self, sensor: Sensor) -> Result<Taken, PlateError<I2C>> {
-        let plate = sensor.plate;
         let none = Taken {
             counts: [NOT_READ; 3],
             fresh: false,
             overflow: false,
         };
+        let Some(plate) = self.plates.get_mut(sensor.plate) else {
+            return Ok(none);
+        };
         match sensor.kind {
             Kind::Accelerometer => {
-                let sample = self.accelerometers[plate].read().await?;
+                let sample = plate.accelerometer.read().await?;
                 Ok(Taken {
                     counts: sample.counts,
                     fresh: sample.fresh,
                     overflow: false,
                 })
             }
-            Kind::Magnetometer => Ok(match self.magnetometers[plate].read().await? {
+            Kind::Magnetometer => Ok(match plate.magnetometer.read().await? {
                 Some(sample) => Taken {
                     counts: sample.counts,
                     fresh: sample.ready,
@@ -112,7 +133,7 @@ impl<'a, I2C: I2c> Plates<'a, I2C> {
                 None => none,
             }),
             Kind::Thermometer => {
-                let counts = self.thermometers[plate].read().await?;
+                let counts = plate.thermometer.read().await?;
                 Ok(Taken {
                     counts: [counts, NOT_READ, NOT_READ],
                     fresh: true,

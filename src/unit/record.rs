@@ -2,19 +2,17 @@
 //! better done in free time.
 //!
 //! A chip that is dead, absent or full costs its records and nothing else: the reason is on the console and in the health
-//! of every derived frame, and it is tried again every [`RETRY_MS`]. After a dip of the supply it is tried again at once, and
+//! of every derived frame, and it is tried again every [`RETRY`]. After a dip of the supply it is tried again at once, and
 //! again after twice as long each time; the newest record waits for it. So a dip costs the records of its own duration at most.
 //!
 //! What the log says of the time before power-on (mode, attitude, the calibration set it keeps) is taken once, at the first mount,
 //! and where neither retained memory nor a command knows better. A crash record is forgotten when a boot header with it is in the log.
 
-use core::cell::RefCell;
-
 use embassy_time::{Duration, Instant};
 
 use super::{
     calibration,
-    clock::now,
+    clock::{after, never, now},
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -32,30 +30,30 @@ use crate::{
     retained::{CRASH, SET},
 };
 
-/// \[ms\] while a dump waits for the line, how long until the next look.
-const STEP_MS: u64 = 1;
+/// While a dump waits for the line, how long until the next look.
+const STEP: Duration = Duration::from_millis(1);
 
-/// \[ms\] otherwise, how long an order to erase or dump may wait.
-const IDLE_MS: u64 = 100;
+/// Otherwise, how long an order to erase or dump may wait.
+const IDLE: Duration = Duration::from_millis(100);
 
-/// \[ms\] until a chip that failed is tried again.
-const RETRY_MS: u64 = 2_000;
+/// Until a chip that failed is tried again.
+const RETRY: Duration = Duration::from_secs(2);
 
-/// \[ms\] until it is tried again after the supply failed, at first.
-const DIP_MS: u64 = 10;
+/// Until it is tried again after the supply failed, at first.
+const DIP: Duration = Duration::from_millis(10);
 
 /// Serves the recorder for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory: &RefCell<B::Retained>) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory: &B::Retained) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
-        return;
+        never().await
     };
     let mut recorder = Recorder {
         shared,
         memory,
         log: FlightLog::new(K9f1208::new(bus, &shared.clock), header(shared)),
-        calibration: shared.set_name.borrow().clone(),
+        calibration: shared.set_name(),
         retry: Some(Instant::MIN),
-        dip_ms: DIP_MS,
+        dip: DIP,
         crash: shared.start.crash.is_some(),
         missed: None,
         set: [0; ENCODED_BYTES],
@@ -64,11 +62,9 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory:
     };
     loop {
         recorder.mount_if_due().await;
-        let wait_ms = recorder.step().await;
+        let wait = recorder.step().await;
         shared.recorder.set(recorder.log.status());
-        let next = shared
-            .clock
-            .within(Duration::from_millis(wait_ms), frames.next_message_pure());
+        let next = shared.clock.within(wait, frames.next_message_pure());
         let Ok(frame) = votes.waiting(Voter::Record, next).await else {
             continue;
         };
@@ -88,22 +84,22 @@ fn header(shared: &Shared) -> BootHeader {
         opened_us: 0,
         firmware: name(env!("CARGO_PKG_VERSION")),
         unit: name(shared.settings.unit),
-        calibration: shared.set_name.borrow().clone(),
-        period_us: shared.settings.period_ms as u32 * 1000,
+        calibration: shared.set_name(),
+        period_us: shared.settings.period_ms.saturating_mul(1000) as u32,
         start: Some(shared.start.in_full()),
     }
 }
 
 struct Recorder<'a, N, R> {
     shared: &'a Shared,
-    memory: &'a RefCell<R>,
+    memory: &'a R,
     log: FlightLog<N>,
     /// The set that the log's header names.
     calibration: Name,
     /// When to mount; `None` while mounted.
     retry: Option<Instant>,
-    /// \[ms\] the next wait for the supply.
-    dip_ms: u64,
+    /// The next wait for the supply.
+    dip: Duration,
     /// What the log was about to take when the supply failed.
     missed: Option<Entry>,
     /// A calibration set on its way from or to the chip.
@@ -127,7 +123,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
                 if self.missed.is_none() {
                     self.forgive();
                 }
-                if self.shared.state.borrow().awaits_log {
+                if self.shared.state.get().awaits_log {
                     self.find_attitude(resumed.flight);
                     let shared = self.shared;
                     shared.change(Cause::Log, |state| state.recovered(resumed));
@@ -146,7 +142,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
     }
 
     fn forgive(&mut self) {
-        self.dip_ms = DIP_MS;
+        self.dip = DIP;
         self.shared.recorder_error.set(None);
         self.shared.recorder_refused.set(false);
     }
@@ -166,7 +162,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
         let kept = self.log.kept_set(&mut self.set)?.unwrap_or_default();
         // A command may have ordered one meanwhile.
         if !self.shared.set_known.replace(true) {
-            SET.keep(&mut *self.memory.borrow_mut(), kept);
+            SET.keep(self.memory, kept);
             if !kept.is_empty() {
                 calibration::take_kept(self.shared, kept);
             }
@@ -200,16 +196,16 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
         if self.shared.recorder_error.replace(Some(error)) != Some(error) {
             self.shared.say(format_args!("recorder: {error}"));
         }
-        let wait_ms = match error {
+        let wait = match error {
             LogError::Nand(NandError::PowerFailing) => {
-                let wait_ms = self.dip_ms;
-                self.dip_ms = (2 * self.dip_ms).min(RETRY_MS);
-                wait_ms
+                let wait = self.dip;
+                self.dip = Duration::from_ticks(wait.as_ticks().saturating_mul(2)).min(RETRY);
+                wait
             }
-            LogError::Nand(_) | LogError::NotMounted => RETRY_MS,
+            LogError::Nand(_) | LogError::NotMounted => RETRY,
             _ => return,
         };
-        self.retry = Some(now() + Duration::from_millis(wait_ms));
+        self.retry = Some(after(wait));
     }
 
     fn entry(&self, cycle: &Cycle, estimate: &Estimate) -> Entry {
@@ -219,14 +215,14 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             start_us: sample.start_us,
             packet: cycle.packet,
             slots_us: sample.slots_us,
-            flight: self.shared.state.borrow().mode == Mode::Flight,
+            flight: self.shared.state.get().mode == Mode::Flight,
             health: cycle.health.with(errors).with(Health::RECORDING),
             estimate: estimate.kept(),
         }
     }
 
     async fn take(&mut self, entry: Entry) {
-        let state = *self.shared.state.borrow();
+        let state = self.shared.state.get();
         let recording = state.recording;
         let power_failed = self.shared.recorder_error.get() == Some(LogError::Nand(NandError::PowerFailing));
         if self.retry.is_some() {
@@ -256,15 +252,15 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             derived: state.derived,
         };
         self.log.keep_mode(mode).await?;
-        if self.calibration != *self.shared.set_name.borrow() {
-            self.calibration.clone_from(&self.shared.set_name.borrow());
+        let calibration = self.shared.set_name();
+        if self.calibration != calibration {
+            self.calibration = calibration;
             self.log.describe(header(self.shared));
         }
-        let oldest = |shared: &Shared| shared.changes.borrow().front().copied();
-        while let Some(change) = oldest(self.shared) {
+        while let Some(change) = self.shared.with_changes(|changes| changes.front().copied()) {
             let noted = self.log.note(&change).await;
             if !matches!(noted, Err(LogError::Nand(_) | LogError::NotMounted)) {
-                self.shared.changes.borrow_mut().pop_front();
+                self.shared.with_changes(|changes| changes.pop_front());
             }
             noted?;
         }
@@ -277,12 +273,12 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
     /// A crash is forgotten when the log has it.
     fn forget_logged_crash(&mut self) {
         if self.log.is_begun() && core::mem::take(&mut self.crash) {
-            CRASH.forget(&mut *self.memory.borrow_mut());
+            CRASH.forget(self.memory);
         }
     }
 
-    /// A bounded piece of erasing, dumping or preparing; how long to wait for a cycle then \[ms\].
-    async fn step(&mut self) -> u64 {
+    /// A bounded piece of erasing, dumping or preparing; how long to wait for a cycle then.
+    async fn step(&mut self) -> Duration {
         if self.shared.erase_ordered.take() {
             match self.log.start_erase().await {
                 Ok(()) => {
@@ -298,14 +294,14 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             }
         }
         if let Some(due) = self.retry {
-            return due.saturating_duration_since(now()).as_millis().clamp(STEP_MS, IDLE_MS);
+            return due.saturating_duration_since(now()).clamp(STEP, IDLE);
         }
         if self.shared.set_to_keep.get() {
             self.keep_set().await;
         }
         match self.log.free_time().await {
             // An erase takes milliseconds itself, and everybody else has their turn in them.
-            Ok(true) => return 0,
+            Ok(true) => return Duration::MIN,
             Ok(false) if self.erasing && self.log.status().erasing.is_none() => {
                 self.erasing = false;
                 self.shared.say(format_args!("G_MA done: recorder is empty"));
@@ -313,31 +309,33 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             Ok(false) | Err(LogError::Full | LogError::NotMounted) => {}
             Err(error) => self.fail(error),
         }
-        self.dump().await
+        self.dump()
     }
 
-    async fn dump(&mut self) -> u64 {
-        let Task::Dump { next, end } = self.shared.state.borrow().task else {
+    fn dump(&mut self) -> Duration {
+        let Task::Dump { next, end } = self.shared.state.get().task else {
             self.dumped = None;
-            return IDLE_MS;
+            return IDLE;
         };
         if !self.shared.dumped.is_empty() {
-            return STEP_MS;
+            return STEP;
         }
         let used = self.log.status().used;
         let ended = next >= end.min(used);
         let read = if ended { Ok([None, None]) } else { self.log.read(next) };
-        let mut state = self.shared.state.borrow_mut();
         // A command may have ended or restarted the dump while the page was read.
-        if state.task != (Task::Dump { next, end }) {
-            return STEP_MS;
+        if self.shared.state.get().task != (Task::Dump { next, end }) {
+            return STEP;
         }
         if ended {
-            state.task = Task::Idle;
+            self.shared.set_task(Task::Idle);
             self.shared.say(format_args!("dump ends at page {next} of {used}"));
-            return IDLE_MS;
+            return IDLE;
         }
-        state.task = Task::Dump { next: next + 1, end };
+        self.shared.set_task(Task::Dump {
+            next: next.saturating_add(1),
+            end,
+        });
         match read {
             // The second half repeats the page before, where that one is whole: the older record first.
             Ok([newer, older]) => {
@@ -351,6 +349,6 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             }
             Err(error) => self.shared.say(format_args!("page {next} cannot be read: {error}")),
         }
-        STEP_MS
+        STEP
     }
 }

@@ -38,7 +38,7 @@ pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros
         shared.self_test_ordered.wait().await;
         let mut passed = 0_u8;
         for (slot, sensor) in SENSORS.into_iter().enumerate() {
-            if shared.state.borrow().mode == Mode::Flight {
+            if shared.state.get().mode == Mode::Flight {
                 break;
             }
             shared.testing.set(Some(slot));

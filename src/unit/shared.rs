@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     board::{BrownOut, Oscillator, ResetCause, StackUse},
-    calibration::{Ranges, Set, load::Arriving},
+    calibration::{Ranges, Set},
     crash::CrashRecord,
     derived::{self, DERIVED_BYTES, Derived, Health},
     flight_log::{
@@ -24,7 +24,7 @@ use crate::{
         record::{self, Name, RecordBytes},
     },
     increments::{Force, Increments, Integrator},
-    mode::{Cause, Change, State},
+    mode::{Cause, Change, State, Task},
     packet::PACKET_BYTES,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
@@ -125,7 +125,7 @@ pub struct Shared {
     /// Safe mode: nothing is estimated, and of commands only those that ask are taken.
     pub safe: Cell<bool>,
     /// Mode, task, confirmations.
-    pub state: RefCell<State>,
+    pub state: Cell<State>,
     /// The gyros' running integration.
     pub integrator: RefCell<Integrator>,
     /// Debounced lift-off and micro-g.
@@ -151,9 +151,9 @@ pub struct Shared {
     /// Bytes lost or passed over on the umbilical.
     pub umbilical_noise: Cell<u32>,
     /// The calibration set in use.
-    pub calibration: RefCell<Set>,
+    pub calibration: Cell<Set>,
     /// Its name in the log: what was compiled in, or number and checksum of what was loaded.
-    pub set_name: RefCell<Name>,
+    set_name: Cell<Name>,
     /// It was loaded and the estimation does not use it yet.
     pub set_loaded: Cell<bool>,
     /// The set in use is known to be the one to use: it was kept over a reset, or ordered. Otherwise the recorder is asked.
@@ -165,9 +165,7 @@ pub struct Shared {
     /// \[us\] when the watchdog was last fed.
     pub fed_us: Cell<u64>,
     /// Changes of mode that are not in the log yet.
-    pub changes: RefCell<Deque<Change, CHANGES>>,
-    /// The one that is being sent.
-    pub arriving: RefCell<Arriving>,
+    changes: Cell<Deque<Change, CHANGES>>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
     pub force: Signal<NoopRawMutex, (u16, Force)>,
     cycles: Cycles,
@@ -186,7 +184,7 @@ impl Shared {
         Shared {
             clock: Clock::new(),
             settings,
-            state: RefCell::new(State::resumed(start.resume)),
+            state: Cell::new(State::resumed(start.resume)),
             safe: Cell::new(start.starts.ask_for_safe_mode()),
             start,
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
@@ -201,15 +199,14 @@ impl Shared {
             errors: Cell::default(),
             lines_lost: Cell::default(),
             umbilical_noise: Cell::default(),
-            calibration: RefCell::new(Set::compiled_in(Ranges::of(&settings))),
-            set_name: RefCell::new(settings.calibration.chars().take(16).collect()),
+            calibration: Cell::new(Set::compiled_in(Ranges::of(&settings))),
+            set_name: Cell::new(settings.calibration.chars().take(16).collect()),
             set_loaded: Cell::default(),
             set_known: Cell::default(),
             set_to_keep: Cell::default(),
             attitude_found: Cell::default(),
             fed_us: Cell::default(),
-            changes: RefCell::default(),
-            arriving: RefCell::default(),
+            changes: Cell::default(),
             force: Signal::new(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
@@ -238,12 +235,17 @@ impl Shared {
     /// Whether a derived frame is to be sent: they are on, and the line has room for it beside the packets. A unit that is
     /// too fast for all of them sends as many as there is time for; each stands for itself.
     pub fn is_wanted(&self, frame: &Derived) -> bool {
-        let line_us = |bytes: usize| (bytes as u64 * BITS_PER_BYTE * 1_000_000).div_ceil(LINE_BAUD);
-        let free_us = (self.settings.period_ms * 1000)
+        const fn line_us(bytes: usize) -> u64 {
+            (bytes as u64 * BITS_PER_BYTE * 1_000_000).div_ceil(LINE_BAUD)
+        }
+        let free_us = self
+            .settings
+            .period_ms
+            .saturating_mul(1000)
             .saturating_sub(line_us(PACKET_BYTES))
             .max(1);
         let every = line_us(DERIVED_BYTES).div_ceil(free_us);
-        self.state.borrow().derived && u64::from(frame.counter).is_multiple_of(every)
+        self.state.get().derived && u64::from(frame.counter).is_multiple_of(every)
     }
 
     /// Gives a derived frame to every reader.
@@ -253,35 +255,56 @@ impl Shared {
 
     /// Changes the state. A change of mode is announced on both lines and waits for the log.
     pub fn change<T>(&self, cause: Cause, act: impl FnOnce(&mut State) -> T) -> T {
-        let (before, outcome, after) = {
-            let mut state = self.state.borrow_mut();
-            let before = state.mode;
-            let outcome = act(&mut state);
-            (before, outcome, *state)
-        };
-        if after.mode != before {
+        let before = self.state.get();
+        let mut after = before;
+        let outcome = act(&mut after);
+        self.state.set(after);
+        if after.mode != before.mode {
             let text = line(format_args!("mode {}: {}", after.mode.name(), cause.name()));
             for announced in &self.announced {
                 let _ = announced.try_send(text.clone());
             }
-            let mut changes = self.changes.borrow_mut();
-            if changes.is_full() {
-                changes.pop_front();
-            }
-            let _ = changes.push_back(Change {
-                at_us: now().as_micros(),
-                mode: after.mode,
-                recording: after.recording,
-                cause,
+            self.with_changes(|changes| {
+                if changes.is_full() {
+                    changes.pop_front();
+                }
+                let _ = changes.push_back(Change {
+                    at_us: now().as_micros(),
+                    mode: after.mode,
+                    recording: after.recording,
+                    cause,
+                });
             });
         }
         outcome
     }
 
+    /// What the umbilical is busy with from now on.
+    pub fn set_task(&self, task: Task) {
+        let mut state = self.state.get();
+        state.task = task;
+        self.state.set(state);
+    }
+
+    /// Works on the changes of mode that are not in the log yet, oldest first.
+    pub fn with_changes<T>(&self, act: impl FnOnce(&mut Deque<Change, CHANGES>) -> T) -> T {
+        let mut changes = self.changes.take();
+        let outcome = act(&mut changes);
+        self.changes.set(changes);
+        outcome
+    }
+
+    /// Name of the calibration set in use.
+    pub fn set_name(&self) -> Name {
+        let name = self.set_name.take();
+        self.set_name.set(name.clone());
+        name
+    }
+
     /// Uses another set from the next cycle on.
     pub fn use_set(&self, set: &Set, name: Name) {
-        *self.calibration.borrow_mut() = *set;
-        *self.set_name.borrow_mut() = name;
+        self.calibration.set(*set);
+        self.set_name.set(name);
         self.set_known.set(true);
         self.set_loaded.set(true);
     }
@@ -295,8 +318,8 @@ impl Shared {
     }
 
     /// Puts a line on the console when there is room: for answers of many lines, of which none may be missing.
-    pub async fn tell(&self, text: core::fmt::Arguments<'_>) {
-        self.replies.send(line(text)).await;
+    pub fn tell(&self, text: core::fmt::Arguments<'_>) -> impl Future<Output = ()> {
+        self.replies.send(line(text))
     }
 }
 

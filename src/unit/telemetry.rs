@@ -6,7 +6,7 @@ use embassy_time::Duration;
 use embedded_io_async::Write;
 
 use super::{
-    clock::Clock,
+    clock::{Clock, never},
     shared::{Line, Shared},
     vote::{Voter, Votes},
 };
@@ -18,7 +18,7 @@ const WRITE_MS: u64 = 100;
 /// Sends for ever.
 pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Telemetry) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
-        return;
+        never().await
     };
     loop {
         let next = select3(

@@ -2,20 +2,19 @@
 //!
 //! Every reply is one line `>...\r\n`, without `@` or `$`, between whole frames; a reader of packets passes over it.
 
-use core::cell::RefCell;
-
 use embassy_futures::select::{Either, Either4, select, select4};
 use embedded_io_async::Read;
 
 use super::{
     calibration,
-    clock::now,
+    clock::{never, now},
     shared::Shared,
     telemetry::{say, write},
     vote::{Voter, Votes},
 };
 use crate::{
     board::{Board, Retained},
+    calibration::load::Arriving,
     command::{COMMANDS, Command, Heard, Parser, word_of},
     crash::{CrashCause, CrashRecord},
     derived,
@@ -26,7 +25,7 @@ use crate::{
 /// Sends for ever.
 pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalTx) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
-        return;
+        never().await
     };
     if let Some(crash) = &shared.start.crash {
         shared.say(format_args!(
@@ -62,7 +61,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
             }
             Either::Second(next) => next,
         };
-        let sending = shared.state.borrow().task == Task::SendPackets;
+        let sending = shared.state.get().task == Task::SendPackets;
         match next {
             Either4::First(reply) => say(&shared.clock, &mut line, &reply).await,
             Either4::Second((page, record)) => {
@@ -81,8 +80,8 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
 }
 
 /// Listens for ever.
-pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx, memory: &RefCell<B::Retained>) {
-    let mut parser = Parser::default();
+pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx, memory: &B::Retained) {
+    let (mut parser, mut arriving) = (Parser::default(), Arriving::default());
     let mut lost = 0_u32;
     let mut bytes = [0; 32];
     loop {
@@ -97,7 +96,7 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
             if let Some(heard) = parser.hear(*byte, now().as_micros()) {
                 // An answer of many lines waits for room behind a transmitter that may be stuck.
                 votes
-                    .waiting(Voter::UmbilicalListen, answer(shared, memory, heard))
+                    .waiting(Voter::UmbilicalListen, answer(shared, memory, &mut arriving, heard))
                     .await;
             }
         }
@@ -105,7 +104,7 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
     }
 }
 
-async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) {
+async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving, heard: Heard) {
     let command = match heard {
         Heard::Command(command) => command,
         Heard::Unknown(word) => {
@@ -132,7 +131,7 @@ async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) 
     let verdict = shared.change(Cause::Command, |state| state.command(command, now().as_micros()));
     let word = Printable(word_of(command));
     if let (Verdict::Confirm(_), Command::LoadSet) = (verdict, command)
-        && let Err(why) = calibration::sent(shared)
+        && let Err(why) = calibration::sent(shared, arriving)
     {
         return shared.say(format_args!("G_CL no: {why}"));
     }
@@ -142,7 +141,7 @@ async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) 
         Verdict::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
         Verdict::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
         Verdict::Done(Action::None) => {
-            let mode = shared.state.borrow().mode.name();
+            let mode = shared.state.get().mode.name();
             shared.say(format_args!("{word} ok: {mode}"));
         }
         Verdict::Done(Action::Erase) => {
@@ -155,7 +154,7 @@ async fn answer(shared: &Shared, memory: &RefCell<impl Retained>, heard: Heard) 
                 "{word} ok: sixteen sensors, about 5 s; keep the unit still"
             ));
         }
-        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, memory, command).await,
+        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, memory, arriving, command).await,
         Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
@@ -173,7 +172,7 @@ async fn help(shared: &Shared) {
 }
 
 fn status(shared: &Shared) {
-    let state = *shared.state.borrow();
+    let state = shared.state.get();
     let (lift_off, micro_g) = shared.discretes.get();
     let recorder = shared.recorder.get();
     let resets = shared.start.resets();

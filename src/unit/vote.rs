@@ -97,7 +97,7 @@ pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchd
     let mut ask = next_on_grid(interval, PHASE);
     loop {
         clock.until(ask).await;
-        ask += interval;
+        ask = ask.saturating_add(interval);
         if votes.all_have_answered() {
             watchdog.feed();
             fed_us.set(now().as_micros());

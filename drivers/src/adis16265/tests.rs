@@ -91,10 +91,10 @@ fn frames_can_be_pipelined_by_the_caller() {
     with(
         &[(0x0400, 0), (0x0400, 0x8001), (0x5600, 0x8002), (0x0400, ID)],
         async |gyro| {
-            gyro.request(GYRO_OUT).await.unwrap();
+            gyro.exchange(GYRO_OUT).await.unwrap();
             assert_eq!(gyro.exchange(GYRO_OUT).await, Ok(0x8001));
             assert_eq!(gyro.exchange(PROD_ID).await, Ok(0x8002));
-            gyro.request(GYRO_OUT).await.unwrap();
+            gyro.exchange(GYRO_OUT).await.unwrap();
         },
     );
 }

@@ -143,7 +143,7 @@ impl Retained for Kept {
         bytes.copy_from_slice(&self.0.borrow()[at..at + bytes.len()]);
     }
 
-    fn write(&mut self, at: usize, bytes: &[u8]) {
+    fn write(&self, at: usize, bytes: &[u8]) {
         self.0.borrow_mut()[at..at + bytes.len()].copy_from_slice(bytes);
     }
 }

@@ -92,7 +92,7 @@ pub fn fly_around(
                         ends.plight.strike("panic");
                         let uptime_us = Instant::now().as_micros();
                         let crash = CrashRecord::new(CrashCause::Panic, 123, 0, 0, uptime_us, "src/unit/twin.rs");
-                        crash.keep(&mut ends.kept.clone());
+                        crash.keep(&ends.kept);
                         struck = Some(ResetCause::Software);
                     }
                     Some(Fault::KeptFlip(bit)) => {

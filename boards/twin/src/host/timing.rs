@@ -18,14 +18,14 @@ pub const I2C_OVERHEAD: Nanos = 2_100;
 /// \[ns\] what a transaction that reads takes more of it.
 pub const I2C_READ: Nanos = 6_500;
 /// \[ns\] its work at each change of direction inside one.
-pub const I2C_TURN: Nanos = 13_000;
+pub const I2C_TURN: Nanos = 12_900;
 /// \[ns\] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// \[ns\] the firmware's work around one word.
-pub const SPI_OVERHEAD: Nanos = 6_200;
+pub const SPI_OVERHEAD: Nanos = 5_750;
 /// \[ns\] the firmware's work before the first bit of a write to a UART.
-pub const UART_START: Nanos = 110_300;
+pub const UART_START: Nanos = 109_100;
 /// \[ns\] a byte on a UART, 8N1 at 42 MHz / 365, the divisor nearest to 115200.
 pub const UART_BYTE: Nanos = 86_905;
 /// \[ns\] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 663_300;
+pub const BOOT: Nanos = 665_100;
