@@ -1,14 +1,26 @@
 //! `ground size`: what a firmware image takes of flash and RAM, and in how many places it may panic, against ceilings.
 //!
 //! In: an ELF file. Out: text, data and bss in bytes, as `size` counts them: text is all that is only read, data what is
-//! copied from flash to RAM at start, bss what is cleared; and the places that may panic, by why (panics.rs). Refuses a
-//! file that is no ELF, and one over a ceiling.
+//! copied from flash to RAM at start, bss what is cleared; and the places that may panic, by why (panics.rs) and by where
+//! (origin.rs). Refuses a file that is no ELF, and one over a ceiling.
+//!
+//! A future that is polled after its end panics too. No byte from outside can do that: `await`, `join` and `select` poll none
+//! that has ended, and neither do the unit's own `Within` and `Waiting`. So these places count among all, and not among those
+//! that data may reach.
 
+mod origin;
 mod panics;
 
-use std::path::PathBuf;
+use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use object::{Object, ObjectSection, SectionFlags, elf};
+
+use origin::{Origin, Sources};
+use panics::Call;
 
 /// Prints the sizes of a firmware image and fails over a ceiling
 #[derive(clap::Args)]
@@ -24,6 +36,12 @@ pub struct Arguments {
     /// Places that may panic
     #[arg(long, default_value_t = u64::MAX, hide_default_value = true)]
     panic_ceiling: u64,
+    /// Those of them in code that takes bytes from outside
+    #[arg(long, default_value_t = u64::MAX, hide_default_value = true)]
+    data_panic_ceiling: u64,
+    /// Prints each of these places
+    #[arg(long)]
+    places: bool,
 }
 
 /// Why an image is refused.
@@ -35,6 +53,9 @@ pub enum SizeError {
     /// It is no ELF file.
     #[error("{0}: {1}")]
     Parse(PathBuf, object::read::Error),
+    /// Its debug information cannot be read.
+    #[error("{0}: debug information: {1}; build it with `cargo build --release`")]
+    Debug(PathBuf, addr2line::gimli::Error),
     /// It has too much of something.
     #[error("{what} takes {bytes} of {ceiling}")]
     Ceiling {
@@ -69,18 +90,89 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
         text + data,
         data + bss
     );
-    let panics = panics::sites(&bytes).map_err(|error| SizeError::Parse(path.clone(), error))?;
-    let sites = panics.values().sum();
-    let mut by_kind: Vec<_> = panics.into_iter().collect();
-    by_kind.sort_by_key(|(name, count)| (std::cmp::Reverse(*count), name.clone()));
-    let by_kind: Vec<String> = by_kind
-        .into_iter()
-        .map(|(name, count)| format!("{count} {}", name.trim_start_matches("panic_const_").replace('_', " ")))
-        .collect();
-    println!("places that may panic {sites}: {}", by_kind.join(", "));
+    let places = places(&bytes, path)?;
+    println!(
+        "places that may panic {}: {}",
+        places.len(),
+        counted(places.iter().map(|place| place.why.as_str()))
+    );
+    println!(
+        "  by file: {}",
+        counted(places.iter().map(|place| place.origin.file.as_str()))
+    );
+    let by_data: Vec<_> = places.iter().filter(|place| place.is_reachable_from_data()).collect();
+    println!(
+        "  reachable from data {}: {}",
+        by_data.len(),
+        counted(by_data.iter().map(|place| place.why.as_str()))
+    );
+    if arguments.places {
+        places
+            .iter()
+            .for_each(|place| println!("  {}: {}", place.origin, place.why));
+    }
     below("flash", text + data, arguments.flash_ceiling)?;
     below("static RAM", data + bss, arguments.ram_ceiling)?;
-    below("the image in places that may panic", sites, arguments.panic_ceiling)
+    below(
+        "the image in places that may panic",
+        places.len() as u64,
+        arguments.panic_ceiling,
+    )?;
+    below(
+        "the image in places that data may reach and that may panic",
+        by_data.len() as u64,
+        arguments.data_panic_ceiling,
+    )
+}
+
+/// A place that may panic.
+struct Place {
+    why: String,
+    origin: Origin,
+}
+
+/// As the compiler names polling a future after its end.
+const RESUMED: &str = "async fn resumed";
+
+impl Place {
+    fn is_reachable_from_data(&self) -> bool {
+        self.origin.takes_data() && self.why != RESUMED
+    }
+}
+
+/// The places that may panic, by where they stand.
+fn places(image: &[u8], path: &Path) -> Result<Vec<Place>, SizeError> {
+    let parsed = |error| SizeError::Parse(path.into(), error);
+    let understood = |error| SizeError::Debug(path.into(), error);
+    let file = object::File::parse(image).map_err(parsed)?;
+    let sources = Sources::of(&file).map_err(understood)?;
+    let place = |call: Call| {
+        let why = call.of.trim_start_matches("panic_const_").replace('_', " ");
+        Ok(Place {
+            why,
+            origin: sources.origin(call.at).map_err(understood)?,
+        })
+    };
+    let mut places: Vec<Place> = panics::calls(&file)
+        .map_err(parsed)?
+        .into_iter()
+        .map(place)
+        .collect::<Result<_, _>>()?;
+    places.sort_by(|one, other| one.origin.cmp(&other.origin));
+    Ok(places)
+}
+
+/// How often each name comes, most first.
+fn counted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let mut counts = BTreeMap::new();
+    names.for_each(|name| *counts.entry(name).or_insert(0_u32) += 1);
+    let mut counts: Vec<_> = counts.into_iter().collect();
+    counts.sort_by_key(|(_, count)| Reverse(*count));
+    let counts: Vec<_> = counts
+        .into_iter()
+        .map(|(name, count)| format!("{count} {name}"))
+        .collect();
+    counts.join(", ")
 }
 
 fn below(what: &'static str, bytes: u64, ceiling: u64) -> Result<(), SizeError> {

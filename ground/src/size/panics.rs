@@ -1,7 +1,7 @@
 //! Places of a firmware image that may panic: calls of the functions that end in the panic handler.
 //!
-//! In: an ELF file with symbols, for a Cortex-M. Out: how many calls of each of those functions, from code that is not one of
-//! them. Every instruction is looked at: mapping symbols tell code from data (ELF for the Arm architecture 5.5.5), a first
+//! In: an ELF file with symbols, for a Cortex-M. Out: the calls of those functions from code that is not one of
+//! them: where, and which. Every instruction is looked at: mapping symbols tell code from data (ELF for the Arm architecture 5.5.5), a first
 //! halfword tells 16 from 32 bits (ARMv7-M ARM, A5.1), and a call is BL or a branch B.W, B (A7.7.12, A7.7.18). A call
 //! through a pointer is not seen; none of these functions is called so.
 
@@ -20,9 +20,16 @@ const PANICS: [&str; 6] = [
     "_defmt_panic",
 ];
 
-/// How many calls there are of each function that panics, by its own name.
-pub fn sites(image: &[u8]) -> object::read::Result<BTreeMap<String, u64>> {
-    let file = object::File::parse(image)?;
+/// A call of a function that panics.
+pub struct Call {
+    /// Its address.
+    pub at: u64,
+    /// The function's own name.
+    pub of: String,
+}
+
+/// The calls of functions that panic.
+pub fn calls(file: &object::File) -> object::read::Result<Vec<Call>> {
     let mut panics = BTreeMap::new();
     let mut functions = BTreeMap::new();
     // Where code begins and where data does.
@@ -48,20 +55,20 @@ pub fn sites(image: &[u8]) -> object::read::Result<BTreeMap<String, u64>> {
         let function = functions.range(..=at).next_back();
         function.is_some_and(|(start, size)| at < start + size && inside.contains(start))
     };
-    let mut sites = BTreeMap::new();
+    let mut calls = Vec::new();
     for section in file
         .sections()
         .filter(|section| section.kind() == object::SectionKind::Text)
     {
         for (at, target) in branches(section.address(), section.data()?, &maps) {
-            if let Some(name) = panics.get(&target)
+            if let Some(of) = panics.get(&target)
                 && !is_inside(at)
             {
-                *sites.entry(name.clone()).or_default() += 1;
+                calls.push(Call { at, of: of.clone() });
             }
         }
     }
-    Ok(sites)
+    Ok(calls)
 }
 
 fn is_panic(name: &str) -> bool {
