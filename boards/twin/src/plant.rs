@@ -7,6 +7,7 @@
 //! Noise is that of the thesis' unit (sections 4.1 and 4.2: 1.53 LSB, 2.68 LSB) and of the datasheets, bias what
 //! is left after calibration. Scale and misalignment are nominal.
 
+pub mod assembly;
 mod gyro;
 mod sensor_bus;
 #[cfg(test)]

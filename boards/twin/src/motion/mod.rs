@@ -5,6 +5,7 @@
 
 #[cfg(test)]
 mod check;
+mod guided;
 mod rate_table;
 mod recorded;
 mod rotation_test;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 use emems::estimate::{Launch, Site};
 use nalgebra::Vector3;
 
+pub use guided::Guided;
 pub use rate_table::{Axis, Plateau, Position, RateTable, TABLE_4_1};
 pub use recorded::Recorded;
 pub use rotation_test::RotationTest;

@@ -207,6 +207,21 @@ impl Tca9548a {
             .unwrap_or(0)
     }
 
+    /// What is on two channels changes places. Channels beyond 7 are left alone.
+    pub fn exchange(&mut self, a: usize, b: usize) {
+        if a.max(b) < self.channels.len() {
+            self.channels.swap(a, b);
+        }
+    }
+
+    /// Another part in the place of the one at `address` on `channel`.
+    pub fn replace(&mut self, channel: usize, address: u8, mut part: impl I2cPart + 'static) {
+        if let Some(socket) = self.sockets(channel, address).next() {
+            part.power_on(0);
+            socket.part = Box::new(part);
+        }
+    }
+
     /// The part at `address` on `channel` holds SCL low for `duration` after each time it acknowledges its address.
     pub fn stretch_part(&mut self, channel: usize, address: u8, duration: Nanos) {
         self.sockets(channel, address)
