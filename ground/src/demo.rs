@@ -29,7 +29,10 @@ use serde::Deserialize;
 use trials::draw::Draw;
 use twin::predict::UnitDescription;
 
-use crate::fly::{self, board, case::ANSWER, interrupt::Interrupt, plan};
+use crate::{
+    fly::{self, board, case::ANSWER, interrupt::Interrupt, plan},
+    folder::{self, FolderError},
+};
 
 /// What may be wrong: a few of the effects that a unit most often has, each large enough to matter for its attitude.
 const DECK: [&str; 8] = [
@@ -96,6 +99,9 @@ pub enum DemoError {
     /// A figure.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
+    /// The demo's folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
 }
 
 /// What the demo needs of a verdict.
@@ -152,7 +158,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
             host = true;
         }
     }
-    let place = new_folder(&arguments.out, &format!("demo-{}", arguments.seed))?;
+    let place = folder::make(&arguments.out, &format!("demo-{}", arguments.seed))?;
     let with = format!("--with {}", withheld(arguments.seed));
     let flight = |words: &str| flown(words, arguments.seed, host, &place);
     let board = if host { "this computer" } else { "the emulated board" };
@@ -405,25 +411,6 @@ fn by_hand(first: &Path, second: &Path, with: &str) -> String {
         "ground fly {FIRST} {with}\nground gap {first}\nground fly {SECOND} {with}\nground gap {first} --against {second}\n\
          ground fly --unit {first}/{CORRECTED}/{UNIT} --motion-file {first}/motion.csv\n"
     )
-}
-
-fn new_folder(parent: &Path, name: &str) -> Result<PathBuf, DemoError> {
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| DemoError::File { path, source }
-    };
-    fs::create_dir_all(parent).map_err(failed(parent))?;
-    let mut number = 1;
-    loop {
-        let path = parent.join(match number {
-            1 => name.to_owned(),
-            _ => format!("{name}-{number}"),
-        });
-        match fs::create_dir(&path) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            made => return made.map(|()| path.clone()).map_err(failed(&path)),
-        }
-    }
 }
 
 fn read(path: &Path) -> Result<String, DemoError> {

@@ -53,6 +53,31 @@ pub enum FolderError {
     Plot(#[from] ChartError),
 }
 
+/// Makes `parent/name`, or `parent/name-2` and so on if that exists.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn make(parent: &Path, name: &str) -> Result<PathBuf, FolderError> {
+    let fail = |path: &Path| {
+        let path = path.to_owned();
+        move |source| FolderError::Create { path, source }
+    };
+    fs::create_dir_all(parent).map_err(fail(parent))?;
+    for number in 1..=MOST_OF_A_NAME {
+        let path = parent.join(match number {
+            1 => name.to_owned(),
+            _ => format!("{name}-{number}"),
+        });
+        match fs::create_dir(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made.map(|()| path.clone()).map_err(fail(&path)),
+        }
+    }
+    Err(FolderError::Taken {
+        path: parent.join(name),
+    })
+}
+
 /// A folder being written.
 pub struct Folder {
     path: PathBuf,
@@ -72,27 +97,7 @@ impl Folder {
     /// # Errors
     /// When it cannot be made.
     pub fn create(parent: &Path, name: &str, cycle_s: f64) -> Result<Self, FolderError> {
-        let fail = |path: &Path| {
-            let path = path.to_owned();
-            move |source| FolderError::Create { path, source }
-        };
-        fs::create_dir_all(parent).map_err(fail(parent))?;
-        for number in 1..=MOST_OF_A_NAME {
-            let path = parent.join(match number {
-                1 => name.to_owned(),
-                _ => format!("{name}-{number}"),
-            });
-            match fs::create_dir(&path) {
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                made => {
-                    made.map_err(fail(&path))?;
-                    return Folder::open(path, cycle_s);
-                }
-            }
-        }
-        Err(FolderError::Taken {
-            path: parent.join(name),
-        })
+        Folder::open(make(parent, name)?, cycle_s)
     }
 
     fn open(path: PathBuf, cycle_s: f64) -> Result<Self, FolderError> {

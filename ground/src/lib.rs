@@ -1,5 +1,6 @@
 //! The ground side as a library.
 
+pub mod acceptance;
 pub mod case;
 pub mod console;
 pub mod decode;

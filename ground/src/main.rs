@@ -29,6 +29,7 @@ enum Command {
     Drill(drill::Arguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
     Console(ground::console::Arguments),
+    Acceptance(ground::acceptance::Arguments),
     Gap(Gap),
     Size(ground::size::Arguments),
     Sbom(ground::sbom::Arguments),
@@ -84,6 +85,7 @@ fn prints_what_was_asked_for(command: &Command) -> bool {
         Command::Calibrate(arguments) => arguments.json(),
         Command::Calibration(arguments) => arguments.json(),
         Command::Allan(arguments) => arguments.json,
+        Command::Acceptance(arguments) => arguments.json,
         Command::Attitude(arguments) => arguments.json,
         Command::Gap(arguments) => arguments.case.as_ref().is_some_and(|case| case.json),
         _ => false,
@@ -99,6 +101,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Effects(arguments) => print!("{}", ground::effects::effects(&arguments)?),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,
         Command::Drill(arguments) => drill::run(&arguments, ground::drill::on_image)?,
+        Command::Acceptance(arguments) => ground::acceptance::acceptance(&arguments)?,
         Command::Console(arguments) => ground::console::console(&arguments)?,
         Command::Gap(arguments) => gap(&arguments)?,
         Command::Size(arguments) => ground::size::size(&arguments)?,

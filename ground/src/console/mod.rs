@@ -108,7 +108,7 @@ pub fn console(arguments: &Arguments) -> Result<(), Error> {
 }
 
 /// Whether a path is there and is something that no port can be.
-fn is_no_port(path: &Path) -> bool {
+pub(crate) fn is_no_port(path: &Path) -> bool {
     let Ok(there) = path.metadata() else { return false };
     #[cfg(unix)]
     return !std::os::unix::fs::FileTypeExt::is_char_device(&there.file_type());
