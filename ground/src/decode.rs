@@ -5,7 +5,7 @@
 //! first [`HEAD`] bytes, where superblock and log begin. Memory does not grow with a stream; an image is bounded by the
 //! largest chip.
 
-mod cycle;
+pub(crate) mod cycle;
 mod image;
 mod input;
 
@@ -16,7 +16,10 @@ use std::{
 };
 
 use emems::nand::PAGE_BYTES;
-use packets::{input::looks_like, stream::Bytes5To8};
+use packets::{
+    input::looks_like,
+    stream::{Bytes5To8, sequence::CYCLE_S},
+};
 use recorder::log::{self, LogError};
 
 use self::{
@@ -162,10 +165,10 @@ fn stem(name: &str) -> &str {
 }
 
 fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str, json: bool) -> Result<(), DecodeError> {
-    let (rest, summary, envelope) = digest.finish();
+    let (rest, record) = digest.finish();
     folder.entries(&rest)?;
-    let rows = summary.rows();
-    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &summary, &envelope)?;
+    let rows = record.summary.rows();
+    let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &record, None)?;
     let page = path.join("index.html");
     if json {
         let rows: serde_json::Map<_, _> = (rows.into_iter())
@@ -187,8 +190,12 @@ fn stream(
     input: Input,
     mut put: impl FnMut(f64, &[Entry]) -> Result<(), DecodeError>,
 ) -> Result<(Cycle, Digest, Option<DecodeError>), DecodeError> {
-    let mut digest = Digest::new(bytes_5_to_8(arguments));
-    let mut cycle = Cycle::new(arguments.cycle.map(|cycle| cycle.as_secs_f64()));
+    let told_s = arguments.cycle.map(|cycle| cycle.as_secs_f64());
+    let mut digest = match arguments.out {
+        Some(_) => Digest::new(bytes_5_to_8(arguments), told_s.unwrap_or(CYCLE_S)),
+        None => Digest::summing(bytes_5_to_8(arguments)),
+    };
+    let mut cycle = Cycle::new(told_s);
     let read = input.read(|piece| {
         let entries = cycle
             .take(digest.push(None, piece))
@@ -256,10 +263,10 @@ fn to_text(
     if !cycle.any() {
         return Ok(false);
     }
-    let (rest, summary, _) = digest.finish();
+    let (rest, record) = digest.finish();
     put(cycle.s(), &rest)?;
     rows.flush()?;
-    write!(remarks, "{}", folder::text_of(&summary.rows()))?;
+    write!(remarks, "{}", folder::text_of(&record.summary.rows()))?;
     remarks.flush()?;
     broken.map_or(Ok(true), Err)
 }

@@ -1,16 +1,16 @@
-//! A telemetry stream to all that is wanted of it at once: entries in order, figures, and what a plot shows.
+//! A telemetry stream to all that is wanted of it at once: entries in order, and what a page says of it.
 //!
-//! In: bytes, and the instant they were complete where it is known. Out: [`Entry`]s as they are found; [`Summary`] and
-//! [`Envelope`] at any time. Memory does not grow with the stream, so a log of any size can be read.
+//! In: bytes, and the instant they were complete where it is known. Out: [`Entry`]s as they are found, and at the end the
+//! [`Record`]. Memory does not grow with the stream, so a log of any size can be read.
 
-use emems::{derived::Derived, sample::Reading};
+use emems::{derived::Derived, estimate::Site, sample::Reading, unit::Settings};
 
 use packets::stream::{
     Bytes5To8, Decoder, Item, Reject,
-    sequence::{Sequence, Step},
+    sequence::{CYCLE_S, Sequence, Step},
 };
 
-use crate::{envelope::Envelope, summary::Summary};
+use crate::record::Record;
 
 /// Something found in the stream.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,20 +33,35 @@ pub enum Entry {
 }
 
 /// Digests one stream.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Digest {
     decoder: Decoder,
     sequence: Sequence,
     last_s: Option<f64>,
-    summary: Summary,
-    envelope: Envelope,
+    record: Record,
 }
 
 impl Digest {
-    /// At the start of a stream.
-    pub fn new(bytes_5_to_8: Bytes5To8) -> Self {
+    /// At the start of a stream of a unit with this cycle [s].
+    pub fn new(bytes_5_to_8: Bytes5To8, cycle_s: f64) -> Self {
         Digest {
             decoder: Decoder::new(bytes_5_to_8),
+            record: Record::new(cycle_s, &Settings::NOMINAL.site),
+            ..Digest::default()
+        }
+    }
+
+    /// At the start of a stream of which no page is wanted: nobody's attitude is estimated.
+    pub fn summing(bytes_5_to_8: Bytes5To8) -> Self {
+        let mut digest = Digest::new(bytes_5_to_8, CYCLE_S);
+        digest.record.attitude = None;
+        digest
+    }
+
+    /// At the start of the stream of a flight from this site.
+    pub fn at(site: &Site) -> Self {
+        Digest {
+            record: Record::new(CYCLE_S, site),
             ..Digest::default()
         }
     }
@@ -58,20 +73,19 @@ impl Digest {
     }
 
     /// Ends the stream.
-    pub fn finish(mut self) -> (Vec<Entry>, Summary, Envelope) {
+    pub fn finish(mut self) -> (Vec<Entry>, Record) {
         let last = std::mem::take(&mut self.decoder).finish();
         if let Some(reject) = &last {
-            self.summary.end(reject);
+            self.record.summary.end(reject);
         }
-        (
-            last.map(Entry::Reject).into_iter().collect(),
-            self.summary,
-            self.envelope,
-        )
+        if let Some(attitude) = &mut self.record.attitude {
+            attitude.finish();
+        }
+        (last.map(Entry::Reject).into_iter().collect(), self.record)
     }
 
     fn enter(&mut self, at_s: Option<f64>, item: Item) -> Entry {
-        match item {
+        match &item {
             Item::Packet { offset, reading } => {
                 let (number, step) = self.sequence.number(reading.counter);
                 let period_s = match (step, self.last_s, at_s) {
@@ -79,26 +93,21 @@ impl Digest {
                     _ => None,
                 };
                 self.last_s = at_s;
-                let missed = match step {
-                    Step::Missed(count) => u32::from(count),
-                    _ => 0,
-                };
-                self.summary.packet(&reading, step, period_s);
-                self.envelope.add(number, &reading, missed, period_s);
+                self.record.packet(number, step, &item, period_s);
                 Entry::Packet {
                     number,
                     step,
-                    offset,
-                    reading,
+                    offset: *offset,
+                    reading: *reading,
                 }
             }
             Item::Derived { derived, .. } => {
-                self.summary.derived(&derived);
-                Entry::Derived(derived)
+                self.record.derived(&item);
+                Entry::Derived(derived.clone())
             }
             Item::Reject(reject) => {
-                self.summary.reject(&reject);
-                Entry::Reject(reject)
+                self.record.summary.reject(reject);
+                Entry::Reject(reject.clone())
             }
         }
     }
@@ -124,7 +133,7 @@ mod tests {
         digest.push(Some(0.3), &packet(2));
         digest.push(Some(0.9), &packet(5));
         digest.push(Some(1.1001), &packet(6));
-        let (_, summary, envelope) = digest.finish();
+        let (_, Record { summary, envelope, .. }) = digest.finish();
         assert_eq!((summary.packets, summary.missed, summary.period_s.count), (4, 2, 2));
         assert!((summary.period_s.most - 0.2001).abs() < ROUNDING_S);
         assert_eq!(envelope.bins().len(), 6);
@@ -137,7 +146,7 @@ mod tests {
             None,
             &[b"boot".as_slice(), &packet(0xFFFF), &packet(1), b"@00"].concat(),
         );
-        let (rest, summary, _) = digest.finish();
+        let (rest, Record { summary, .. }) = digest.finish();
         entries.extend(rest);
         let found: Vec<String> = (entries.iter())
             .map(|entry| match entry {

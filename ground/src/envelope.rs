@@ -2,7 +2,7 @@
 //!
 //! In: packets by number, with the interval since the one before where it is known. Out: [`Bin`]s of equal length in
 //! packets, each with the least and most count of every channel, the sensors that failed or stood at the end of their range, packets missed, and flags.
-//! A new packet beyond the last bin merges bins in pairs, so memory is bounded (about 400 KiB) and a short flight keeps
+//! A new packet beyond the last bin merges bins in pairs, so memory is bounded (about 1 MiB) and a short flight keeps
 //! one packet a bin. A peak is never lost, only known less sharply in time.
 
 use emems::sample::Reading;
@@ -12,8 +12,8 @@ use packets::{
     reach,
 };
 
-/// Bins at most: more than the pixels a plot is wide on paper or screen.
-pub const MOST_BINS: usize = 1200;
+/// Bins at most: as many stretches as a plot that zooms holds of a layer, eight minutes of flight packet for packet.
+pub const MOST_BINS: usize = 2400;
 
 /// Least and most of something.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,8 +212,8 @@ mod tests {
         for number in 0..DAY_AT_5_HZ {
             envelope.add(number, &reading(if number == 77_777 { 8000 } else { -3 }), 0, None);
         }
-        assert_eq!(envelope.packets_per_bin(), 512);
-        let index = 77_777 / 512;
+        assert_eq!(envelope.packets_per_bin(), 256);
+        let index = 77_777 / 256;
         assert_eq!(g1(&envelope.bins()[index]), Some((-3, 8000)));
         assert_eq!(g1(&envelope.bins()[index + 1]), Some((-3, -3)));
         let packets: u32 = envelope.bins().iter().map(|bin| bin.packets).sum();

@@ -18,6 +18,7 @@ use gap::GapError;
 use recorder::{dump::DumpError, recover::RecoverError};
 
 use crate::{
+    compare::CompareError,
     console,
     decode::DecodeError,
     fly::{FlyError, board::BoardError, source::SourceError},
@@ -102,6 +103,9 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
     }
     if let Some(error) = error.downcast_ref::<DecodeError>() {
         return !matches!(error, DecodeError::Output(_) | DecodeError::Folder(_));
+    }
+    if let Some(error) = error.downcast_ref::<CompareError>() {
+        return !matches!(error, CompareError::Chart(_));
     }
     if let Some(error) = error.downcast_ref::<RecoverError>() {
         return !matches!(error, RecoverError::Output(_));

@@ -17,6 +17,8 @@ pub mod watch;
 
 use std::{io, path::PathBuf, thread, time::Duration};
 
+use emems::estimate::Site;
+use trials::flight::{self, Instants};
 use twin::{
     plant::{Plant, Quality},
     run::Bench,
@@ -37,7 +39,9 @@ use packets::stream::sequence::CYCLE_S;
 
 use crate::{
     console::{self, line},
+    digest::Digest,
     folder::{self, Folder, FolderError},
+    plot::Truth,
 };
 
 /// Why a flight was not made, or not to its end.
@@ -151,14 +155,28 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
             listen: arguments.duration,
             ..console::Options::default()
         };
-        beside_the_console(arguments, folder, progress, interrupt, options, flight)?
+        beside_the_console(arguments, source.site, folder, progress, interrupt, options, flight)?
     } else {
-        let mut watch = Watch::new(folder, progress, None, arguments.derived, interrupt.clone());
+        let digest = Digest::at(&source.site);
+        let mut watch = Watch::new(folder, digest, progress, None, arguments.derived, interrupt.clone());
         let remarks = flight(&mut watch)?;
         (watch.finish()?, remarks)
     };
-    let (case, trouble) = written(arguments, &source, prepared.as_ref(), &seen);
-    let landed = report(arguments, &source, duration, seen, [remarks, vec![case]].concat())?;
+    let instants = prepared.as_ref().and_then(|_| flight::instants(arguments.seed));
+    let (case, trouble) = written(arguments, &source, prepared.as_ref(), instants.as_ref(), &seen);
+    // The log's time is zero at the start of the cycle of packet 0.
+    let flown = prepared.as_ref().zip(instants);
+    let motion = flown.map(|(prepared, instants)| (prepared.scene.motion.clone(), instants.zero_s + instants.lead_s));
+    let truth = motion.map(|(motion, zero_s)| move |t_s: f64| motion.at(t_s + zero_s).attitude.q_nb);
+    let truth = truth.as_ref().map(|truth| truth as Truth);
+    let landed = report(
+        arguments,
+        &source,
+        duration,
+        seen,
+        [remarks, vec![case]].concat(),
+        truth,
+    )?;
     trouble.map_or(Ok(landed), |trouble| Err(trouble.into()))
 }
 
@@ -167,6 +185,7 @@ fn written(
     arguments: &Arguments,
     source: &Source,
     prepared: Option<&Prepared>,
+    instants: Option<&Instants>,
     seen: &Seen,
 ) -> (Remark, Option<CaseError>) {
     let Some(prepared) = prepared else {
@@ -187,6 +206,7 @@ fn written(
         flight: arguments.flight.into(),
         flown_s: seen.flown.as_secs_f64(),
         instrument: arguments.reference,
+        instants,
     };
     let path = seen.folder.path();
     match flown.write(path) {
@@ -208,6 +228,7 @@ fn written(
 /// Flies in a thread of its own while the user has the terminal; ends when both do.
 fn beside_the_console(
     arguments: &Arguments,
+    site: Site,
     folder: Folder,
     progress: Progress,
     interrupt: &Interrupt,
@@ -216,7 +237,15 @@ fn beside_the_console(
 ) -> Result<(Seen, Vec<Remark>), FlyError> {
     let (line, unit) = line::channel("the flying unit");
     let kept = folder.path().join("umbilical.txt");
-    let mut watch = Watch::new(folder, progress, Some(unit), arguments.derived, interrupt.clone());
+    let digest = Digest::at(&site);
+    let mut watch = Watch::new(
+        folder,
+        digest,
+        progress,
+        Some(unit),
+        arguments.derived,
+        interrupt.clone(),
+    );
     let flying = thread::Builder::new()
         .name("flight".into())
         .spawn(move || -> Result<_, FlyError> {
@@ -236,6 +265,7 @@ fn report(
     planned: Duration,
     seen: Seen,
     remarks: Vec<Remark>,
+    truth: Option<Truth>,
 ) -> Result<Landed, FlyError> {
     let board = match &arguments.image {
         _ if arguments.host => "host, virtual time".into(),
@@ -250,11 +280,9 @@ fn report(
         ));
     }
     rows.extend(remarks);
-    rows.extend(seen.summary.rows());
+    rows.extend(seen.record.summary.rows());
     let title = format!("{} flight, unit {}", source.name, arguments.seed);
-    let folder = seen
-        .folder
-        .finish(&title, &source.about, &rows, &seen.summary, &seen.envelope)?;
+    let folder = seen.folder.finish(&title, &source.about, &rows, &seen.record, truth)?;
     Ok(Landed { folder, rows })
 }
 

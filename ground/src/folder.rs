@@ -13,13 +13,35 @@ use std::{
 use chart::{Block, ChartError};
 use packets::stream::sequence::Step;
 
-use crate::{digest::Entry, envelope::Envelope, messages::Messages, plot, summary::Summary, table};
+use crate::{
+    digest::Entry,
+    messages::Messages,
+    plot::{self, Truth},
+    record::Record,
+    table,
+};
 
 /// Folders of one name that are tried before giving up.
 const MOST_OF_A_NAME: u32 = 10_000;
 
 /// The file of [`Messages`].
 const MESSAGES: &str = "flight.mcap";
+
+/// Files that a page leads to, where they are there, and what is in them. Not the answer to what was done to the unit.
+const LINKED: [(&str, &str); 12] = [
+    ("values in SI", "si.csv"),
+    ("counts", "counts.csv"),
+    ("derived frames", "derived.csv"),
+    ("for Foxglove and PlotJuggler", MESSAGES),
+    ("every column", "records.parquet"),
+    ("packets as sent", "packets.txt"),
+    ("umbilical", "umbilical.txt"),
+    ("log", "log.txt"),
+    ("summary", "summary.txt"),
+    ("motion", "motion.csv"),
+    ("unit", "unit.toml"),
+    ("gap case", "case.toml"),
+];
 
 /// Why a folder could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -185,7 +207,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Writes page and summary, of these rows, and closes all files.
+    /// Writes page and summary, of these rows, and closes all files. In simulation the page has the error against the truth.
     ///
     /// # Errors
     /// When a file cannot be written or a figure drawn.
@@ -194,18 +216,15 @@ impl Folder {
         title: &str,
         about: &str,
         rows: &[(&'static str, String)],
-        summary: &Summary,
-        envelope: &Envelope,
+        record: &Record,
+        truth: Option<Truth>,
     ) -> Result<PathBuf, FolderError> {
-        let figures = plot::figures(envelope, self.cycle_s, summary)?;
         let named = rows
             .iter()
             .map(|(name, value)| (name.to_string(), value.clone()))
             .collect();
-        let blocks: Vec<Block> = [Block::Rows(named)]
-            .into_iter()
-            .chain(figures.into_iter().map(Block::Figure))
-            .collect();
+        let mut blocks = vec![Block::Rows(named), Block::Links(self.links())];
+        blocks.extend(plot::blocks(record, self.cycle_s, truth)?);
         let html = chart::html(title, about, &blocks);
         for (name, content) in [("index.html", html), ("summary.txt", text_of(rows))] {
             let path = self.path.join(name);
@@ -223,6 +242,18 @@ impl Folder {
         }
         self.messages.finish().map_err(|source| failed(&self.path, source))?;
         Ok(self.path)
+    }
+}
+
+impl Folder {
+    /// Files that are there, or will be when this one is closed.
+    fn links(&self) -> Vec<(String, String)> {
+        let there = LINKED
+            .iter()
+            .filter(|(_, name)| *name == "summary.txt" || self.path.join(name).exists());
+        there
+            .map(|(what, name)| (format!("{what} ({name})"), name.to_string()))
+            .collect()
     }
 }
 
@@ -338,9 +369,9 @@ mod tests {
         folder.telemetry(&stream).expect("telemetry");
         folder.entries(&entries).expect("entries");
         folder.log(0.25, "INFO up").expect("log");
-        let (_, summary, envelope) = digest.finish();
-        let rows = summary.rows();
-        let path = folder.finish("still", "", &rows, &summary, &envelope).expect("finish");
+        let (_, record) = digest.finish();
+        let rows = record.summary.rows();
+        let path = folder.finish("still", "", &rows, &record, None).expect("finish");
         assert_eq!(read(&path, "packets.txt").as_bytes(), stream);
         assert_eq!(read(&path, "counts.csv").lines().count(), 3);
         assert_eq!(read(&path, "si.csv").lines().count(), 3);
@@ -352,7 +383,9 @@ mod tests {
         assert!(
             read(&path, "summary.txt").starts_with("packets                     2\nmissed                      2\n")
         );
-        assert!(read(&path, "index.html").contains("Accelerometers"));
+        let page = read(&path, "index.html");
+        assert!(page.contains("Accelerometers") && page.contains("href=\"si.csv\""));
+        assert!(!page.contains("derived.csv"), "a link to nothing");
         assert!(!path.join("derived.csv").exists(), "no derived frames, no file");
     }
 

@@ -23,6 +23,7 @@ enum Command {
     /// Makes a gap case of a real unit's log, and says what a case lacks
     #[command(subcommand)]
     Case(ground::case::Step),
+    Compare(ground::compare::Arguments),
     Demo(ground::demo::Arguments),
     Effects(ground::effects::Arguments),
     Decode(ground::decode::Arguments),
@@ -97,6 +98,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Fly(arguments) => ground::fly::fly(&arguments)?,
         Command::Sources => print!("{}", ground::fly::source::list()),
         Command::Case(step) => ground::case::case(&step)?,
+        Command::Compare(arguments) => ground::compare::compare(&arguments)?,
         Command::Demo(arguments) => ground::demo::demo(&arguments)?,
         Command::Effects(arguments) => print!("{}", ground::effects::effects(&arguments)?),
         Command::Decode(arguments) => ground::decode::decode(&arguments)?,

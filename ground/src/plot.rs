@@ -1,171 +1,292 @@
-//! A flight as pictures: every sensor, the packet period and the slot times, as SVG figures.
+//! A flight as figures: every sensor, attitude, spectra, the packet period and the slot times, with events as marks.
 //!
-//! In: [`Envelope`] and [`Summary`]. Out: [`Figure`]s, each an SVG without outside references. Values are nominal SI;
-//! plates share an axis, so that one that disagrees is seen. Where a bin holds several packets, its least and most are
-//! joined, so a peak is never drawn away.
+//! In: a [`Record`], and in simulation the true attitude. Out: [`Block`]s of a page. Values are nominal SI; plates share an axis, so
+//! that one that disagrees is seen. Where a bin holds several packets, its least and most are joined, so a peak is never drawn away.
 
-mod panel;
+pub mod times;
 
-use plotters::prelude::RGBColor;
-
-use chart::{
-    ChartError, Figure,
-    canvas::{drawing, hex},
-};
+use attitude::{plots, recording::Row};
+use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel};
+use nalgebra::{UnitQuaternion, Vector3};
 use packets::channel::{CHANNELS, Quantity};
 
-use crate::{
-    envelope::{Bin, Envelope},
-    summary::Summary,
-    table::SLOT_NAMES,
-};
-use panel::{Bar, Panel, Times, Trace};
+use crate::{envelope::Bin, events::Events, record::Record, spectra::Spectra, summary::Summary, table::SLOT_NAMES};
+use times::Times;
 
-/// Colours of x, y, z: distinguishable also without red or green (Okabe and Ito, "Color universal design", 2008).
-const XYZ: [RGBColor; 3] = [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115)];
+/// A channel that hardly changes is not blown up beyond this many counts.
+const LEAST_SPAN_LSB: f64 = 12.0;
 
-/// \[px\] size of a figure of four panels; shown at half of it or less, so that lines are finer than a pixel.
-const FOUR_PANELS: (u32, u32) = (2600, 1240);
+/// Events in the table, and as marks along an axis.
+const LISTED: usize = 60;
+const MARKED: usize = 25;
 
-/// \[px\] size of a figure of one panel.
-const ONE_PANEL: (u32, u32) = (2600, 640);
+// Colours beyond those of x, y, z.
+const PINK: usize = 3;
+const ORANGE: usize = 4;
+const LIGHT_BLUE: usize = 5;
+const GREY: usize = 6;
 
-/// All figures of a flight; none for a flight without packets.
+/// What the sensors' figures show: title, quantities, names of their lines.
+pub const SENSORS: [(&str, &[Quantity], &[&str]); 4] = [
+    ("Accelerometers", &[Quantity::SpecificForce], &["x", "y", "z"]),
+    ("Magnetometers", &[Quantity::Field], &["x", "y", "z"]),
+    ("Gyros", &[Quantity::Rate], &["rate"]),
+    (
+        "Temperatures",
+        // The quieter one is drawn last, on top.
+        &[Quantity::GyroTemperature, Quantity::Temperature],
+        &["gyro", "plate"],
+    ),
+];
+
+/// The true attitude `q_nb` at a time of the log [s].
+pub type Truth<'a> = &'a dyn Fn(f64) -> UnitQuaternion<f64>;
+
+/// All that a page shows of a flight; nothing for one without packets.
 ///
 /// # Errors
-/// When the plotting library refuses one.
-pub fn figures(envelope: &Envelope, cycle_s: f64, summary: &Summary) -> Result<Vec<Figure>, ChartError> {
-    if envelope.bins().is_empty() {
+/// When a figure cannot be drawn.
+pub fn blocks(record: &Record, cycle_s: f64, truth: Option<Truth>) -> Result<Vec<Block>, ChartError> {
+    if record.envelope.bins().is_empty() {
         return Ok(Vec::new());
     }
-    let times = Times::of(envelope, cycle_s);
-    let mut figures = vec![
-        sensors(&times, "Accelerometers", &[Quantity::SpecificForce], &["x", "y", "z"])?,
-        sensors(&times, "Magnetometers", &[Quantity::Field], &["x", "y", "z"])?,
-        sensors(&times, "Gyros", &[Quantity::Rate], &["rate"])?,
-        sensors(
-            &times,
-            "Temperatures",
-            &[Quantity::Temperature, Quantity::GyroTemperature],
-            &["plate", "gyro"],
-        )?,
-    ];
-    if summary.period_s.count > 0 {
-        figures.push(period(&times, summary)?);
+    let times = Times::of(&record.envelope, cycle_s, 0.0);
+    let marks = marks(&record.events, &times);
+    let mut blocks = events(&record.events, &times);
+    for (title, quantities, names) in SENSORS {
+        let panels: Vec<Panel> = (0..4)
+            .map(|plate| sensors(&times, plate, quantities, names, &marks))
+            .collect();
+        blocks.push(Block::Figure(Figure::of(title, 2, &panels)?));
     }
-    if summary.derived > 0 {
-        figures.push(slots(summary)?);
+    blocks.extend(attitude(record, &times, truth)?);
+    blocks.extend(spectra(&record.spectra, cycle_s)?.map(Block::Figure));
+    if record.summary.period_s.count > 0 {
+        blocks.push(Block::Figure(period(&times, &record.summary, &marks)?));
     }
-    Ok(figures)
+    if record.summary.derived > 0 {
+        blocks.push(Block::Figure(slots(&record.summary)?));
+    }
+    Ok(blocks)
 }
 
-/// Four panels, one a plate.
-fn sensors(times: &Times, title: &str, quantities: &[Quantity], names: &[&'static str]) -> Result<Figure, ChartError> {
-    let unit = quantities.first().map_or("", |quantity| quantity.unit());
-    let channels = |plate| {
-        (0..CHANNELS.len()).filter(move |index| {
-            CHANNELS
-                .get(*index)
-                .is_some_and(|channel| channel.plate == plate && quantities.contains(&channel.quantity))
-        })
+/// Events as a table.
+fn events(events: &Events, times: &Times) -> Vec<Block> {
+    let (all, left_out) = events.all();
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let time = |number: u64| format!("{:.1}", number as f64 * times.cycle_s);
+    let rows = all.iter().take(LISTED).map(|event| {
+        let until = if event.until > event.number {
+            time(event.until)
+        } else {
+            String::new()
+        };
+        vec![time(event.number), until, event.what.clone()]
+    });
+    let table = Block::Table {
+        columns: ["from [s]", "to [s]", "what"].map(str::to_string).to_vec(),
+        rows: rows.collect(),
     };
-    let panels: Vec<Panel> = (0..4)
-        .map(|plate| {
-            // Temperatures: the plate's own first, though the packet has the gyro's first.
-            let mut indices: Vec<usize> = channels(plate).collect();
-            indices.sort_by_key(|index| {
-                let quantity = CHANNELS.get(*index).map(|channel| channel.quantity);
-                quantities.iter().position(|wanted| Some(*wanted) == quantity)
-            });
-            let slots = indices
-                .iter()
-                .filter_map(|index| CHANNELS.get(*index))
-                .fold(0, |bits, channel| bits | 1u16 << channel.slot());
-            Panel {
-                title: format!("plate {}", plate + 1),
-                y_title: unit.into(),
-                traces: (indices.iter().zip(XYZ))
-                    .map(|(index, colour)| Trace {
-                        colour,
-                        runs: times.runs(|bin| si_range(bin, *index)),
-                    })
-                    .collect(),
-                failed: times.spans(|bin| bin.failed & slots != 0),
-                clipped: times.spans(|bin| bin.clipped & slots != 0),
-            }
-        })
+    let mut blocks = vec![Block::Heading("Events".into()), table];
+    let more = all.len().saturating_sub(LISTED) + left_out;
+    if more > 0 {
+        blocks.push(Block::Text(format!(
+            "and {more} more; log.txt has what was missed or broken"
+        )));
+    }
+    blocks
+}
+
+/// The first events as marks along an axis: what tells phases apart first.
+pub fn marks(events: &Events, times: &Times) -> Vec<(f64, String)> {
+    let (mut all, _) = events.all();
+    // Those that are no sensor's are few, and seen first.
+    all.sort_by_key(|event| {
+        (
+            event.what.ends_with("clipped") || event.what.ends_with("silent"),
+            event.number,
+        )
+    });
+    let mut marks: Vec<(f64, String)> = (all.into_iter().take(MARKED))
+        .map(|event| (times.at(event.number as f64), event.what))
         .collect();
+    marks.sort_by(|one, other| one.0.total_cmp(&other.0));
+    marks
+}
+
+/// A plate's sensors of some quantities.
+pub fn sensors(times: &Times, plate: usize, quantities: &[Quantity], names: &[&str], marks: &[(f64, String)]) -> Panel {
+    let unit = quantities.first().map_or("", |quantity| quantity.unit());
+    let mut indices: Vec<usize> = (0..CHANNELS.len())
+        .filter(|index| CHANNELS[*index].plate == plate && quantities.contains(&CHANNELS[*index].quantity))
+        .collect();
+    indices.sort_by_key(|index| {
+        quantities
+            .iter()
+            .position(|wanted| *wanted == CHANNELS[*index].quantity)
+    });
+    let slots = indices
+        .iter()
+        .fold(0, |bits, index| bits | 1u16 << CHANNELS[*index].slot());
     let lsb = quantities.iter().map(|quantity| quantity.scale().0).fold(0.0, f64::max);
-    let mut legend: Vec<_> = XYZ
-        .into_iter()
-        .zip(names)
-        .map(|(colour, name)| (hex(colour), name.to_string()))
-        .collect();
-    legend.extend(times.legend(
-        panels.iter().any(|panel| !panel.failed.is_empty()),
-        panels.iter().any(|panel| !panel.clipped.is_empty()),
-    ));
-    let svg = drawing(title, FOUR_PANELS, |root| {
-        let y = panel::shared_y(&panels, times, lsb);
-        for (area, panel) in root.split_evenly((2, 2)).iter().zip(&panels) {
-            panel.draw(area, times, y.clone())?;
+    let lines = (indices.iter().zip(names).enumerate())
+        .map(|(colour, (index, name))| Layer::new(*name, colour, Marks::Line(times.line(|bin| si_range(bin, *index)))));
+    let strip = |name: &str, colour, spans| Layer::new(name, colour, Marks::Strip(spans));
+    let mut layers = vec![Layer::new(
+        "micro-gravity",
+        LIGHT_BLUE,
+        Marks::Spans(times.micro_g.clone()),
+    )];
+    layers.extend(lines);
+    layers.extend([
+        strip("sensor failed", PINK, times.spans(|bin| bin.failed & slots != 0)),
+        strip("packet missed", GREY, times.missed.clone()),
+        strip(
+            "at the end of its range",
+            ORANGE,
+            times.spans(|bin| bin.clipped & slots != 0),
+        ),
+        Layer::new("events", GREY, Marks::Instants(marks.to_vec())),
+    ]);
+    layers.retain(is_anything);
+    Panel {
+        title: format!("plate {}", plate + 1),
+        x: times.axis(),
+        y: Axis::linear(format!("[{unit}]"))
+            .shared()
+            .at_least(LEAST_SPAN_LSB * lsb),
+        layers,
+    }
+}
+
+/// A line without points has its place in the legend all the same; a mark of what never happened has none.
+fn is_anything(layer: &Layer) -> bool {
+    match &layer.marks {
+        Marks::Spans(spans) | Marks::Strip(spans) => !spans.is_empty(),
+        Marks::Instants(instants) => !instants.is_empty(),
+        _ => true,
+    }
+}
+
+/// Attitude, and in simulation its error.
+fn attitude(record: &Record, times: &Times, truth: Option<Truth>) -> Result<Vec<Block>, ChartError> {
+    let Some(follow) = &record.attitude else {
+        return Ok(Vec::new());
+    };
+    let flight = follow.flight(times.cycle_s);
+    if flight.estimates.is_empty() {
+        return Ok(vec![
+            Block::Heading("Attitude".into()),
+            Block::Text(
+                "none was found: it takes a second of three gyros, specific force near one g and a field not along it"
+                    .into(),
+            ),
+        ]);
+    }
+    let at = |t_s: f64, truth: Truth| Row {
+        t_s,
+        rate_b: Vector3::zeros(),
+        acc_b: None,
+        mag_b: None,
+        reference_nb: Some(truth(t_s)),
+        scored: true,
+    };
+    let rows: Option<Vec<Row>> = truth.map(|truth| {
+        let instants = flight
+            .estimates
+            .iter()
+            .flat_map(|estimate| estimate.triad_nb.map(|(t_s, _)| t_s).into_iter().chain([estimate.t_s]));
+        let mut instants: Vec<f64> = instants.collect();
+        instants.sort_by(f64::total_cmp);
+        instants.into_iter().map(|t_s| at(t_s, truth)).collect()
+    });
+    let figures = plots::attitude(&flight, rows.as_deref(), &times.clock)?;
+    let about = match truth {
+        Some(_) => format!("{} The reference is the motion that was flown.", follow.about()),
+        None => follow.about(),
+    };
+    let mut blocks: Vec<Block> = figures.map(Block::Figure).collect();
+    blocks.push(Block::Text(about));
+    Ok(blocks)
+}
+
+/// Amplitude densities.
+fn spectra(spectra: &Spectra, cycle_s: f64) -> Result<Option<Figure>, ChartError> {
+    let panel = |title: &str, quantity: Quantity| {
+        let lines = spectra.lines(quantity);
+        let layers = lines.into_iter().enumerate().map(|(colour, (name, density))| {
+            let shown = density
+                .into_iter()
+                .map(|(frequency, power)| (frequency / cycle_s, (power * cycle_s).sqrt()));
+            Layer::new(name, colour, Marks::Line(shown.collect()))
+        });
+        Panel {
+            title: title.into(),
+            x: Axis::logarithmic("frequency [Hz]"),
+            y: Axis::logarithmic(format!("density [{}/√Hz]", quantity.unit())),
+            layers: layers.collect(),
         }
-        Ok(())
-    })?;
-    Ok(Figure {
-        title: format!("{title} [{unit}]"),
-        legend,
-        svg,
-    })
+    };
+    let panels = [
+        panel("gyros", Quantity::Rate),
+        panel("accelerometers, mean of the plates", Quantity::SpecificForce),
+        panel("magnetometers, mean of the plates", Quantity::Field),
+    ];
+    if panels.iter().all(|panel| panel.layers.is_empty()) {
+        return Ok(None);
+    }
+    Figure::of("Spectra", 3, &panels).map(Some)
 }
 
 /// Deviation of the packet period from its mean.
-fn period(times: &Times, summary: &Summary) -> Result<Figure, ChartError> {
+fn period(times: &Times, summary: &Summary, marks: &[(f64, String)]) -> Result<Figure, ChartError> {
     /// \[us\] span shown at least: a resolution of the line's instants, not of rounding errors.
     const LEAST_SPAN_US: f64 = 10.0;
     let mean_s = summary.period_s.mean;
-    let title = format!("Packet period minus its mean of {:.3} ms [µs]", 1e3 * mean_s);
+    let line = times.line(|bin| {
+        let range = bin.interval_s?;
+        Some((1e6 * (range.least - mean_s), 1e6 * (range.most - mean_s)))
+    });
+    let mut layers = vec![
+        Layer::new("period of packets that follow each other", 0, Marks::Line(line)),
+        Layer::new("packet missed", GREY, Marks::Strip(times.missed.clone())),
+        Layer::new("events", GREY, Marks::Instants(marks.to_vec())),
+    ];
+    layers.retain(is_anything);
     let panel = Panel {
         title: String::new(),
-        y_title: "µs".into(),
-        traces: vec![Trace {
-            colour: XYZ[0],
-            runs: times.runs(|bin| {
-                let range = bin.interval_s?;
-                Some((1e6 * (range.least - mean_s), 1e6 * (range.most - mean_s)))
-            }),
-        }],
-        failed: Vec::new(),
-        clipped: Vec::new(),
+        x: times.axis(),
+        y: Axis::linear("[µs]").at_least(LEAST_SPAN_US),
+        layers,
     };
-    let mut legend = vec![(hex(XYZ[0]), "period of packets that follow each other".to_string())];
-    legend.extend(times.legend(false, false));
-    let svg = drawing(&title, ONE_PANEL, |root| {
-        let y = panel::shared_y(
-            std::slice::from_ref(&panel),
-            times,
-            LEAST_SPAN_US / panel::LEAST_SPAN_LSB,
-        );
-        panel.draw(root, times, y)
-    })?;
-    Ok(Figure { title, legend, svg })
+    Figure::of(
+        format!("Packet period minus its mean of {:.3} ms", 1e3 * mean_s),
+        1,
+        &[panel],
+    )
 }
 
 /// When each sensor is sampled in its cycle.
 fn slots(summary: &Summary) -> Result<Figure, ChartError> {
-    let title = "Slot times: when each sensor is sampled after the start of its cycle [ms]".to_string();
-    let bars: Vec<Bar> = (SLOT_NAMES.iter().zip(&summary.slot_s))
-        .map(|(name, spread)| Bar {
-            name,
-            range: (spread.count > 0).then_some((1e3 * spread.least, 1e3 * spread.mean, 1e3 * spread.most)),
-        })
-        .collect();
-    let svg = drawing(&title, ONE_PANEL, |root| panel::draw_bars(root, &bars, XYZ[0]))?;
-    Ok(Figure {
-        title,
-        legend: vec![(hex(XYZ[0]), "least to most, dot at the mean".to_string())],
-        svg,
-    })
+    let slots = summary.slot_s.iter().enumerate().filter(|(_, spread)| spread.count > 0);
+    let (mut ranges, mut means) = (Vec::new(), Vec::new());
+    for (slot, spread) in slots {
+        let at = (slot + 1) as f64;
+        ranges.push((at, 1e3 * spread.least, 1e3 * spread.most));
+        means.push((at, 1e3 * spread.mean));
+    }
+    let panel = Panel {
+        title: String::new(),
+        x: Axis::named("sensor", SLOT_NAMES.map(str::to_string)),
+        y: Axis::linear("after the start of the cycle [ms]"),
+        layers: vec![
+            Layer::new("least to most", 0, Marks::Whiskers(ranges)),
+            Layer::new("mean", 1, Marks::Dots(means)),
+        ],
+    };
+    Figure::of("Slot times: when each sensor is sampled in its cycle", 1, &[panel])
 }
 
 /// SI values of a channel in a bin, least and most.

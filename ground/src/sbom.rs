@@ -2,7 +2,8 @@
 //!
 //! In: `cargo tree` of the program's package with the versions of Cargo.lock, and the hashes in Cargo.lock. Out: every
 //! package with version, licence, SHA-256 and what it depends on. What is in the program is `required`; what only builds
-//! it, macros and build scripts, is `excluded`. There is no time in it: the same Cargo.lock gives the same bytes. Refuses
+//! it, macros and build scripts, is `excluded`. The script that stands in every page, which is no package of cargo's, is named
+//! beside them. There is no time in it: the same Cargo.lock gives the same bytes. Refuses
 //! a package without a hash, because it does not come from a registry.
 
 use std::{
@@ -65,8 +66,22 @@ pub fn sbom(arguments: &Arguments) -> Result<(), SbomError> {
     let lock = std::fs::read_to_string(Path::new("Cargo.lock"))?;
     let within = tree(package, target, "normal,no-proc-macro")?;
     let builds = tree(package, target, "normal,build")?;
-    println!("{:#}", bill(&within, &builds, &lock)?);
+    let mut bill = bill(&within, &builds, &lock)?;
+    if let (Program::Ground, Some(components)) = (arguments.program, bill["components"].as_array_mut()) {
+        components.push(uplot());
+    }
+    println!("{bill:#}");
     Ok(())
+}
+
+/// What every page with plots has in it.
+fn uplot() -> Value {
+    let version = chart::page::UPLOT_VERSION;
+    json!({
+        "type": "library", "bom-ref": format!("pkg:npm/uplot@{version}"), "purl": format!("pkg:npm/uplot@{version}"),
+        "name": "uplot", "version": version, "scope": "required", "licenses": [{"expression": "MIT"}],
+        "hashes": [{"alg": "SHA-256", "content": chart::page::uplot_sha256()}],
+    })
 }
 
 fn tree(package: &str, target: &str, edges: &str) -> Result<String, SbomError> {

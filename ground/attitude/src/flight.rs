@@ -111,26 +111,9 @@ impl Flight {
                 let again = Derived { estimate, ..**sent };
                 flight.replayed[usize::from(derived::encode(sent) != derived::encode(&again))] += 1;
             }
-            let t_s = cycle.increments.end_us as f64 * 1e-6;
-            flight.note(t_s, &outcome);
-            let Some(q_nb) = estimate.q_nb.and_then(from_parts) else {
-                continue;
-            };
-            let [nn, ne, nd, ee, ed, dd] = estimate.covariance_n.map(f64::from);
-            let vector = |parts: [f32; 3]| Some(Vector3::from(parts.map(f64::from)));
-            flight.estimates.push(Estimate {
-                t_s,
-                q_nb: q_nb.cast(),
-                triad_nb: estimate
-                    .triad_nb
-                    .and_then(from_parts)
-                    .map(|q_nb| (vectors_s(cycle), q_nb.cast())),
-                covariance_n: Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd),
-                bias_b: Vector3::from(estimate.bias_b.map(f64::from)),
-                force_b: vector(estimate.force_b),
-                field_b_ut: vector(estimate.field_b_ut),
-                innovations: outcome.innovations.to_vec(),
-            });
+            flight.note(cycle.increments.end_us as f64 * 1e-6, &outcome);
+            let innovations = outcome.innovations.to_vec();
+            flight.estimates.extend(Estimate::of(cycle, &estimate, innovations));
         }
         flight
     }
@@ -153,6 +136,13 @@ impl Flight {
             .chain(&mut self.aligned_s)
         {
             *t_s += by_s;
+        }
+        for (triad_s, _) in self
+            .estimates
+            .iter_mut()
+            .filter_map(|estimate| estimate.triad_nb.as_mut())
+        {
+            *triad_s += by_s;
         }
         self
     }
@@ -207,6 +197,24 @@ impl Flight {
 }
 
 impl Estimate {
+    /// What the unit made of a cycle; `None` without an attitude.
+    pub fn of(cycle: &Cycle, estimate: &emems::estimate::Estimate, innovations: Vec<Innovation>) -> Option<Self> {
+        let q_nb = estimate.q_nb.and_then(from_parts)?;
+        let triad_nb = estimate.triad_nb.and_then(from_parts);
+        let [nn, ne, nd, ee, ed, dd] = estimate.covariance_n.map(f64::from);
+        let vector = |parts: [f32; 3]| Some(Vector3::from(parts.map(f64::from)));
+        Some(Estimate {
+            t_s: cycle.increments.end_us as f64 * 1e-6,
+            q_nb: q_nb.cast(),
+            triad_nb: triad_nb.map(|q_nb| (vectors_s(cycle), q_nb.cast())),
+            covariance_n: Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd),
+            bias_b: Vector3::from(estimate.bias_b.map(f64::from)),
+            force_b: vector(estimate.force_b),
+            field_b_ut: vector(estimate.field_b_ut),
+            innovations,
+        })
+    }
+
     /// \[deg\] roll, pitch, yaw.
     pub fn euler_deg(&self) -> [f64; 3] {
         euler_deg(&self.q_nb)

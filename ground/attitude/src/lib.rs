@@ -15,6 +15,7 @@ pub mod chapter6;
 pub mod command;
 pub mod counts;
 pub mod flight;
+pub mod follow;
 pub mod log;
 pub mod methods;
 pub mod orbit;

@@ -227,10 +227,6 @@ mod tests {
         for part in ["verdict", "good", "-12.58", "<svg", "left out"] {
             assert!(page.contains(part), "{part}");
         }
-        assert!(
-            !page.contains("http://") || page.contains("www.w3.org"),
-            "nothing but the name space of SVG"
-        );
-        assert!(!page.contains("<script"));
+        assert!(page.contains("default-src 'none'"), "it may not fetch anything");
     }
 }

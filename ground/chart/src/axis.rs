@@ -24,6 +24,12 @@ pub struct Axis {
     pub scale: Scale,
     /// Least and most shown, in values; `None` for what the layers need.
     pub limits: Option<(f64, f64)>,
+    /// What stands at 1, 2, 3 and so on instead of numbers; empty for numbers.
+    pub names: Vec<String>,
+    /// As a y axis: alike in all panels of the figure whose y axis is shared and has the same label.
+    pub is_shared: bool,
+    /// Length that it has at least: values that hardly change are not blown up beyond it.
+    pub least_span: f64,
 }
 
 impl Axis {
@@ -40,6 +46,34 @@ impl Axis {
         Axis {
             scale: Scale::Logarithmic,
             ..Axis::linear(label)
+        }
+    }
+
+    /// An axis of things that have names instead of values: the first stands at 1.
+    pub fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<String> = names.into_iter().collect();
+        Axis {
+            limits: Some((0.4, names.len() as f64 + 0.6)),
+            names,
+            ..Axis::linear(label)
+        }
+    }
+
+    /// The same axis, alike in all panels of the figure that share it.
+    #[must_use]
+    pub fn shared(self) -> Self {
+        Axis {
+            is_shared: true,
+            ..self
+        }
+    }
+
+    /// The same axis, never shorter than `span`.
+    #[must_use]
+    pub fn at_least(self, span: f64) -> Self {
+        Axis {
+            least_span: span,
+            ..self
         }
     }
 
@@ -81,14 +115,35 @@ impl Axis {
             Scale::Linear => (1e-3 * least.abs().max(most.abs())).max(1e-12),
             Scale::Logarithmic => 0.5,
         };
-        let span = (most - least).max(flat);
+        let span = (most - least).max(flat).max(self.least_span);
         let middle = 0.5 * (least + most);
         middle - (0.5 + air) * span..middle + (0.5 + air) * span
+    }
+
+    /// Where ticks stand in a range: some `count` round values, whole powers, or names.
+    pub(crate) fn ticks(&self, range: &Range<f64>, count: usize) -> Vec<f64> {
+        let span = range.end - range.start;
+        let step = match self.scale {
+            _ if !self.names.is_empty() => 1.0,
+            Scale::Logarithmic if span >= 1.0 => (span / count as f64).ceil().max(1.0),
+            _ => round_step(span / count.max(1) as f64),
+        };
+        let first = (range.start / step - 1e-9).ceil();
+        let last = (range.end / step + 1e-9).floor();
+        if !(last - first).is_finite() || last - first > 100.0 {
+            return Vec::new();
+        }
+        let each = (0..=(last - first).max(-1.0) as i64).map(|k| (first + k as f64) * step);
+        each.filter(|_| last >= first).collect()
     }
 
     /// The text of a tick.
     pub(crate) fn tick(&self, place: f64, range: &Range<f64>) -> String {
         let span = range.end - range.start;
+        if !self.names.is_empty() {
+            let name = self.names.get((place.round() - 1.0).max(0.0) as usize);
+            return name.filter(|_| place > 0.5).cloned().unwrap_or_default();
+        }
         match self.scale {
             Scale::Linear => tidy(place, range),
             Scale::Logarithmic if (place - place.round()).abs() < 1e-6 => power(place.round()),
@@ -96,6 +151,15 @@ impl Axis {
             Scale::Logarithmic => String::new(),
         }
     }
+}
+
+/// The round step (1, 2 or 5 by a power of ten) that is not less than some length.
+fn round_step(least: f64) -> f64 {
+    let power = 10f64.powf(least.log10().floor());
+    let step = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|step| step * power >= least * (1.0 - 1e-9));
+    step.unwrap_or(10.0) * power
 }
 
 /// A power of ten as people write it: plain where that is short.
@@ -152,6 +216,22 @@ mod tests {
         assert_eq!(axis.tick(-2.5, &(-4.0..0.0)), "");
         assert_eq!(axis.place(100.0), 2.0);
         assert!(axis.place(0.0).is_nan());
+    }
+
+    #[test]
+    fn ticks_stand_at_round_values_powers_and_names() {
+        assert_eq!(Axis::linear("").ticks(&(-0.3..4.2), 5), [0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(Axis::linear("").ticks(&(0.0..1e-3), 3), [0.0, 5e-4, 1e-3]);
+        assert_eq!(Axis::logarithmic("").ticks(&(-2.5..1.2), 5), [-2.0, -1.0, 0.0, 1.0]);
+        let named = Axis::named("", ["a1", "m1"].map(str::to_string));
+        let range = named.range([].into_iter(), 0.0);
+        let texts: Vec<String> = named
+            .ticks(&range, 5)
+            .iter()
+            .map(|at| named.tick(*at, &range))
+            .collect();
+        assert_eq!(texts, ["a1", "m1"]);
+        assert!(Axis::linear("").ticks(&(0.0..f64::NAN), 5).is_empty());
     }
 
     #[test]

@@ -1,7 +1,13 @@
-//! Results as pictures: panels as SVG, and one HTML page that opens without a network.
+//! Results as one HTML page that opens without a network: text, tables, plots that zoom, bodies that turn.
 //!
-//! [`Figure`]s are rows and columns of [`Panel`]s; a panel is two axes and what is drawn between them. [`page::html`]
-//! puts figures, tables and text into one file. Nothing here knows what the numbers mean.
+//! [`Figure`]s are [`Panel`]s in columns, a [`Map`] of shades, or a [`Scene`] of bodies that turn in time. A panel is two
+//! axes and the [`Layer`]s between them. [`html`] puts figures, tables and text into one file. Nothing here knows what the
+//! numbers mean.
+//!
+//! Each panel is on the page twice: as a picture (SVG), which is there without scripts and in print, and as data of which the
+//! script of the page makes a plot with zoom, values under the pointer and a legend that switches. Panels whose x axes have
+//! the same label are moved together. A layer of more points than [`thin::LIVE`] has the least and the most of each stretch,
+//! so that the weight of a page does not grow with the record and no peak is lost.
 //!
 //! ```
 //! use chart::{Block, Figure, Layer, Marks, Panel};
@@ -14,26 +20,32 @@
 //! ```
 
 mod axis;
-pub mod canvas;
-mod draw;
+mod live;
+mod map;
 pub mod page;
+mod picture;
+mod scene;
+mod thin;
 
 pub use axis::{Axis, Scale, tidy};
+pub use map::Map;
 pub use page::{Block, html};
+pub use scene::{Arrow, Face, Poses, Scene};
 
 /// Colours in the order layers take them, distinguishable without red or green (Okabe and Ito, "Color universal
-/// design", 2008); the seventh layer has the first colour again.
-pub const COLOURS: [(u8, u8, u8); 6] = [
+/// design", 2008), and a grey; the layer after the last has the first colour again.
+pub const COLOURS: [(u8, u8, u8); 7] = [
     (0, 114, 178),
     (213, 94, 0),
     (0, 158, 115),
     (204, 121, 167),
     (230, 159, 0),
     (86, 180, 233),
+    (110, 110, 110),
 ];
 
 /// What a layer draws. A point with a coordinate that is not finite (or not positive on a logarithmic axis) is left
-/// out and breaks the line or band it is in.
+/// out and breaks the line or band it is in. Lines, dashes and bands go from left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Marks {
     /// A line through `(x, y)`.
@@ -50,6 +62,10 @@ pub enum Marks {
     Bars(Vec<(f64, f64)>),
     /// Shaded stretches of x: `(from, to)`.
     Spans(Vec<(f64, f64)>),
+    /// Stretches of x as a strip along the bottom, a level above the strips of the layers before: `(from, to)`.
+    Strip(Vec<(f64, f64)>),
+    /// Instants, as vertical lines with their names: `(x, name)`.
+    Instants(Vec<(f64, String)>),
 }
 
 /// One layer of a panel.
@@ -76,35 +92,27 @@ pub struct Panel {
     pub layers: Vec<Layer>,
 }
 
-/// Shares or scores in rows and columns, as shades with their values written in.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Map {
-    /// Names of the rows, from the top.
-    pub rows: Vec<String>,
-    /// Names of the columns.
-    pub columns: Vec<String>,
-    /// `values[row][column]`, 0 white to 1 dark; what is not finite is left empty.
-    pub values: Vec<Vec<f64>>,
-}
-
-/// A picture with its title and legend.
+/// A part of a page that is looked at: a title, and what is below it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Its title.
-    pub title: String,
-    /// Colours (`#rrggbb`) and what they mean.
-    pub legend: Vec<(String, String)>,
-    /// The picture.
-    pub svg: String,
+    title: String,
+    body: Body,
 }
 
-/// A figure could not be drawn.
+#[derive(Clone, Debug, PartialEq)]
+enum Body {
+    Panels { columns: usize, panels: Vec<live::Plot> },
+    Map(Map),
+    Scene(Box<Scene>),
+}
+
+/// A figure cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("figure \"{figure}\" cannot be drawn: {why}")]
 pub struct ChartError {
     /// Its title.
     pub figure: String,
-    /// What the plotting library says.
+    /// What is wrong with it.
     pub why: String,
 }
 
@@ -120,90 +128,73 @@ impl Layer {
 }
 
 impl Figure {
-    /// Panels in rows of `columns`; the legend lists each layer name once, in the colour it first has.
+    /// Panels in rows of `columns` (1 to 4); a narrow window has fewer. The legend lists each layer name once, in the colour
+    /// it first has.
     ///
     /// # Errors
-    /// When the plotting library refuses.
+    /// When a line, dashes or a band go back along x.
     pub fn of(title: impl Into<String>, columns: usize, panels: &[Panel]) -> Result<Self, ChartError> {
         let title = title.into();
-        let mut legend: Vec<(String, String)> = Vec::new();
-        for layer in panels.iter().flat_map(|panel| &panel.layers) {
-            if !layer.name.is_empty() && !legend.iter().any(|(_, name)| *name == layer.name) {
-                legend.push((canvas::hex(draw::rgb(layer.colour)), layer.name.clone()));
+        let plots = panels.iter().map(live::Plot::of).collect::<Result<Vec<_>, _>>();
+        match plots {
+            Ok(mut panels) => {
+                live::share(&mut panels);
+                Ok(Figure {
+                    title,
+                    body: Body::Panels {
+                        columns: columns.clamp(1, 4),
+                        panels,
+                    },
+                })
             }
+            Err(why) => Err(ChartError { figure: title, why }),
         }
-        let svg = draw::panels(&title, columns, panels)?;
-        Ok(Figure { title, legend, svg })
     }
 
     /// A map of shades.
     ///
     /// # Errors
-    /// When the plotting library refuses.
+    /// When it has not a row of values for each name.
     pub fn map(title: impl Into<String>, map: &Map) -> Result<Self, ChartError> {
         let title = title.into();
-        let svg = draw::map(&title, map)?;
+        if map.values.len() != map.rows.len() {
+            let why = format!("{} rows of values for {} names", map.values.len(), map.rows.len());
+            return Err(ChartError { figure: title, why });
+        }
         Ok(Figure {
             title,
-            legend: Vec::new(),
-            svg,
+            body: Body::Map(map.clone()),
         })
+    }
+
+    /// Bodies that turn.
+    ///
+    /// # Errors
+    /// When times of poses go back.
+    pub fn scene(title: impl Into<String>, scene: Scene) -> Result<Self, ChartError> {
+        let title = title.into();
+        match scene.check() {
+            Ok(()) => Ok(Figure {
+                title,
+                body: Body::Scene(Box::new(scene)),
+            }),
+            Err(why) => Err(ChartError { figure: title, why }),
+        }
+    }
+
+    /// Its title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Names in its legend, each once.
+    pub fn legend(&self) -> Vec<&str> {
+        match &self.body {
+            Body::Panels { panels, .. } => live::legend(panels).into_iter().map(|(name, _)| name).collect(),
+            Body::Map(_) | Body::Scene(_) => Vec::new(),
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn panel(points: Vec<(f64, f64)>) -> Panel {
-        Panel {
-            layers: vec![Layer::new("a", 0, Marks::Line(points))],
-            ..Panel::default()
-        }
-    }
-
-    #[test]
-    fn numbers_that_are_none_break_a_line_and_nothing_else() {
-        let whole = Figure::of("t", 1, &[panel(vec![(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0)])]).unwrap();
-        let broken = Figure::of(
-            "t",
-            1,
-            &[panel(vec![
-                (0.0, 0.0),
-                (1.0, 1.0),
-                (1.5, f64::NAN),
-                (2.0, 2.0),
-                (3.0, 3.0),
-            ])],
-        )
-        .unwrap();
-        let lines = |figure: &Figure| figure.svg.matches("<polyline").count();
-        assert_eq!(lines(&broken), lines(&whole) + 1);
-        assert!(!broken.svg.contains("NaN"));
-    }
-
-    #[test]
-    fn nothing_to_draw_is_an_empty_panel() {
-        for points in [vec![], vec![(f64::INFINITY, 1.0)], vec![(0.0, f64::NAN)]] {
-            assert!(Figure::of("t", 2, &[panel(points)]).unwrap().svg.starts_with("<svg"));
-        }
-        assert!(Figure::of("t", 0, &[]).unwrap().svg.starts_with("<svg"));
-        assert!(Figure::map("t", &Map::default()).unwrap().svg.starts_with("<svg"));
-    }
-
-    #[test]
-    fn a_name_is_once_in_the_legend() {
-        let figure = Figure::of("t", 2, &[panel(vec![(0.0, 1.0)]), panel(vec![(0.0, 2.0)])]).unwrap();
-        assert_eq!(figure.legend, [("#0072b2".to_string(), "a".to_string())]);
-    }
-
-    #[test]
-    fn a_million_points_make_a_small_picture_that_keeps_the_peak() {
-        let mut points: Vec<(f64, f64)> = (0..1_000_000).map(|k| (f64::from(k), 0.0)).collect();
-        let flat = Figure::of("t", 1, &[panel(points.clone())]).unwrap();
-        points[654_321].1 = 1.0;
-        let peak = Figure::of("t", 1, &[panel(points)]).unwrap();
-        assert!(peak.svg.len() < 200_000, "{} bytes", peak.svg.len());
-        assert_ne!(flat.svg, peak.svg);
-    }
-}
+mod tests;

@@ -45,8 +45,9 @@ pub fn to_folder(log: &Log, name: &str, parent: &Path, json: bool) -> Result<(),
         .next_back()
         .map_or(PERIOD_US, |header| header.period_us.max(1_000));
     let stem = stem(name);
-    let mut folder = Folder::create(parent, stem, f64::from(period_us) * 1e-6)?;
-    let mut digest = Digest::new(Bytes5To8::Errors);
+    let cycle_s = f64::from(period_us) * 1e-6;
+    let mut folder = Folder::create(parent, stem, cycle_s)?;
+    let mut digest = Digest::new(Bytes5To8::Errors, cycle_s);
     for (_, entry) in log.packets_of(false) {
         folder.entries(&digest.push(None, &entry.packet))?;
     }

@@ -87,6 +87,8 @@ pub struct Flown<'a> {
     pub flown_s: f64,
     /// What recorded it.
     pub instrument: Instrument,
+    /// When the parts of the unit convert, if that could be learnt.
+    pub instants: Option<&'a Instants>,
 }
 
 /// The answer, as it is kept.
@@ -129,7 +131,7 @@ impl Flown<'_> {
         if !self.struck.is_empty() {
             put(folder, ANSWER, &self.answer()?)?;
         }
-        let instants = flight::instants(self.seed).ok_or(CaseError::NoInstants(self.seed))?;
+        let instants = self.instants.ok_or(CaseError::NoInstants(self.seed))?;
         let zero_s = instants.zero_s + instants.lead_s;
         let end_s = (self.flown_s - zero_s).min(LONGEST_S);
         // The packet of the last whole cycle.
@@ -158,7 +160,7 @@ impl Flown<'_> {
             windows: &windows,
         };
         put(folder, case::MOTION, &motion)?;
-        put(folder, case::UNIT, &described(self.unit, &instants).text())?;
+        put(folder, case::UNIT, &described(self.unit, instants).text())?;
         put(folder, case::CASE, &text.toml())
     }
 

@@ -15,9 +15,8 @@ use super::{interrupt::Interrupt, progress::Progress};
 use crate::{
     console::line::UnitEnd,
     digest::{Digest, Entry},
-    envelope::Envelope,
     folder::{Folder, FolderError},
-    summary::Summary,
+    record::Record,
 };
 
 /// \[ns\] when derived frames are asked for: the unit has long booted.
@@ -27,10 +26,8 @@ const ASK_AT: Nanos = 300_000_000;
 pub struct Seen {
     /// The folder, still open.
     pub folder: Folder,
-    /// The figures.
-    pub summary: Summary,
-    /// What plots show.
-    pub envelope: Envelope,
+    /// What a page says of it.
+    pub record: Record,
     /// Virtual time flown.
     pub flown: Duration,
     /// Wall time it took.
@@ -55,6 +52,7 @@ impl Watch {
     /// Before take-off. With a console, the umbilical is the console's to keep.
     pub fn new(
         folder: Folder,
+        digest: Digest,
         progress: Progress,
         console: Option<UnitEnd>,
         ask_derived: bool,
@@ -62,7 +60,7 @@ impl Watch {
     ) -> Self {
         Watch {
             folder,
-            digest: Digest::default(),
+            digest,
             progress,
             console,
             ask_derived,
@@ -84,12 +82,11 @@ impl Watch {
             return Err(error);
         }
         let mut folder = self.folder;
-        let (rest, summary, envelope) = self.digest.finish();
+        let (rest, record) = self.digest.finish();
         folder.entries(&rest)?;
         Ok(Seen {
             folder,
-            summary,
-            envelope,
+            record,
             flown: Duration::from_nanos(self.flown),
             took,
         })
@@ -171,7 +168,14 @@ mod tests {
     fn watch(place: &std::path::Path, console: Option<UnitEnd>, ask_derived: bool) -> Watch {
         let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
         let progress = Progress::start(Duration::from_secs(60), false, true);
-        Watch::new(folder, progress, console, ask_derived, Interrupt::default())
+        Watch::new(
+            folder,
+            Digest::default(),
+            progress,
+            console,
+            ask_derived,
+            Interrupt::default(),
+        )
     }
 
     #[test]
@@ -184,11 +188,11 @@ mod tests {
             watch.telemetry(at, &packet[155..]);
         }
         let seen = watch.finish().expect("seen");
-        assert_eq!(seen.summary.period_s.count, 1);
+        assert_eq!(seen.record.summary.period_s.count, 1);
         assert!(
-            (seen.summary.period_s.mean - 0.200_05).abs() < 1e-12,
+            (seen.record.summary.period_s.mean - 0.200_05).abs() < 1e-12,
             "{:?}",
-            seen.summary.period_s
+            seen.record.summary.period_s
         );
     }
 

@@ -1,9 +1,9 @@
-//! What the figures hold: checked on the SVG's text, seen by eye elsewhere.
+//! What the figures hold: checked on the page's text; a browser looks at pages in `tests/pages.rs`.
 
 use emems::sample::{Errors, NOT_READ, Reading};
+use packets::stream::{Item, sequence::Step};
 
 use super::*;
-use packets::stream::sequence::Step;
 
 fn reading(value: i16) -> Reading {
     Reading {
@@ -17,38 +17,54 @@ fn reading(value: i16) -> Reading {
     }
 }
 
-fn drawn(packets: impl IntoIterator<Item = (u64, Reading)>) -> Vec<Figure> {
-    let (mut envelope, mut summary) = (Envelope::default(), Summary::default());
+fn recorded(packets: impl IntoIterator<Item = (u64, Reading)>) -> Record {
+    let mut record = Record {
+        attitude: None,
+        ..Record::default()
+    };
     for (number, reading) in packets {
-        envelope.add(number, &reading, 0, Some(0.2));
-        summary.packet(&reading, Step::Next, Some(0.2));
+        let item = Item::Packet { offset: 0, reading };
+        record.packet(number, Step::Next, &item, Some(0.2));
     }
-    figures(&envelope, 0.2, &summary).expect("figures")
+    record
 }
 
-fn lines(figure: &Figure) -> usize {
-    figure
-        .svg
-        .matches(&format!("stroke=\"{}\"", hex(XYZ[0]).to_uppercase()))
-        .count()
+fn drawn(packets: impl IntoIterator<Item = (u64, Reading)>) -> Vec<Figure> {
+    let blocks = blocks(&recorded(packets), 0.2, None).expect("figures");
+    let figures = blocks.into_iter().filter_map(|block| match block {
+        Block::Figure(figure) => Some(figure),
+        _ => None,
+    });
+    figures.collect()
+}
+
+fn page(figures: &[Figure]) -> String {
+    let blocks: Vec<Block> = figures.iter().cloned().map(Block::Figure).collect();
+    chart::html("", "", &blocks)
 }
 
 #[test]
 fn every_sensor_has_its_figure() {
-    let figures = drawn((0..50).map(|number| (number, reading(number as i16))));
-    let titles: Vec<&str> = figures.iter().map(|figure| figure.title.as_str()).collect();
+    let figures = drawn((0..500).map(|number| (number, reading(number as i16 % 90))));
+    let titles: Vec<&str> = figures.iter().map(Figure::title).collect();
     assert_eq!(
         titles,
         [
-            "Accelerometers [m/s²]",
-            "Magnetometers [µT]",
-            "Gyros [rad/s]",
-            "Temperatures [°C]",
-            "Packet period minus its mean of 200.000 ms [µs]",
+            "Accelerometers",
+            "Magnetometers",
+            "Gyros",
+            "Temperatures",
+            "Spectra",
+            "Packet period minus its mean of 200.000 ms",
         ]
     );
-    assert_eq!(lines(&figures[0]), 4, "one x line a plate");
-    assert!(figures[0].svg.contains("plate 4"));
+    let page = page(&figures[..1]);
+    assert_eq!(
+        page.matches("<g class=\"c0\"><path class=\"line\"").count(),
+        4,
+        "one x line a plate"
+    );
+    assert!(page.contains("plate 4") && page.contains("[m/s²]"));
 }
 
 #[test]
@@ -60,18 +76,28 @@ fn a_value_that_was_not_read_breaks_its_line() {
         }
         (number, reading)
     }));
-    assert_eq!(lines(&figures[2]), 5, "the line of gyro 2 is in two parts");
-    assert!(figures[2].legend.iter().any(|(_, meaning)| *meaning == "sensor failed"));
-    assert!(!figures[0].legend.iter().any(|(_, meaning)| *meaning == "sensor failed"));
+    let lines = |page: &str| -> Vec<usize> {
+        let parts = page.split("<path class=\"line\" d=\"").skip(1);
+        parts
+            .filter_map(|part| Some(part.split('"').next()?.matches('M').count()))
+            .collect()
+    };
+    assert_eq!(
+        lines(&page(&figures[2..3])),
+        [1, 2, 1, 1],
+        "the line of gyro 2 is in two parts"
+    );
+    assert!(figures[2].legend().contains(&"sensor failed"));
+    assert!(!figures[0].legend().contains(&"sensor failed"));
 }
 
 #[test]
 fn a_day_is_drawn_small() {
     const MOST_BYTES: usize = 2_000_000;
-    let figures = drawn((0..432_000).map(|number| (number, reading((number * 7919 % 4001) as i16))));
-    let bytes: usize = figures.iter().map(|figure| figure.svg.len()).sum();
-    assert!(bytes < MOST_BYTES, "{bytes}");
-    assert!(figures[0].svg.contains("time [h]"));
+    let figures = drawn((0..432_000).map(|number| (number, reading((number * 7919 % 2001) as i16))));
+    let page = page(&figures);
+    assert!(page.len() < MOST_BYTES, "{}", page.len());
+    assert!(page.contains("time [h]"));
 }
 
 #[test]

@@ -129,7 +129,7 @@ mod tests {
         let right: f64 = found.bins.iter().map(|bin| bin.right * bin.count as f64).sum();
         assert_eq!(right, 15.0);
         assert!(found.bins.first().is_some_and(|bin| bin.stated == 0.6));
-        assert!(found.figure().expect("drawn").svg.contains("<svg"));
+        assert!(found.figure().expect("drawn").legend().contains(&"what it should be"));
     }
 
     #[test]
