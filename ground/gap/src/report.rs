@@ -6,5 +6,6 @@
 mod gained;
 pub mod page;
 mod place_shares;
+pub mod plain;
 pub mod terminal;
 pub mod verdict;

@@ -2,7 +2,10 @@
 
 use chart::{Block, ChartError, Figure, Map};
 
-use crate::parity::{findings::Findings, flight::Flight, nulls::NULLS, text};
+use crate::{
+    parity::{findings::Findings, flight::Flight, nulls::NULLS, text},
+    probability::outcome::Outcome,
+};
 
 /// The page.
 ///
@@ -13,6 +16,7 @@ pub fn html(flight: &Flight, findings: &Findings) -> Result<String, ChartError> 
         .iter()
         .map(|null| vec![null.what.to_owned(), null.settled_by.to_owned()]);
     let blocks = [
+        Block::Lead(sentence(findings)),
         Block::Terminal(text::screen(flight, findings)),
         Block::Heading("What parity shows of each effect".to_owned()),
         Block::Terminal(text::visibility(findings)),
@@ -25,6 +29,36 @@ pub fn html(flight: &Flight, findings: &Findings) -> Result<String, ChartError> 
     ];
     let title = format!("Gap without a reference: {}", flight.opened.text.name);
     Ok(chart::html(&title, &flight.opened.text.about, &blocks))
+}
+
+/// What it comes to.
+fn sentence(findings: &Findings) -> String {
+    let named = || {
+        let each: Vec<String> = findings
+            .names
+            .iter()
+            .map(|name| format!("{} at {}", name.effect, name.locality))
+            .collect();
+        each.join(", and ")
+    };
+    let said = match findings.outcome {
+        Outcome::Clean => "The sensors agree with each other".to_owned(),
+        Outcome::Recalibrate => "The sensors agree with each other once their calibration is made anew".to_owned(),
+        Outcome::Named => format!("The sensors disagree because of {}", named()),
+        Outcome::PartlyNamed => format!(
+            "The sensors disagree because of {}, and of something that is not known",
+            named()
+        ),
+        Outcome::Undecided => "The sensors disagree, but no cause of that is likelier than not".to_owned(),
+        Outcome::Unknown => {
+            "The sensors disagree, or the motion was not followed closely enough; no known effect explains it"
+                .to_owned()
+        }
+    };
+    format!(
+        "{said}: {:.2} sigma, where 1 is noise and calibration alone. Without a reference, what all sensors share cannot be seen.",
+        findings.gap[0]
+    )
 }
 
 /// Gap of each channel, before.

@@ -1,11 +1,12 @@
-//! The verdict as one page that opens without a network: residuals before and after, where, which effect, what confuses.
+//! The verdict as one page that opens without a network: in plain words, as the screen has it, and then residuals before and
+//! after, where, which effect, what confuses.
 
 use chart::{Axis, Block, ChartError, Figure, Layer, Map, Marks, Panel};
 
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
-    report::{place_shares, terminal},
+    report::{place_shares, plain, terminal},
     unknown::traces::Trace,
 };
 
@@ -21,6 +22,9 @@ const SHARES: usize = 8;
 /// When a plot cannot be drawn.
 pub fn html(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Result<String, ChartError> {
     let mut blocks = vec![
+        Block::Lead(plain::sentence(subject, diagnosis)),
+        Block::Rows(plain::rows(subject, diagnosis, advice)),
+        Block::Heading("As the terminal has it".to_owned()),
         Block::Terminal(terminal::screen(subject, diagnosis, advice)),
         Block::Figure(residuals(diagnosis)?),
         Block::Heading("Where".to_owned()),
