@@ -13,14 +13,15 @@
 //! | 6 | [`visible`], [`nulls`] | of each effect, what this log can show at all, before anything is sought |
 //! | 7 | [`search`] | which effects the evidence prefers among those that can be seen |
 //! | 8 | [`findings`] | which of them are said, and where the gap is |
-//! | 9 | [`text`], [`verdict`], [`page`] | how it is told |
+//! | 9 | [`crate::parity::smooth`] | the attitude along the whole log |
+//! | 10 | [`text`], [`verdict`], [`page`] | how it is told |
 //!
 //! Per packet the channels are `y = h + A x + C beta + E theta + noise`. `x` is the deviation from the smoothed motion: rate,
 //! specific force, field and temperature, which are free, and the derivatives of rate and force, which are known about as well
 //! as the packets before and after tell them. Within the packet `m' = -w x m` and `f' = -w x f + jerk`. With `[A; P] = Q R`, `P`
 //! being the prior rows, the motion is marginalised by `<u, v> = u'v - (Q'[u; 0])'(Q'[v; 0])`; residual, calibration and effects
-//! go through the same operator, so an effect that is another motion has no column left. No attitude is needed, and none is
-//! found: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
+//! go through the same operator, so an effect that is another motion has no column left. No attitude is needed for
+//! this: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
 //!
 //! Columns are those of [`crate::library`], made about the smoothed motion. What the hold windows would say is not asked yet.
 
@@ -32,6 +33,7 @@ pub mod nulls;
 pub mod packet;
 pub mod page;
 pub mod search;
+pub mod smooth;
 pub mod space;
 pub mod spline;
 pub mod text;
@@ -42,11 +44,14 @@ use std::path::Path;
 
 use crate::{
     input::case::CaseError,
-    parity::{findings::Findings, flight::Flight, verdict::Verdict},
+    parity::{findings::Findings, flight::Flight, smooth::told::Told, verdict::Verdict},
 };
 
 /// File of the verdict, of the screen and of the page among the texts.
 const FILES: [&str; 3] = ["verdict.json", "all.txt", "index.html"];
+
+/// File of the smoothed attitude.
+pub const ATTITUDE: &str = "attitude.csv";
 
 /// Why nothing is said.
 #[derive(Debug, thiserror::Error)]
@@ -73,9 +78,10 @@ pub fn analysed(
 ) -> Result<Vec<(String, String)>, ParityError> {
     let flight = Flight::open(case)?;
     let findings = Findings::of(&flight, withheld, progress)?;
+    let told = Told::of(&flight, &|share| progress("attitude", share))?;
     let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings))?;
-    let screen = text::screen(&flight, &findings);
-    let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings)?];
+    let screen = text::screen(&flight, &findings, &told);
+    let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings, &told)?];
     let mut texts: Vec<(String, String)> = FILES.iter().map(|name| (*name).to_owned()).zip(texts).collect();
     let sections = [
         ("where.txt", text::places(&findings)),
@@ -88,5 +94,6 @@ pub fn analysed(
         ),
     ];
     texts.extend(sections.map(|(name, text)| (name.to_owned(), text)));
+    texts.extend(told.csv().map(|text| (ATTITUDE.to_owned(), text)));
     Ok(texts)
 }

@@ -6,7 +6,7 @@ use clap::Parser;
 use gap::{
     command::{Arguments, run},
     input::case::Subject,
-    parity::{analysed, findings::Findings, flight::Flight},
+    parity::{analysed, findings::Findings, flight::Flight, smooth::told::Told},
     probability::outcome::Outcome,
     thresholds::PARITY_SNR,
 };
@@ -159,6 +159,45 @@ fn a_magnet_on_one_plate_is_named_sized_and_said_to_rest_on_parity() {
     );
     let screen = text("all.txt");
     assert!(screen.find("UNSEEN") < screen.find("CAUSE"), "{screen}");
+    assert!(screen.contains("ATTITUDE"), "{screen}");
+    let rows = text("attitude.csv").lines().count();
+    assert_eq!(rows, 1 + 550, "a line a packet of the fit windows");
+}
+
+#[test]
+fn the_smoothed_attitude_of_a_healthy_unit_is_the_truth_within_what_it_says() {
+    for (name, from_s) in [("tumble", 20.0), ("rate-table", 20.0)] {
+        let flight = Flight::open(flown(name, from_s, 3, &[], |_| true).path()).expect("opens");
+        let told = Told::of(&flight, &|_| ()).expect("is smoothed");
+        assert_eq!(told.attitudes.len(), 550, "{name}: {:?}", told.turns);
+        let motion = motion::world_by_name(name).expect("a motion").motion;
+        let (mut square, mut said) = (0.0, 0.0);
+        for own in &told.attitudes {
+            let truth = motion.at(from_s + own.t_s).attitude.q_nb;
+            square += truth.angle_to(&own.q_nb).to_degrees().powi(2);
+            said += own.sigmas_b_deg.norm_squared();
+        }
+        let ratio = (square / said).sqrt();
+        // A few slow directions carry all of it, so that one flight is no sharp test: three of them within half and twice.
+        assert!((0.3..2.0).contains(&ratio), "{name}: {ratio}");
+        assert!((said / 550.0).sqrt() < 1.5, "{name}: {said}");
+    }
+}
+
+#[test]
+fn an_attitude_that_does_not_settle_is_said_and_not_written() {
+    let told = Told {
+        attitudes: Vec::new(),
+        rests: Vec::new(),
+        turns: vec![0.4, 0.3],
+    };
+    assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
+    assert!(
+        told.line()
+            .contains("did not settle: step 2 still turned it by 17.19 deg"),
+        "{}",
+        told.line()
+    );
 }
 
 #[test]

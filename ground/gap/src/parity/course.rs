@@ -31,6 +31,12 @@ const KNOT_S: f64 = 0.05;
 /// \[s\] over which the attitude follows gravity and field.
 const TURNS_TOWARDS_S: f64 = 5.0;
 
+/// \[s\] distance of knots of what gravity and field add: a start without steps is one that a smoother can mend.
+const TOWARDS_KNOT_S: f64 = 0.5;
+
+/// [rad/s] far above what they add: no smoothing but by the knots.
+const TOWARDS_BEND: f64 = 1.0;
+
 /// Part of gravity within which the specific force is taken for it.
 const STEADY: f64 = 0.1;
 
@@ -58,9 +64,36 @@ pub struct Course {
     pub jerk_sigmas: Vec<f64>,
 }
 
+/// What a course was made of: where a smoother begins.
+pub struct Start {
+    /// \[s\] from where to where.
+    pub span_s: (f64, f64),
+    /// \[s\] distance of its knots.
+    pub knot_s: f64,
+    /// [m/s2] specific force in n.
+    pub forces_n: Spline<3>,
+    /// [m/s2] row by row, how far the acceleration may be off nothing.
+    pub acc_sigmas: Vec<f64>,
+    rates: Spline<3>,
+    /// [rad/s] what gravity and field add to the rates.
+    towards: Spline<3>,
+}
+
+impl Start {
+    /// [rad/s] rate of the attitude that follows gravity and field.
+    pub fn rate(&self, t_s: f64) -> Vector3<f64> {
+        self.rates.at(t_s) + self.towards.at(t_s)
+    }
+
+    /// [rad/s2] its derivative.
+    pub fn rate_dot(&self, t_s: f64) -> Vector3<f64> {
+        self.rates.derivative(t_s, 1) + self.towards.derivative(t_s, 1)
+    }
+}
+
 impl Course {
     /// Of a log.
-    pub fn of(log: &Log, unit: &UnitDescription, environment: &Environment) -> Self {
+    pub fn of(log: &Log, unit: &UnitDescription, environment: &Environment) -> (Self, Start) {
         let (first, last) = (log.start_s[0], log.start_s[log.start_s.len() - 1]);
         let cycle_s = unit.cycle_s.unwrap_or(0.0);
         let span_s = (first - MARGIN_S, last + cycle_s + MARGIN_S);
@@ -132,7 +165,7 @@ impl Course {
             own.map(Channel::sigma).fold(0.0, f64::max)
         };
         let open = |spline: &Spline<3>, kind: Kind| lively(spline, &log.start_s, knot_s, floor(kind));
-        Self {
+        let course = Self {
             scene: Scene::through(span_s.0, STEP_S, &states),
             rate_dot_sigmas: (open(&rates, Kind::Gyro).iter())
                 .map(|bend| knot_s * (FLOORS[0] + WIDER * bend))
@@ -140,7 +173,16 @@ impl Course {
             jerk_sigmas: (open(&forces_n, Kind::Accelerometer).iter())
                 .map(|bend| FLOORS[1] + WIDER * knot_s * bend)
                 .collect(),
-        }
+        };
+        let start = Start {
+            span_s,
+            knot_s,
+            towards: turned.towards(span_s),
+            acc_sigmas: goes_nowhere(&forces_n, &log.start_s, environment.gravity),
+            rates,
+            forces_n,
+        };
+        (course, start)
     }
 }
 
@@ -189,6 +231,8 @@ fn readings<'a>(log: &'a Log, unit: &'a UnitDescription, kind: Kind) -> impl Ite
 struct Turned {
     from_s: f64,
     nodes: Vec<UnitQuaternion<f64>>,
+    /// [rad/s] at the same instants, what gravity and field add to the rates.
+    towards: Vec<Vector3<f64>>,
 }
 
 impl Turned {
@@ -206,6 +250,7 @@ impl Turned {
         );
         let steps = ((span_s.1 - span_s.0) / STEP_S).ceil() as usize;
         let mut nodes = Vec::with_capacity(steps + 1);
+        let mut added = Vec::with_capacity(steps + 1);
         for step in 0..=steps {
             nodes.push(q_nb);
             let t_s = span_s.0 + step as f64 * STEP_S;
@@ -219,13 +264,29 @@ impl Turned {
             if is_steady {
                 off += towards(force, up_n);
             }
+            added.push(off / TURNS_TOWARDS_S);
             let rate = rates.at(t_s + 0.5 * STEP_S) + off / TURNS_TOWARDS_S;
             q_nb *= UnitQuaternion::from_scaled_axis(rate * STEP_S);
         }
         Self {
             from_s: span_s.0,
             nodes,
+            towards: added,
         }
+    }
+
+    /// What gravity and field add, without steps.
+    fn towards(&self, span_s: (f64, f64)) -> Spline<3> {
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let samples = self.towards.iter().enumerate().flat_map(|(step, added)| {
+            axes.map(|direction| Sample {
+                t_s: self.from_s + step as f64 * STEP_S,
+                direction,
+                value: direction.dot(added),
+                sigma: 1.0,
+            })
+        });
+        Spline::fit(span_s, TOWARDS_KNOT_S, TOWARDS_BEND, samples)
     }
 
     fn at(&self, t_s: f64, rates: &Spline<3>) -> UnitQuaternion<f64> {
@@ -269,6 +330,21 @@ fn lively(spline: &Spline<3>, starts_s: &[f64], knot_s: f64, sigma: f64) -> Vec<
         let around = squares[from..to].iter().sum::<f64>() / (to - from) as f64;
         let chance = 1.0 + 3.0 * (2.0 / (3.0 * (to - from) as f64)).sqrt();
         (around - noise * chance).max(0.0).sqrt()
+    };
+    starts_s.iter().map(about).collect()
+}
+
+/// [m/s2] how far the acceleration may be off nothing about each row. A specific force whose size is gravity's within `d` leaves room for an
+/// acceleration of `sqrt(2 g d)` across gravity and of `d` along it. A unit that stays on the ground, or hangs on a parachute, has no
+/// mean acceleration; under thrust, `d` is so large that this says nothing of its attitude.
+fn goes_nowhere(forces_n: &Spline<3>, starts_s: &[f64], gravity: f64) -> Vec<f64> {
+    let off = |t_s: &f64| (forces_n.at(*t_s).norm() - gravity).powi(2);
+    let squares: Vec<f64> = starts_s.iter().map(off).collect();
+    let about = |now_s: &f64| {
+        let from = starts_s.partition_point(|start_s| *start_s < now_s - ALIKE_S);
+        let to = starts_s.partition_point(|start_s| *start_s <= now_s + ALIKE_S);
+        let d = (squares[from..to].iter().sum::<f64>() / (to - from) as f64).sqrt();
+        WIDER * ((2.0 * gravity * d).sqrt() + d)
     };
     starts_s.iter().map(about).collect()
 }

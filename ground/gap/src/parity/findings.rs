@@ -29,7 +29,7 @@ use crate::{
         nulls,
         packet::Motion,
         search::{self, Chosen},
-        space::{Projected, Space},
+        space::{Elimination, Projected, Space},
         visible::{self, Row},
     },
     probability::{cause::Sized, outcome::Outcome},
@@ -100,7 +100,7 @@ impl Findings {
         let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
         codes::taken_out(&mut log, &mut unit, &coded);
         progress("motion", 0.0);
-        let course = Course::of(&log, &unit, &flight.environment);
+        let (course, _) = Course::of(&log, &unit, &flight.environment);
         let starts_s = log.start_s.clone();
         let twin = Twin::new(unit, flight.environment, course.scene.clone(), starts_s)?;
         let fit = Fit { channels: log.channels };
@@ -183,7 +183,7 @@ fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
 }
 
 fn projected(space: &Space, column: Entries) -> Projected {
-    space.project(vec![column]).remove(0)
+    space.project_residual(column)
 }
 
 fn components(library: &Library, said: &[&Chosen]) -> Vec<Component> {

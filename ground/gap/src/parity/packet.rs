@@ -18,7 +18,11 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use twin::predict::{Feel, Kind};
 
-use crate::{library::products::Entries, null::problem::Problem, parity::course::Course};
+use crate::{
+    library::products::Entries,
+    null::problem::Problem,
+    parity::{course::Course, space::Elimination},
+};
 
 /// Rate, its derivative, force, jerk, field, temperature.
 pub const UNKNOWNS: usize = 16;
@@ -86,9 +90,11 @@ impl Motion {
         }
         motion
     }
+}
 
-    /// `Q'[u; 0]` of a column, packet by packet: what the motion can imitate of it.
-    pub fn part(&self, column: &Entries) -> DVector<f64> {
+impl Elimination for Motion {
+    /// `Q'[u; 0]`, packet by packet.
+    fn part(&self, column: &Entries) -> DVector<f64> {
         let mut part = DVector::zeros(UNKNOWNS * self.packets);
         for (channel, values) in column {
             let samples = self.packet[*channel]
@@ -102,8 +108,7 @@ impl Motion {
         part
     }
 
-    /// What a [`Motion::part`] is in the samples of a channel.
-    pub fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64> {
+    fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64> {
         let samples = self.packet[channel]
             .iter()
             .zip(self.rows[channel].chunks_exact(UNKNOWNS));
@@ -114,8 +119,7 @@ impl Motion {
         DVector::from_iterator(self.packet[channel].len(), values)
     }
 
-    /// Degrees of freedom that the motion leaves a channel.
-    pub fn free(&self, channel: usize) -> f64 {
+    fn free(&self, channel: usize) -> f64 {
         let taken: f64 = self.rows[channel].iter().map(|q| q * q).sum();
         self.packet[channel].len() as f64 - taken
     }

@@ -3,7 +3,7 @@
 use chart::{Block, ChartError, Figure, Map};
 
 use crate::{
-    parity::{findings::Findings, flight::Flight, nulls::NULLS, text},
+    parity::{findings::Findings, flight::Flight, nulls::NULLS, smooth::told::Told, text},
     probability::outcome::Outcome,
 };
 
@@ -11,13 +11,13 @@ use crate::{
 ///
 /// # Errors
 /// When a plot cannot be drawn.
-pub fn html(flight: &Flight, findings: &Findings) -> Result<String, ChartError> {
+pub fn html(flight: &Flight, findings: &Findings, told: &Told) -> Result<String, ChartError> {
     let nulls = NULLS
         .iter()
         .map(|null| vec![null.what.to_owned(), null.settled_by.to_owned()]);
-    let blocks = [
+    let mut blocks = vec![
         Block::Lead(sentence(findings)),
-        Block::Terminal(text::screen(flight, findings)),
+        Block::Terminal(text::screen(flight, findings, told)),
         Block::Heading("What parity shows of each effect".to_owned()),
         Block::Terminal(text::visibility(findings)),
         Block::Heading("What no redundancy can show".to_owned()),
@@ -27,6 +27,7 @@ pub fn html(flight: &Flight, findings: &Findings) -> Result<String, ChartError> 
         },
         Block::Figure(channels(findings)?),
     ];
+    blocks.extend(told.figure()?.map(Block::Figure));
     let title = format!("Gap without a reference: {}", flight.opened.text.name);
     Ok(chart::html(&title, &flight.opened.text.about, &blocks))
 }

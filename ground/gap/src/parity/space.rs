@@ -7,10 +7,25 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::{library::products::Entries, null::problem::Problem, parity::packet::Motion};
+use crate::{library::products::Entries, null::problem::Problem};
 
 /// Columns that are projected at once: enough for a matrix product, few enough for the memory.
 const AT_ONCE: usize = 32;
+
+/// A motion that can be eliminated, whichever way it is described.
+pub trait Elimination {
+    /// `Q'u` of a column, `Q` being orthonormal: what the motion can imitate of it.
+    fn part(&self, column: &Entries) -> DVector<f64>;
+
+    /// Adds what a prior that is not about the point of linearisation gives to the part of a residual.
+    fn prior(&self, _part: &mut DVector<f64>) {}
+
+    /// What a [`Elimination::part`] is in the samples of a channel.
+    fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64>;
+
+    /// Degrees of freedom that the motion leaves a channel.
+    fn free(&self, channel: usize) -> f64;
+}
 
 /// What motion and calibration can imitate of a column.
 #[derive(Clone, Debug)]
@@ -31,7 +46,7 @@ pub struct Projected {
 pub struct Space<'a> {
     /// The problem.
     pub problem: &'a Problem<'a>,
-    motion: &'a Motion,
+    motion: &'a dyn Elimination,
     nulls: Vec<Entries>,
     /// `(Q'C)'`, a row a column of the calibration.
     spread: DMatrix<f64>,
@@ -40,7 +55,7 @@ pub struct Space<'a> {
 
 impl<'a> Space<'a> {
     /// Sets it up; `nulls` are columns for a standard deviation that leaves them free.
-    pub fn new(problem: &'a Problem<'a>, motion: &'a Motion, nulls: Vec<Entries>) -> Self {
+    pub fn new(problem: &'a Problem<'a>, motion: &'a dyn Elimination, nulls: Vec<Entries>) -> Self {
         let own = problem.frames.iter().enumerate().flat_map(|(channel, frame)| {
             let columns = frame.nuisance.column_iter();
             columns.map(move |column| vec![(channel, column.into_owned())])
@@ -85,6 +100,15 @@ impl<'a> Space<'a> {
 
     /// What of columns can be imitated.
     pub fn project(&self, columns: Vec<Entries>) -> Vec<Projected> {
+        self.projected(columns, false)
+    }
+
+    /// What of a residual can be imitated.
+    pub fn project_residual(&self, residual: Entries) -> Projected {
+        self.projected(vec![residual], true).remove(0)
+    }
+
+    fn projected(&self, columns: Vec<Entries>, are_residuals: bool) -> Vec<Projected> {
         let mut projected = Vec::with_capacity(columns.len());
         let mut columns = columns.into_iter();
         loop {
@@ -92,7 +116,10 @@ impl<'a> Space<'a> {
             if some.is_empty() {
                 return projected;
             }
-            let parts: Vec<DVector<f64>> = some.iter().map(|column| self.motion.part(column)).collect();
+            let mut parts: Vec<DVector<f64>> = some.iter().map(|column| self.motion.part(column)).collect();
+            if are_residuals {
+                parts.iter_mut().for_each(|part| self.motion.prior(part));
+            }
             let mut open = match self.factor {
                 Some(_) => -(&self.spread * DMatrix::from_columns(&parts)),
                 None => DMatrix::zeros(0, parts.len()),
@@ -133,32 +160,63 @@ impl<'a> Space<'a> {
         open
     }
 
-    /// Of each channel, the energy that a residual keeps and the degrees of freedom that it has there: both are equal on the whole
-    /// where noise and calibration are enough. What the calibration must be off by, in its own sigmas, is energy too: without
-    /// it a calibration could explain anything at no price.
-    pub fn kept(&self, residual: &Projected) -> Vec<(f64, f64)> {
+    /// Variance and more of what calibration and nulls come to, as a factor: with rows `b` of what depends on them, in units of their sigmas,
+    /// `L^-1 b` has the covariance as its inner products.
+    pub fn open_factor(&self, right: &mut DMatrix<f64>) {
+        if let Some(factor) = &self.factor {
+            factor.l_dirty().solve_lower_triangular_mut(right);
+        }
+    }
+
+    /// What the motion can imitate of each column of calibration and nulls, a row each.
+    pub fn open_parts(&self) -> &DMatrix<f64> {
+        &self.spread
+    }
+
+    /// What calibration and nulls leave of a residual, and what of each channel's calibration that costs: the energy of how far it
+    /// must be off, in its own sigmas. Without it a calibration could explain anything at no price.
+    fn left(&self, residual: &Projected) -> (Entries, Vec<f64>) {
         let mut left = residual.column.clone();
         let mut price = vec![0.0; self.problem.frames.len()];
-        if self.factor.is_some() {
-            let found = self.open(residual);
-            let mut next = 0;
-            for (channel, frame) in self.problem.frames.iter().enumerate() {
-                let own = found.rows(next, frame.nuisance.ncols());
-                next += frame.nuisance.ncols();
-                price[channel] = own.norm_squared();
-                if let Some((_, values)) = left.iter_mut().find(|(own, _)| *own == channel) {
-                    values.gemv(-1.0, &frame.nuisance, &own, 1.0);
-                }
+        if self.factor.is_none() {
+            return (left, price);
+        }
+        let found = self.open(residual);
+        let mut next = 0;
+        for (channel, frame) in self.problem.frames.iter().enumerate() {
+            let own = found.rows(next, frame.nuisance.ncols());
+            next += frame.nuisance.ncols();
+            price[channel] = own.norm_squared();
+            if let Some((_, values)) = left.iter_mut().find(|(own, _)| *own == channel) {
+                values.gemv(-1.0, &frame.nuisance, &own, 1.0);
             }
-            for (null, size) in self.nulls.iter().zip(found.iter().skip(next)) {
-                for (channel, values) in null {
-                    if let Some((_, left)) = left.iter_mut().find(|(own, _)| own == channel) {
-                        left.axpy(-size, values, 1.0);
-                    }
+        }
+        for (null, size) in self.nulls.iter().zip(found.iter().skip(next)) {
+            for (channel, values) in null {
+                if let Some((_, left)) = left.iter_mut().find(|(own, _)| own == channel) {
+                    left.axpy(-size, values, 1.0);
                 }
             }
         }
-        let part = self.motion.part(&left);
+        (left, price)
+    }
+
+    /// The motion's part of what calibration and nulls leave of a residual.
+    pub fn motion_part(&self, residual: &Projected) -> DVector<f64> {
+        self.part_of(&self.left(residual).0)
+    }
+
+    fn part_of(&self, left: &Entries) -> DVector<f64> {
+        let mut part = self.motion.part(left);
+        self.motion.prior(&mut part);
+        part
+    }
+
+    /// Of each channel, the energy that a residual keeps and the degrees of freedom that it has there: both are equal on the whole
+    /// where noise and calibration are enough.
+    pub fn kept(&self, residual: &Projected) -> Vec<(f64, f64)> {
+        let (left, price) = self.left(residual);
+        let part = self.part_of(&left);
         let mut kept = vec![(0.0, 0.0); self.problem.frames.len()];
         for (channel, values) in &left {
             let imitated = self.motion.imitated(*channel, &part);
@@ -191,7 +249,11 @@ mod tests {
     use crate::{
         input::{log::Series, reference::Reference, windows::Fit},
         library::hypotheses::Library,
-        parity::{course::Course, nulls, packet::slopes_of},
+        parity::{
+            course::Course,
+            nulls,
+            packet::{Motion, slopes_of},
+        },
     };
 
     /// A unit that turns about all axes, in so many packets, without noise; what is asked of its space and its library.

@@ -6,8 +6,7 @@
 
 use nalgebra::SVector;
 
-/// Share of the largest diagonal that is added to all: a direction that no reading sees stays at nothing.
-const RIDGE: f64 = 1e-12;
+use crate::parity::smooth::banded::Banded;
 
 /// A reading.
 #[derive(Clone, Copy, Debug)]
@@ -40,22 +39,28 @@ impl<const N: usize> Spline<N> {
             step_s,
             coefficients: vec![SVector::zeros(); intervals + 3],
         };
-        let mut normal = Banded::zeros(N * spline.coefficients.len(), 4 * N);
+        let size = N * spline.coefficients.len();
+        let (mut normal, mut solution) = (Banded::zeros(size, 4 * N), vec![0.0; size]);
+        let mut add = |first: usize, row: &[f64], value: f64| {
+            normal.add(first, row);
+            let own = solution[first..].iter_mut();
+            own.zip(row).for_each(|(sum, one)| *sum += one * value);
+        };
         for sample in samples {
             let (first, weights) = spline.weights(sample.t_s, 0);
             let row: Vec<f64> = (weights.iter())
                 .flat_map(|weight| sample.direction.iter().map(move |along| weight * along / sample.sigma))
                 .collect();
-            normal.add(N * first, &row, sample.value / sample.sigma);
+            add(N * first, &row, sample.value / sample.sigma);
         }
         for knot in 1..spline.coefficients.len() - 1 {
             for axis in 0..N {
                 let mut row = vec![0.0; 2 * N + 1];
                 (row[0], row[N], row[2 * N]) = (1.0 / bend, -2.0 / bend, 1.0 / bend);
-                normal.add(N * (knot - 1) + axis, &row, 0.0);
+                add(N * (knot - 1) + axis, &row, 0.0);
             }
         }
-        let solution = normal.solve();
+        normal.factor().solve(&mut solution);
         for (knot, coefficient) in spline.coefficients.iter_mut().enumerate() {
             *coefficient = SVector::from_fn(|axis, _| solution[N * knot + axis]);
         }
@@ -100,74 +105,6 @@ impl<const N: usize> Spline<N> {
             _ => [y, 3.0 * x - 2.0, 3.0 * y - 2.0, x],
         };
         (first, weights)
-    }
-}
-
-/// A symmetric positive matrix whose rows reach `width` to the left, and a right side.
-struct Banded {
-    width: usize,
-    /// Row by row, the diagonal last.
-    rows: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Banded {
-    fn zeros(size: usize, width: usize) -> Self {
-        Self {
-            width,
-            rows: vec![0.0; size * width],
-            right: vec![0.0; size],
-        }
-    }
-
-    /// Adds `row' row` and `row' value`, the row beginning at a column.
-    fn add(&mut self, first: usize, row: &[f64], value: f64) {
-        for (at, one) in row.iter().enumerate() {
-            self.right[first + at] += one * value;
-            for (before, other) in row[..=at].iter().enumerate() {
-                self.rows[(first + at) * self.width + self.width - 1 - (at - before)] += one * other;
-            }
-        }
-    }
-
-    /// By Cholesky in place.
-    fn solve(mut self) -> Vec<f64> {
-        let (width, size) = (self.width, self.right.len());
-        let largest = (0..size)
-            .map(|row| self.rows[row * width + width - 1])
-            .fold(0.0, f64::max);
-        for row in 0..size {
-            self.rows[row * width + width - 1] += RIDGE * largest;
-            for column in row.saturating_sub(width - 1)..=row {
-                let from = (row.max(column))
-                    .saturating_sub(width - 1)
-                    .max(column.saturating_sub(width - 1));
-                let sum: f64 = (from..column)
-                    .map(|k| {
-                        self.rows[row * width + width - 1 + k - row]
-                            * self.rows[column * width + width - 1 + k - column]
-                    })
-                    .sum();
-                let at = row * width + width - 1 + column - row;
-                let rest = self.rows[at] - sum;
-                self.rows[at] = match column == row {
-                    true => rest.max(f64::MIN_POSITIVE).sqrt(),
-                    false => rest / self.rows[column * width + width - 1],
-                };
-            }
-            let from = row.saturating_sub(width - 1);
-            let known: f64 = (from..row)
-                .map(|k| self.rows[row * width + width - 1 + k - row] * self.right[k])
-                .sum();
-            self.right[row] = (self.right[row] - known) / self.rows[row * width + width - 1];
-        }
-        for row in (0..size).rev() {
-            self.right[row] /= self.rows[row * width + width - 1];
-            for k in row.saturating_sub(width - 1)..row {
-                self.right[k] -= self.rows[row * width + width - 1 + k - row] * self.right[row];
-            }
-        }
-        self.right
     }
 }
 

@@ -9,6 +9,7 @@ use crate::{
         findings::{Findings, Name},
         flight::Flight,
         nulls::NULLS,
+        smooth::told::Told,
         visible::Row,
     },
     probability::outcome::Outcome,
@@ -23,7 +24,7 @@ const SHOWN: usize = 6;
 const STANDS_OUT: f64 = 1.1;
 
 /// All of it.
-pub fn screen(flight: &Flight, findings: &Findings) -> String {
+pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     let text = &flight.opened.text;
     let mut out = format!("{}  {}\n", text.name, text.about);
     // Writing to a string cannot fail.
@@ -48,6 +49,7 @@ pub fn screen(flight: &Flight, findings: &Findings) -> String {
     );
     out += &places(findings);
     out += &why(flight, findings);
+    let _ = writeln!(out, "{}", told.line());
     let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
     wrapped(&out)
 }

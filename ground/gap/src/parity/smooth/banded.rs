@@ -1,0 +1,220 @@
+//! Symmetric positive matrices whose rows reach a constant width: normal matrices of splines.
+//!
+//! In: rows of a design, added one by one. Out: [`Factor`] `L` of `N = L L'` (Golub and Van Loan, Matrix Computations, 4.3.5), which solves
+//! either triangle, and the entries of `N^-1` within the band (Takahashi, Fagan and Chen 1973). Time and memory are linear in
+//! the size.
+
+/// Share of the largest diagonal that is added to all: a direction that no row sees stays at nothing.
+const RIDGE: f64 = 1e-12;
+
+/// A matrix that is filled.
+#[derive(Clone, Debug)]
+pub struct Banded {
+    width: usize,
+    /// Row by row, the diagonal last.
+    rows: Vec<f64>,
+}
+
+/// Its lower Cholesky factor.
+#[derive(Clone, Debug)]
+pub struct Factor {
+    width: usize,
+    rows: Vec<f64>,
+}
+
+impl Banded {
+    /// Nothing yet. `width` counts the diagonal.
+    pub fn zeros(size: usize, width: usize) -> Self {
+        Self {
+            width,
+            rows: vec![0.0; size * width],
+        }
+    }
+
+    /// Adds `row' row`, the row beginning at a column; it is no longer than the band is wide.
+    pub fn add(&mut self, first: usize, row: &[f64]) {
+        for (at, one) in row.iter().enumerate().filter(|(_, one)| **one != 0.0) {
+            let end = (first + at + 1) * self.width;
+            let own = &mut self.rows[end - 1 - at..end];
+            own.iter_mut().zip(row).for_each(|(sum, other)| *sum += one * other);
+        }
+    }
+
+    /// By Cholesky.
+    pub fn factor(self) -> Factor {
+        let Self { width, mut rows } = self;
+        let size = rows.len() / width;
+        let largest = (0..size).map(|row| rows[row * width + width - 1]).fold(0.0, f64::max);
+        for row in 0..size {
+            rows[row * width + width - 1] += RIDGE * largest;
+            let from = (row + 1).saturating_sub(width);
+            let (before, own) = rows.split_at_mut(row * width);
+            for column in from..=row {
+                // The columns that both rows reach: those of this row up to `column`.
+                let (start, reach) = (width - 1 + from - row, column - from);
+                let at = start + reach;
+                let sum = if column == row {
+                    own[start..at].iter().map(|value| value * value).sum()
+                } else {
+                    let other = (column + 1) * width - 1;
+                    dot(&before[other - reach..other], &own[start..at])
+                };
+                let rest = own[at] - sum;
+                own[at] = if column == row {
+                    rest.max(f64::MIN_POSITIVE).sqrt()
+                } else {
+                    rest / before[(column + 1) * width - 1]
+                };
+            }
+        }
+        Factor { width, rows }
+    }
+}
+
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(one, other)| one * other).sum()
+}
+
+impl Factor {
+    /// Rows there are.
+    pub fn size(&self) -> usize {
+        self.rows.len() / self.width
+    }
+
+    /// The row's entries left of the diagonal, and the diagonal.
+    fn row(&self, row: usize) -> (&[f64], f64) {
+        let end = (row + 1) * self.width - 1;
+        (&self.rows[end - row.min(self.width - 1)..end], self.rows[end])
+    }
+
+    /// `L^-1 right`, in place.
+    pub fn forward(&self, right: &mut [f64]) {
+        for row in 0..self.size() {
+            let (left, diagonal) = self.row(row);
+            right[row] = (right[row] - dot(left, &right[row - left.len()..row])) / diagonal;
+        }
+    }
+
+    /// `L^-T right`, in place.
+    pub fn backward(&self, right: &mut [f64]) {
+        for row in (0..self.size()).rev() {
+            let (left, diagonal) = self.row(row);
+            right[row] /= diagonal;
+            let value = right[row];
+            let above = &mut right[row - left.len()..row];
+            above.iter_mut().zip(left).for_each(|(sum, own)| *sum -= own * value);
+        }
+    }
+
+    /// `N^-1 right`, in place.
+    pub fn solve(&self, right: &mut [f64]) {
+        self.forward(right);
+        self.backward(right);
+    }
+
+    /// `N^-1` within the band.
+    pub fn inverse(&self) -> Inverse {
+        let (size, width) = (self.size(), self.width);
+        let mut inverse = Inverse {
+            width,
+            rows: vec![0.0; self.rows.len()],
+        };
+        // Z = N^-1 fulfils L'Z = L^-1, whose upper triangle is nothing but 1 / l_jj on the diagonal.
+        let mut column = vec![0.0; width];
+        for j in (0..size).rev() {
+            let diagonal = self.row(j).1;
+            let last = (j + width).min(size);
+            // Below the diagonal of column j of L.
+            for k in j + 1..last {
+                column[k - j] = self.rows[k * width + width - 1 + j - k];
+            }
+            for i in (j..last).rev() {
+                let sum: f64 = (j + 1..last)
+                    .map(|k| column[k - j] * inverse.at(i.max(k), i.min(k)))
+                    .sum();
+                let own = if i == j { 1.0 / diagonal } else { 0.0 };
+                inverse.rows[i * width + width - 1 + j - i] = (own - sum) / diagonal;
+            }
+        }
+        inverse
+    }
+}
+
+/// Entries of an inverse near its diagonal.
+#[derive(Clone, Debug)]
+pub struct Inverse {
+    width: usize,
+    rows: Vec<f64>,
+}
+
+impl Inverse {
+    /// The entry of a row at a column that is not to the right of it, and in the band.
+    fn at(&self, row: usize, column: usize) -> f64 {
+        self.rows[row * self.width + self.width - 1 + column - row]
+    }
+
+    /// `one' N^-1 other` of two vectors that begin at `first` and are as long as each other, and no longer than the band is wide.
+    pub fn between(&self, first: usize, one: &[f64], other: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (row, own) in one.iter().enumerate() {
+            for (column, others) in other.iter().enumerate() {
+                let (low, high) = (row.min(column), row.max(column));
+                sum += own * others * self.at(first + high, first + low);
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// A design of overlapping rows, dense and banded.
+    fn matrices() -> (DMatrix<f64>, Banded) {
+        let (size, width) = (9, 4);
+        let mut dense = DMatrix::zeros(size, size);
+        let mut banded = Banded::zeros(size, width);
+        for k in 0..24 {
+            let first = k % (size - width + 1);
+            let row: Vec<f64> = (0..width).map(|j| ((k * 7 + j * 3) as f64 * 0.61).sin()).collect();
+            banded.add(first, &row);
+            for (i, one) in row.iter().enumerate() {
+                for (j, other) in row.iter().enumerate() {
+                    dense[(first + i, first + j)] += one * other;
+                }
+            }
+        }
+        (dense, banded)
+    }
+
+    #[test]
+    fn it_solves_as_the_dense_matrix_does() {
+        let (dense, banded) = matrices();
+        let right = DVector::from_fn(9, |row, _| (row as f64).cos());
+        let mut solved: Vec<f64> = right.iter().copied().collect();
+        banded.factor().solve(&mut solved);
+        let truth = dense.cholesky().expect("positive").solve(&right);
+        assert!((DVector::from_vec(solved) - truth).norm() < 1e-8);
+    }
+
+    #[test]
+    fn its_inverse_is_that_of_the_dense_matrix_within_the_band() {
+        let (dense, banded) = matrices();
+        let inverse = banded.factor().inverse();
+        let truth = dense.try_inverse().expect("regular");
+        let (one, other) = ([0.3, -1.0, 0.0, 2.0], [1.0, 0.5, -0.2, 0.7]);
+        for first in 0..=5 {
+            let mut sum = 0.0;
+            for i in 0..4 {
+                for j in 0..4 {
+                    sum += one[i] * other[j] * truth[(first + i, first + j)];
+                }
+            }
+            let own = inverse.between(first, &one, &other);
+            assert!((own - sum).abs() < 1e-8 * truth.amax(), "{first}: {own} {sum}");
+        }
+    }
+}

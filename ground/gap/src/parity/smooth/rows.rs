@@ -1,0 +1,113 @@
+//! What a turn and an acceleration of the trajectory change of every sample: the rows of the normal matrix of the motion.
+//!
+//! In: the problem along a trajectory, and the knots. Out: [`Rows`], channel by channel, in units of noise.
+//!
+//! With `w`, `f`, `m` the rate, force and field at the sample, `a` its axis and `r` its lever, a turn `th` in b and an
+//! acceleration `s` in n change it by
+//!
+//! ```text
+//! gyro   a.(th' + w x th)
+//! accel  a.(f x th + C_bn s + dw' x r + dw x (w x r) + w x (dw x r)),  dw = th' + w x th,  dw' = th'' + w' x th + w x th'
+//! mag    a.(m x th)
+//! ```
+//!
+//! A low-pass of the first order is the mean of these over its past, by Gauss and Laguerre's three points: exact to the fifth
+//! order of its time constant.
+
+use nalgebra::Vector3;
+use twin::predict::{Channel, Feel, Kind};
+
+use crate::{
+    null::problem::Problem,
+    parity::smooth::basis::{Knots, SUPPORT},
+};
+
+/// Unknowns a knot: a turn, an acceleration.
+pub const UNKNOWNS: usize = 6;
+
+/// Points and weights of the mean over an exponential past (Abramowitz and Stegun, table 25.9).
+const LAGUERRE: [(f64, f64); 3] = [
+    (0.415_774_556_783, 0.711_093_009_929),
+    (2.294_280_360_279, 0.278_517_733_569),
+    (6.289_945_082_937, 0.010_389_256_501_6),
+];
+
+/// The samples of one channel.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// The first knot of each.
+    pub first: Vec<usize>,
+    /// Derivatives of each by the unknowns from there on, as many a sample as [`width`] says.
+    pub slopes: Vec<f64>,
+}
+
+/// Unknowns that a sample may depend on.
+pub fn width(problem: &Problem, knots: &Knots) -> usize {
+    let channels = problem.twin.unit().channels.iter();
+    let past_s = channels
+        .filter(|channel| channel.sensor != Kind::Thermometer)
+        .map(|channel| LAGUERRE[2].0 * channel.tau_s())
+        .fold(0.0, f64::max);
+    UNKNOWNS * (SUPPORT + (past_s / knots.step_s).ceil() as usize)
+}
+
+impl Rows {
+    /// Of a channel.
+    pub fn of(problem: &Problem, channel: usize, knots: &Knots, feel: &dyn Fn(f64) -> Feel, width: usize) -> Self {
+        let own = &problem.twin.unit().channels[channel];
+        let frame = &problem.frames[channel];
+        let mut rows = Self::default();
+        if own.sensor == Kind::Thermometer {
+            return rows;
+        }
+        let tau_s = own.tau_s();
+        let points: &[(f64, f64)] = if tau_s > 0.0 { &LAGUERRE } else { &[(0.0, 1.0)] };
+        for (sample, row) in frame.series.rows.iter().enumerate() {
+            let t_s = problem.twin.starts_s()[*row as usize] + own.slot_s;
+            let earliest_s = t_s - tau_s * points[points.len() - 1].0;
+            let first = knots.weights(earliest_s, 0).0;
+            let mut slopes = vec![0.0; width];
+            for (past, share) in points {
+                let at_s = t_s - tau_s * past;
+                let by = changes(own, &feel(at_s));
+                for (order, [turn, acc]) in by.iter().enumerate() {
+                    let (knot, weights) = knots.weights(at_s, order);
+                    for (at, weight) in weights.iter().enumerate() {
+                        let from = UNKNOWNS * (knot + at - first);
+                        let scale = share * weight / frame.weights[sample];
+                        for axis in 0..3 {
+                            slopes[from + axis] += scale * turn[axis];
+                            slopes[from + 3 + axis] += scale * acc[axis];
+                        }
+                    }
+                }
+            }
+            rows.first.push(first);
+            rows.slopes.extend(slopes);
+        }
+        rows
+    }
+}
+
+/// Derivatives of a reading by turn and acceleration, their first and their second derivatives.
+fn changes(channel: &Channel, feel: &Feel) -> [[Vector3<f64>; 2]; 3] {
+    let (a, r, w) = (channel.axis_b, channel.lever_m, feel.rate_b);
+    let none = Vector3::zeros();
+    match channel.sensor {
+        Kind::Gyro => [[a.cross(&w), none], [a, none], [none; 2]],
+        Kind::Accelerometer => {
+            let by_rate_dot = r.cross(&a);
+            let by_rate = w.cross(&r).cross(&a) + r.cross(&a.cross(&w));
+            [
+                [
+                    a.cross(&feel.force_b) + by_rate.cross(&w) + by_rate_dot.cross(&feel.rate_dot_b),
+                    feel.q_nb * a,
+                ],
+                [by_rate + by_rate_dot.cross(&w), none],
+                [by_rate_dot, none],
+            ]
+        }
+        Kind::Magnetometer => [[a.cross(&feel.field_b_ut), none], [none; 2], [none; 2]],
+        Kind::Thermometer => [[none; 2]; 3],
+    }
+}

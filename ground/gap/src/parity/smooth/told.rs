@@ -1,0 +1,146 @@
+//! The smoothed attitude as it is told: a file, a line of text, a plot.
+//!
+//! In: a [`Flight`]. Out: [`Told`]: attitude and its standard deviations at every row of the log, or that the smoother did not settle. Then
+//! there is no file: an attitude that still turns is no result.
+
+use std::fmt::Write;
+
+use chart::{Axis, ChartError, Figure, Layer, Marks, Panel};
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::{
+    input::{case::CaseError, reference::Reference},
+    null::problem::Problem,
+    parity::smooth::{Smoothed, covariances, fit},
+    parity::{
+        codes::{self, Finding},
+        course::Course,
+        flight::Flight,
+        space::Space,
+    },
+};
+
+/// What an attitude is at a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Attitude {
+    /// \[s\] start of the row.
+    pub t_s: f64,
+    /// Body to north-east-down.
+    pub q_nb: UnitQuaternion<f64>,
+    /// \[deg\] one sigma of a turn about each axis of b.
+    pub sigmas_b_deg: Vector3<f64>,
+}
+
+/// The attitude of a flight.
+pub struct Told {
+    /// At every row; none where the smoother did not settle.
+    pub attitudes: Vec<Attitude>,
+    /// \[s\] spans in which the unit was at rest.
+    pub rests: Vec<(f64, f64)>,
+    /// \[rad\] largest turn of each step of the smoother.
+    pub turns: Vec<f64>,
+}
+
+impl Told {
+    /// Of a flight.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn of(flight: &Flight, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+        let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
+        let coded: Vec<Finding> = codes::look(&log, &unit);
+        codes::taken_out(&mut log, &mut unit, &coded);
+        let (course, start) = Course::of(&log, &unit, &flight.environment);
+        let smoothed = Smoothed::of(&log, &unit, &flight.environment, (&course, &start), progress)?;
+        let mut told = Self {
+            attitudes: Vec::new(),
+            rests: smoothed.rests.clone(),
+            turns: smoothed.turns.clone(),
+        };
+        if !smoothed.is_settled() {
+            return Ok(told);
+        }
+        let twin = smoothed.twin(&log, &unit, &flight.environment)?;
+        let (fit, reference) = (fit(&log), Reference::default());
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = smoothed.smoothing(&problem, &course, &start);
+        let space = Space::new(&problem, &motion, Vec::new());
+        let covariances = covariances(&space, &motion, &log.start_s);
+        told.attitudes = (log.start_s.iter().zip(&covariances))
+            .map(|(t_s, covariance)| Attitude {
+                t_s: *t_s,
+                q_nb: smoothed.trajectory.attitude(*t_s),
+                sigmas_b_deg: covariance
+                    .diagonal()
+                    .map(|variance| variance.max(0.0).sqrt().to_degrees()),
+            })
+            .collect();
+        Ok(told)
+    }
+
+    /// `attitude.csv`, if there is one.
+    pub fn csv(&self) -> Option<String> {
+        let mut out = "t_s,qw,qx,qy,qz,sigma_x_deg,sigma_y_deg,sigma_z_deg\n".to_owned();
+        for own in &self.attitudes {
+            let (q, sigma) = (own.q_nb.quaternion(), own.sigmas_b_deg);
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                out,
+                "{:.3},{:.7},{:.7},{:.7},{:.7},{:.4},{:.4},{:.4}",
+                own.t_s, q.w, q.i, q.j, q.k, sigma.x, sigma.y, sigma.z
+            );
+        }
+        (!self.attitudes.is_empty()).then_some(out)
+    }
+
+    /// One line.
+    pub fn line(&self) -> String {
+        let turn_deg = self.turns.last().copied().unwrap_or(f64::NAN).to_degrees();
+        let norms = self.attitudes.iter().map(|own| (own.t_s, own.sigmas_b_deg.norm()));
+        let Some((worst_s, worst)) = norms.clone().max_by(|one, other| one.1.total_cmp(&other.1)) else {
+            return format!(
+                "ATTITUDE  did not settle: step {} still turned it by {turn_deg:.2} deg, so no attitude.csv is written; a reference \
+                 or a rest in the log would help",
+                self.turns.len()
+            );
+        };
+        let mean = (norms.map(|(_, norm)| norm * norm).sum::<f64>() / self.attitudes.len() as f64).sqrt();
+        format!(
+            "ATTITUDE  smoothed over the whole log, in attitude.csv: known to {mean:.2} deg (one sigma, all axes), to {worst:.2} deg \
+             at {worst_s:.0} s; at rest in {} spans; settled in {} steps",
+            self.rests.len(),
+            self.turns.len()
+        )
+    }
+
+    /// Three sigma about each axis of b, and the attitude as angles; none where it did not settle.
+    ///
+    /// # Errors
+    /// When a plot cannot be drawn.
+    pub fn figure(&self) -> Result<Option<Figure>, ChartError> {
+        if self.attitudes.is_empty() {
+            return Ok(None);
+        }
+        let line = |of: &dyn Fn(&Attitude) -> f64| -> Marks {
+            Marks::Line(self.attitudes.iter().map(|own| (own.t_s, of(own))).collect())
+        };
+        let angles = |own: &Attitude| {
+            let (roll, pitch, yaw) = own.q_nb.euler_angles();
+            [roll, pitch, yaw].map(f64::to_degrees)
+        };
+        let panel = |y: &str, layers: Vec<Layer>| Panel {
+            x: Axis::linear("time [s]"),
+            y: Axis::linear(y),
+            layers,
+            ..Panel::default()
+        };
+        let names = ["roll", "pitch", "yaw"];
+        let turned = (0..3).map(|axis| Layer::new(names[axis], axis, line(&|own| angles(own)[axis])));
+        let known = (0..3).map(|axis| Layer::new("", axis, line(&|own| 3.0 * own.sigmas_b_deg[axis])));
+        let panels = [
+            panel("attitude [deg]", turned.collect()),
+            panel("three sigma about x, y, z [deg]", known.collect()),
+        ];
+        Figure::of("Attitude, smoothed over the whole log", 1, &panels).map(Some)
+    }
+}
