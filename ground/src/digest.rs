@@ -107,7 +107,7 @@ impl Digest {
             }
             Item::Reject(reject) => {
                 self.record.summary.reject(reject);
-                Entry::Reject(reject.clone())
+                Entry::Reject(*reject)
             }
         }
     }
