@@ -41,7 +41,7 @@ use crate::{
 };
 
 /// Gauss and Newton's steps at most.
-const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 20;
 
 /// \[rad\] the largest turn of a step after which nothing is left to turn: its square is far below any sigma.
 const SETTLED_RAD: f64 = 3e-3;
