@@ -42,7 +42,7 @@ pub struct Digest {
 }
 
 impl Digest {
-    /// At the start of a stream of a unit with this cycle [s].
+    /// At the start of a stream of a unit with this cycle \[s\].
     pub fn new(bytes_5_to_8: Bytes5To8, cycle_s: f64) -> Self {
         Digest {
             decoder: Decoder::new(bytes_5_to_8),

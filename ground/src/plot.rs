@@ -39,7 +39,7 @@ pub const SENSORS: [(&str, &[Quantity], &[&str]); 4] = [
     ),
 ];
 
-/// The true attitude `q_nb` at a time of the log [s].
+/// The true attitude `q_nb` at a time of the log \[s\].
 pub type Truth<'a> = &'a dyn Fn(f64) -> UnitQuaternion<f64>;
 
 /// All that a page shows of a flight; nothing for one without packets.

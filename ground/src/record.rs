@@ -24,7 +24,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Of a unit with this cycle [s], at a site.
+    /// Of a unit with this cycle \[s\], at a site.
     pub fn new(cycle_s: f64, site: &Site) -> Self {
         Record {
             summary: Summary::default(),
@@ -35,7 +35,7 @@ impl Record {
         }
     }
 
-    /// Takes a packet: its number, how it follows the one before, and the time between them where that was seen [s].
+    /// Takes a packet: its number, how it follows the one before, and the time between them where that was seen \[s\].
     pub fn packet(&mut self, number: u64, step: Step, item: &Item, period_s: Option<f64>) {
         let Item::Packet { reading, .. } = item else { return };
         let missed = match step {

@@ -35,7 +35,7 @@ pub struct Follow {
 }
 
 impl Follow {
-    /// Of a unit with this cycle [ms], at a site.
+    /// Of a unit with this cycle \[ms\], at a site.
     pub fn new(period_ms: u64, site: &Site) -> Self {
         let settings = Settings {
             period_ms,
@@ -107,7 +107,7 @@ impl Follow {
         }
     }
 
-    /// What is known, for a cycle [s].
+    /// What is known, for a cycle \[s\].
     pub fn flight(&self, cycle_s: f64) -> Flight {
         let each = self.estimates.iter().zip(&self.numbers);
         let estimates = each.map(|(estimate, number)| {

@@ -11,16 +11,16 @@ use crate::{
     thin::{self, Point},
 };
 
-/// [px] size of a panel beside others, and of one that has the width for itself.
+/// \[px\] size of a panel beside others, and of one that has the width for itself.
 const SIZES: [(f64, f64); 2] = [(640.0, 300.0), (1080.0, 300.0)];
 
-/// [px] margins: left, right, top, bottom.
+/// \[px\] margins: left, right, top, bottom.
 const MARGINS: [f64; 4] = [74.0, 14.0, 10.0, 46.0];
 
-/// [px] height of a strip, and from one to the next.
+/// \[px\] height of a strip, and from one to the next.
 pub const STRIP_PX: [f64; 2] = [6.0, 8.0];
 
-/// [px] narrowest stretch that is still seen.
+/// \[px\] narrowest stretch that is still seen.
 const LEAST_PX: f64 = 1.5;
 
 /// Where places are on the picture.

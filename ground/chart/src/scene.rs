@@ -18,11 +18,11 @@ pub const MOST: usize = 4_000;
 /// Pictures of instants.
 const INSTANTS: usize = 5;
 
-/// [px] side of a picture, and the length of one unit on it.
+/// \[px\] side of a picture, and the length of one unit on it.
 const SIDE: f64 = 200.0;
 const UNIT: f64 = 70.0;
 
-/// [rad] where the viewer stands: from the first world axis towards the second, and above the plane of both.
+/// \[rad\] where the viewer stands: from the first world axis towards the second, and above the plane of both.
 const AZIMUTH: f64 = 3.6;
 const ELEVATION: f64 = 0.45;
 
@@ -187,7 +187,7 @@ fn turned([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| v[k] + w * t[k] + ut[k])
 }
 
-/// [px] where a point of the world is seen, and how near the viewer it is.
+/// \[px\] where a point of the world is seen, and how near the viewer it is.
 fn seen(point: [f64; 3]) -> ([f64; 2], f64) {
     let (sin_a, cos_a) = AZIMUTH.sin_cos();
     let (sin_e, cos_e) = ELEVATION.sin_cos();

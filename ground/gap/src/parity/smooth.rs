@@ -127,7 +127,7 @@ pub fn fit(log: &Log) -> Fit {
     }
 }
 
-/// Covariance of the attitude at instants \[s\]: of a turn in b [rad2], noise and calibration together.
+/// Covariance of the attitude at instants \[s\]: of a turn in b \[rad2\], noise and calibration together.
 pub fn covariances(space: &Space, motion: &Smoothing, instants_s: &[f64]) -> Vec<Matrix3<f64>> {
     let parts = space.open_parts();
     let mut moved = DMatrix::zeros(parts.nrows(), 3 * instants_s.len());

@@ -1,6 +1,6 @@
 //! Inner products of residual and columns with motion and calibration marginalised.
 //!
-//! In: a problem about the smoothed motion, its eliminated [`Motion`], and columns of what can never be told from either. Out:
+//! In: a problem about the smoothed motion, its motion by an [`Elimination`], and columns of what can never be told from either. Out:
 //! `<u, v> = u'v - (Q'u)'(Q'v) - c_u'c_v` with `c_u = L^-1 <C, u>` and `L L' = I + <C, C>`, `C` being what the calibration of
 //! every channel leaves open and the known nulls. The motion joins the channels, so the calibration is one system of some
 //! four hundred columns.

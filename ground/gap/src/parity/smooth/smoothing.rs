@@ -112,7 +112,7 @@ impl Smoothing {
         solved
     }
 
-    /// Covariance of the turn at an instant [rad2] with the calibration known.
+    /// Covariance of the turn at an instant \[rad2\] with the calibration known.
     pub fn covariance(&self, t_s: f64) -> [[f64; 3]; 3] {
         let (first, own) = self.turn_rows(t_s);
         std::array::from_fn(|one| {
