@@ -203,8 +203,13 @@ fn the_page_holds_every_line_and_what_to_check() {
     let outcome = judge(&run.evidence, PLACE);
     let page = page::html(&outcome, &run.evidence, "EM-1", "the twin").expect("a page");
     assert!(page.contains("What to check on the board") && page.contains("soldered on the other side"));
-    // A picture a panel.
-    assert_eq!(page.matches("<svg").count(), 5);
-    assert!(!page.contains("NaN"));
+    // A picture a panel; the script of the live plots may name what is no number, a picture may not.
+    let pictures: Vec<&str> = page
+        .split("<svg")
+        .skip(1)
+        .filter_map(|rest| rest.split("</svg>").next())
+        .collect();
+    assert_eq!(pictures.len(), 5);
+    assert!(pictures.iter().all(|picture| !picture.contains("NaN")));
     assert_eq!(page::json(&outcome)["good"], false);
 }
