@@ -9,6 +9,7 @@
 pub mod case;
 pub mod gross;
 pub mod hold;
+pub mod level;
 pub mod log;
 pub mod reference;
 pub mod windows;

@@ -4,12 +4,14 @@
 //! motion as it is used, and for each channel and row the standard deviation that the instrument puts into the prediction.
 //!
 //! An optical system resolves microns and microradians, which its rate, differentiated once or twice, turns into more than the
-//! unit's own noise. A hand or a table moves below [`CORNERS_HZ`], so what the octave above them holds is error, and tells how
-//! much there is below: [`BELOW`] times as much for rates, no more than as much for specific forces. It changes within a
-//! second by ten times, with the markers that are seen, so it is taken over [`ALIKE_S`] to either side.
+//! unit's own noise. A hand or a table moves below [`CORNERS_HZ`], so what the octave above them holds is error. It changes within
+//! a second by ten times, with the markers that are seen, so it is taken over [`ALIKE_S`] to either side, at the pace of the record
+//! and not of the log, which may have one row in that time. How much there is below, the log tells ([`super::level`]): at most
+//! [`BELOW`] times as much for rates, no more than as much for specific forces.
 
 use std::rc::Rc;
 
+use crate::input::{level::levels, windows::Fit};
 use twin::{
     motion::Recorded,
     predict::{Accuracy, Kind, Twin},
@@ -18,12 +20,15 @@ use twin::{
 /// \[Hz\] corners to which the record is smoothed, of attitude and position.
 const CORNERS_HZ: [f64; 2] = [20.0, 10.0];
 
-/// Error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated on the
+/// Most of the error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated on the
 /// spot, it is 1.3 to 1.7, for small errors and large ones, and 0.6 to 0.9 for specific forces.
 const BELOW: f64 = 1.6;
 
 /// \[s\] to either side over which an error is as large.
 const ALIKE_S: f64 = 0.15;
+
+/// \[s\] at most from one instant to the next at which that is looked at: the octave holds nothing much faster.
+pub const SPREAD_S: f64 = 0.025;
 
 /// [s^2] how its record answers to motion, as its second derivative: it is filtered, or what it sees bends against the unit,
 /// like a low-pass of 50 Hz or less: `1/(2 pi 50 Hz)^2`. On BROAD's recording 03 it is 1.0e-5 for the first of three rates.
@@ -52,30 +57,38 @@ impl Reference {
         }
     }
 
-    /// Of the twin along the record as it is [`used`] and the one along what is [`finer`]; `dense` are the same two at even
-    /// instants that are as close as the record's.
-    pub fn seen(accuracy: Accuracy, [used, finer]: [&Twin; 2], dense: [&Twin; 2]) -> Self {
-        let channels = 0..used.unit().channels.len();
-        let below = |channel: usize| match used.unit().channels[channel].sensor {
-            Kind::Gyro => BELOW,
-            _ => 1.0,
+    /// Of two twins, along the record as it is [`used`] and along what is [`finer`]: `close` at even instants that are as close as
+    /// the record's, `spread` all along the log, whose rows are those of `twin`.
+    pub fn seen(accuracy: Accuracy, twin: &Twin, fit: &Fit, spread: [&Twin; 2], close: [&Twin; 2]) -> Self {
+        let channels = &twin.unit().channels;
+        let above = |channel: usize| -> Vec<f64> {
+            let octave = octave(channel, spread);
+            let local = Local::of(spread[0].starts_s(), &octave);
+            twin.starts_s().iter().map(|row_s| local.rms(*row_s)).collect()
         };
-        let fast = |channel: usize| -> Vec<f64> {
-            let octave = local_rms(used.starts_s(), &octave(channel, used, finer));
-            octave.into_iter().map(|rms| below(channel) * rms).collect()
-        };
-        let starts_s = dense[0].starts_s();
+        let mut fast: Vec<Vec<f64>> = (0..channels.len()).map(above).collect();
+        for (kind, most) in [
+            (Kind::Gyro, BELOW),
+            (Kind::Accelerometer, 1.0),
+            (Kind::Magnetometer, 1.0),
+        ] {
+            let levels = levels(twin, fit, kind, &|channel, row| fast[channel][row], most);
+            for (channel, level) in levels {
+                fast[channel].iter_mut().for_each(|sigma| *sigma *= level);
+            }
+        }
+        let starts_s = close[0].starts_s();
         let record = |channel: usize| -> Rc<[f64]> {
-            let octave = octave(channel, dense[0], dense[1]);
-            let around = local_rms(starts_s, &octave);
-            let even = octave.iter().zip(around);
-            even.map(|(value, around)| value / around.max(f64::MIN_POSITIVE))
+            let octave = octave(channel, close);
+            let local = Local::of(starts_s, &octave);
+            let even = octave.iter().zip(starts_s);
+            even.map(|(value, start_s)| value / local.rms(*start_s).max(f64::MIN_POSITIVE))
                 .collect()
         };
         Self {
             accuracy,
-            fast: channels.clone().map(fast).collect(),
-            records: channels.map(record).collect(),
+            fast,
+            records: (0..channels.len()).map(record).collect(),
             step_s: starts_s.get(1).map_or(1.0, |second| second - starts_s[0]),
         }
     }
@@ -100,7 +113,7 @@ impl Reference {
 }
 
 /// What the finer record adds to the readings of a channel.
-fn octave(channel: usize, used: &Twin, finer: &Twin) -> Vec<f64> {
+fn octave(channel: usize, [used, finer]: [&Twin; 2]) -> Vec<f64> {
     let (used, finer) = (used.channel(channel, &[]), finer.channel(channel, &[]));
     finer
         .iter()
@@ -119,27 +132,39 @@ pub fn finer(record: &Recorded) -> Recorded {
     record.smoothed(2.0 * CORNERS_HZ[0], 2.0 * CORNERS_HZ[1])
 }
 
-/// Root mean square over [`ALIKE_S`] to either side of each instant, of what is finite there.
-fn local_rms(t_s: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0usize)];
-    for value in values {
-        let (energy, count) = sums[sums.len() - 1];
-        sums.push(if value.is_finite() {
-            (energy + value * value, count + 1)
-        } else {
-            (energy, count)
-        });
+/// A series whose mean square is asked for over [`ALIKE_S`] to either side of an instant, of what is finite there.
+struct Local<'a> {
+    t_s: &'a [f64],
+    /// Energy and number of the samples before each.
+    before: Vec<(f64, usize)>,
+}
+
+impl<'a> Local<'a> {
+    fn of(t_s: &'a [f64], values: &[f64]) -> Self {
+        let mut before = vec![(0.0, 0)];
+        for value in values {
+            let (energy, count) = before[before.len() - 1];
+            before.push(if value.is_finite() {
+                (energy + value * value, count + 1)
+            } else {
+                (energy, count)
+            });
+        }
+        Self { t_s, before }
     }
-    let (mut from, mut to) = (0, 0);
-    let at = |now_s: &f64| {
-        while t_s[from] < now_s - ALIKE_S {
-            from += 1;
-        }
-        while to < t_s.len() && t_s[to] <= now_s + ALIKE_S {
-            to += 1;
-        }
-        let (energy, count) = (sums[to].0 - sums[from].0, sums[to].1 - sums[from].1);
+
+    /// Root mean square; at an instant beyond the series as at its nearest end.
+    fn rms(&self, now_s: f64) -> f64 {
+        let ends = self.t_s.first().zip(self.t_s.last());
+        let now_s = ends.map_or(now_s, |(first, last)| now_s.clamp(*first, *last));
+        let [from, to] = [
+            self.t_s.partition_point(|t_s| *t_s < now_s - ALIKE_S),
+            self.t_s.partition_point(|t_s| *t_s <= now_s + ALIKE_S),
+        ];
+        let (energy, count) = (
+            self.before[to].0 - self.before[from].0,
+            self.before[to].1 - self.before[from].1,
+        );
         (energy.max(0.0) / count.max(1) as f64).sqrt()
-    };
-    t_s.iter().map(at).collect()
+    }
 }

@@ -6,7 +6,9 @@
 //!
 //! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
 //! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
-//! errors are [`crate::input::reference`]'s and make some samples worth less than others.
+//! errors are [`crate::input::reference`]'s and make some samples worth less than others. They are one vector that all sensors of a
+//! kind see, and each channel is fitted by itself: what `n` channels share, each takes for `n` times its energy, so that together
+//! they say no more of it than one.
 
 mod frame;
 
@@ -75,10 +77,17 @@ impl<'a> Problem<'a> {
             let fast = |row: usize| channel.sigma().hypot(instrument.fast_sigma(index, row));
             steady.push(channel.sigma().hypot(slow));
             sigmas.push((0..starts_s.len()).map(|row| fast(row).hypot(slow)).collect());
+            let beside = twin.unit().channels.iter().filter(|own| own.sensor == channel.sensor);
+            let sharing: f64 = beside.map(|own| own.axis_b.dot(&channel.axis_b).powi(2)).sum();
+            let shared = |row: usize| {
+                channel
+                    .sigma()
+                    .hypot(sharing.sqrt() * instrument.fast_sigma(index, row))
+            };
             let rows = series
                 .rows
                 .iter()
-                .map(|row| fast(*row as usize).hypot(slow * alike.sqrt()));
+                .map(|row| shared(*row as usize).hypot(slow * alike.sqrt()));
             let weights = DVector::from_iterator(series.rows.len(), rows);
             frames.push(Frame {
                 quiet_energy: 0.0,

@@ -18,7 +18,7 @@ use crate::input::{
     gross::{Gross, put_right},
     hold::Held,
     log::{Column, Log, Masked, Stream},
-    reference::{Reference, finer, used},
+    reference::{self, Reference, SPREAD_S, finer},
     windows::{Fit, Span},
 };
 
@@ -133,14 +133,18 @@ impl Subject {
         let (twin, reference) = if is_exact {
             (along(&record, &start_s)?, Reference::stated(stated))
         } else {
-            let (used, finer) = (used(&record), finer(&record));
-            let even: Vec<f64> = (0..MOST_ROWS)
-                .map(|row| from_s + row as f64 * step_s)
-                .filter(|t_s| *t_s < to_s)
-                .collect();
+            let used = reference::used(&record);
+            let even = |step_s: f64, most: usize| -> Vec<f64> {
+                let instants = (0..most).map(|row| from_s + row as f64 * step_s);
+                instants.take_while(|t_s| *t_s < to_s).collect()
+            };
             let twin = along(&used, &start_s)?;
-            let dense = [along(&used, &even)?, along(&finer, &even)?];
-            let reference = Reference::seen(stated, [&twin, &along(&finer, &start_s)?], [&dense[0], &dense[1]]);
+            let close = even(step_s, MOST_ROWS);
+            let spread = even(step_s.max(SPREAD_S), usize::MAX);
+            let finer = finer(&record);
+            let [spread, close] = [spread, close].map(|t_s| [along(&used, &t_s), along(&finer, &t_s)]);
+            let [[own, more], [close, closer]] = [spread, close];
+            let reference = Reference::seen(stated, &twin, &fit, [&own?, &more?], [&close?, &closer?]);
             (twin, reference)
         };
         Ok(Subject {
