@@ -85,10 +85,18 @@ pub enum FlyError {
 /// See [`FlyError`].
 pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
     let landed = fly_until(arguments, &Interrupt::listen()?)?;
+    let page = landed.folder.join("index.html");
+    if arguments.json {
+        let rows: serde_json::Map<_, _> = (landed.rows.into_iter())
+            .map(|(name, value)| (name.to_owned(), value.into()))
+            .collect();
+        println!("{}", serde_json::json!({ "summary": rows, "page": page }));
+        return Ok(());
+    }
     if !arguments.quiet {
         print!("{}", folder::text_of(&landed.rows));
     }
-    println!("{}", landed.folder.join("index.html").display());
+    println!("{}", page.display());
     Ok(())
 }
 
@@ -131,7 +139,11 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
     let name = format!("{}-{}", source.name, arguments.seed);
     let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
     let is_paced = arguments.real_time || arguments.console;
-    let progress = Progress::start(duration, is_paced, arguments.console || arguments.quiet);
+    let progress = Progress::start(
+        duration,
+        is_paced,
+        arguments.console || arguments.quiet || arguments.json,
+    );
     let quality = Quality {
         flight: arguments.flight.into(),
         ..Quality::NOMINAL

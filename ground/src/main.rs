@@ -81,7 +81,8 @@ fn prints_what_was_asked_for(command: &Command) -> bool {
         // A flight has its own word for it.
         Command::Fly(_) | Command::Sources | Command::Sbom(_) | Command::Xtce(_) | Command::Completions(_) => true,
         Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
-        Command::Recover(arguments) => arguments.table.is_none(),
+        Command::Recover(arguments) => arguments.table.is_none() || arguments.json,
+        Command::Size(arguments) => arguments.json,
         Command::Design(arguments) => arguments.prints_the_plan(),
         Command::Calibrate(arguments) => arguments.json(),
         Command::Calibration(arguments) => arguments.json(),

@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Prints each of these places
     #[arg(long)]
     places: bool,
+    /// Print all of it as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Why an image is refused.
@@ -85,31 +88,34 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
     let path = &arguments.image;
     let bytes = std::fs::read(path).map_err(|error| SizeError::Read(path.clone(), error))?;
     let Sizes { text, data, bss } = sizes(&bytes).map_err(|error| SizeError::Parse(path.clone(), error))?;
-    println!(
-        "text {text}, data {data}, bss {bss}: flash {}, RAM {}",
-        text + data,
-        data + bss
-    );
     let places = places(&bytes, path)?;
-    println!(
-        "places that may panic {}: {}",
-        places.len(),
-        counted(places.iter().map(|place| place.why.as_str()))
-    );
-    println!(
-        "  by file: {}",
-        counted(places.iter().map(|place| place.origin.file.as_str()))
-    );
     let by_data: Vec<_> = places.iter().filter(|place| place.is_reachable_from_data()).collect();
-    println!(
-        "  reachable from data {}: {}",
-        by_data.len(),
-        counted(by_data.iter().map(|place| place.why.as_str()))
-    );
-    if arguments.places {
-        places
-            .iter()
-            .for_each(|place| println!("  {}: {}", place.origin, place.why));
+    let by_why = counted(places.iter().map(|place| place.why.as_str()));
+    let by_file = counted(places.iter().map(|place| place.origin.file.as_str()));
+    let by_data_why = counted(by_data.iter().map(|place| place.why.as_str()));
+    let (flash, ram) = (text + data, data + bss);
+    if arguments.json {
+        let object = |counts: Vec<(&str, u32)>| -> serde_json::Map<_, _> {
+            let pairs = counts.into_iter().map(|(name, count)| (name.to_owned(), count.into()));
+            pairs.collect()
+        };
+        let sizes = serde_json::json!({
+            "text": text, "data": data, "bss": bss, "flash": flash, "ram": ram,
+            "may_panic": places.len(), "by_why": object(by_why), "by_file": object(by_file),
+            "reachable_from_data": by_data.len(), "reachable_by_why": object(by_data_why),
+            "places": places.iter().map(|place| format!("{}: {}", place.origin, place.why)).collect::<Vec<_>>(),
+        });
+        println!("{sizes}");
+    } else {
+        println!("text {text}, data {data}, bss {bss}: flash {flash}, RAM {ram}");
+        println!("places that may panic {}: {}", places.len(), listed(&by_why));
+        println!("  by file: {}", listed(&by_file));
+        println!("  reachable from data {}: {}", by_data.len(), listed(&by_data_why));
+        if arguments.places {
+            places
+                .iter()
+                .for_each(|place| println!("  {}: {}", place.origin, place.why));
+        }
     }
     below("flash", text + data, arguments.flash_ceiling)?;
     below("static RAM", data + bss, arguments.ram_ceiling)?;
@@ -163,15 +169,16 @@ fn places(image: &[u8], path: &Path) -> Result<Vec<Place>, SizeError> {
 }
 
 /// How often each name comes, most first.
-fn counted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+fn counted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(&'a str, u32)> {
     let mut counts = BTreeMap::new();
     names.for_each(|name| *counts.entry(name).or_insert(0_u32) += 1);
     let mut counts: Vec<_> = counts.into_iter().collect();
     counts.sort_by_key(|(_, count)| Reverse(*count));
-    let counts: Vec<_> = counts
-        .into_iter()
-        .map(|(name, count)| format!("{count} {name}"))
-        .collect();
+    counts
+}
+
+fn listed(counts: &[(&str, u32)]) -> String {
+    let counts: Vec<_> = counts.iter().map(|(name, count)| format!("{count} {name}")).collect();
     counts.join(", ")
 }
 

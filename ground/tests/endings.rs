@@ -106,3 +106,38 @@ fn it_says_its_commit_its_codes_and_its_words() {
     assert!(quiet.status.success() && quiet.stdout.is_empty());
     assert!(place.path().join("ground-calibrate-ellipsoid.1").exists());
 }
+
+#[test]
+fn fly_size_and_recover_speak_json() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| place.path().join(name).display().to_string();
+    let json = |words: &[&str]| -> serde_json::Value {
+        let output = run(words);
+        assert!(output.status.success(), "{words:?}: {}", said(&output));
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{words:?}: {error}"))
+    };
+    let flown = json(&[
+        "fly",
+        "--host",
+        "--motion",
+        "still",
+        "--duration",
+        "5s",
+        "--out",
+        &path("flights"),
+        "--json",
+    ]);
+    assert!(
+        flown["summary"].as_object().is_some_and(|rows| rows.len() > 5),
+        "{flown}"
+    );
+    assert!(std::path::Path::new(flown["page"].as_str().expect("a page")).is_file());
+    let size = json(&["size", env!("CARGO_BIN_EXE_ground"), "--json"]);
+    assert_eq!(
+        size["flash"].as_u64().expect("flash"),
+        size["text"].as_u64().unwrap_or(0) + size["data"].as_u64().unwrap_or(0)
+    );
+    let refused = run(&["recover", "nowhere.bin", "--json"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("--table"));
+}

@@ -45,6 +45,35 @@ fn flown(out: &Path, words: &str) -> PathBuf {
     landed.folder
 }
 
+/// A set with a magnetometer on it, of a flight that turned every way.
+fn calibrated(flight: &Path, set: &Path) {
+    #[derive(Parser)]
+    struct Words {
+        #[command(flatten)]
+        arguments: bench::calibrate::Arguments,
+    }
+    let (log, unit) = (flight.join("packets.txt"), flight.join("unit.toml"));
+    let words = [
+        "calibrate",
+        "ellipsoid",
+        &log.display().to_string(),
+        "--channels=m1x,m1y,m1z",
+        // Norm of the laboratory's field.
+        "--strength=23.2uT",
+        "--unit",
+        &unit.display().to_string(),
+        "--set",
+        &set.display().to_string(),
+        "--even-if-not-good",
+    ]
+    .map(str::to_owned);
+    let words = Words::try_parse_from(words).unwrap_or_else(|error| panic!("{error}"));
+    match bench::calibrate::run(&words.arguments) {
+        Ok(()) | Err(bench::calibrate::CalibrateError::NotGood) => {}
+        Err(error) => panic!("{error}"),
+    }
+}
+
 fn diagnosed(case: &Path) -> (Subject, Diagnosis) {
     let subject = Subject::open(case).unwrap_or_else(|error| panic!("{error}"));
     let diagnosis = diagnose(&subject, &[], &|_, _| ());
@@ -230,6 +259,25 @@ fn a_real_log_and_its_reference_become_a_case_on_one_clock() {
     assert!(!diagnosis.is_unexplained(), "{}", diagnosis.none_of_these);
     let whole = checked(&case);
     assert!(whole.is_whole && !whole.text.contains("look"), "{}", whole.text);
+
+    // With what `calibrate` says of a magnetometer, the case has its parameters and how well they are known.
+    let set = place.path().join("set.toml");
+    calibrated(&flight, &set);
+    let with_set = place.path().join("with-set");
+    let said =
+        made(&arguments(&with_set, &["--set", &set.display().to_string()])).unwrap_or_else(|error| panic!("{error}"));
+    assert!(said.contains("3 channels and their sigmas"), "{said}");
+    let [before, after] = [&case, &with_set].map(|folder| {
+        let unit = UnitDescription::open(&folder.join("unit.toml")).expect("a description");
+        unit.channels[unit.channel("m1x").expect("a channel")].clone()
+    });
+    assert!(
+        after.bias_sigma < before.bias_sigma && after.bias_sigma > 0.0,
+        "{after:?}"
+    );
+    assert!((after.lsb / before.lsb - 1.0).abs() < 0.05 && after.lsb != before.lsb);
+    let (_, diagnosis) = diagnosed(&with_set);
+    assert!(diagnosis.causes.is_empty() && diagnosis.gap < 1.2, "{}", diagnosis.gap);
 
     // A clock that is off is said to be.
     let off = place.path().join("off");

@@ -93,6 +93,9 @@ pub enum AllanError {
     /// The table cannot be read.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// It was done, and the verdict says what is wrong.
+    #[error("not good; what is wrong stands above")]
+    NotGood,
     /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] chart::ChartError),
@@ -109,7 +112,8 @@ pub enum AllanError {
 /// Analyses a file.
 ///
 /// # Errors
-/// When it cannot be read, or the report not written.
+/// When it cannot be read, or the report not written; and when a record is not good, so that a script does not take its
+/// coefficients for noise.
 pub fn run(arguments: &Arguments) -> Result<(), AllanError> {
     let table = Table::open(&arguments.file)?;
     let selection = Selection {
@@ -140,13 +144,22 @@ pub fn run(arguments: &Arguments) -> Result<(), AllanError> {
             .map(|analysis| json(analysis, &arguments.unit))
             .collect();
         println!("{}", serde_json::json!({ "records": records, "page": page }));
-        return Ok(());
+    } else {
+        for analysis in &analyses {
+            print(analysis, &arguments.unit);
+        }
+        println!("{}", page.display());
     }
-    for analysis in &analyses {
-        print(analysis, &arguments.unit);
+    if analyses.iter().all(is_good) {
+        Ok(())
+    } else {
+        Err(AllanError::NotGood)
     }
-    println!("{}", page.display());
-    Ok(())
+}
+
+/// Whether the verdict finds nothing wrong.
+fn is_good(analysis: &Analysis) -> bool {
+    !report::verdict(analysis).iter().any(|line| line.starts_with("wrong"))
 }
 
 fn json(analysis: &Analysis, unit: &str) -> serde_json::Value {
@@ -155,7 +168,7 @@ fn json(analysis: &Analysis, unit: &str) -> serde_json::Value {
         "name": analysis.name,
         "samples": analysis.used,
         "step_s": analysis.step_s,
-        "good": !said.iter().any(|line| line.starts_with("wrong")),
+        "good": is_good(analysis),
         "said": said,
         "coefficients": report::coefficients(analysis, unit).into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     })

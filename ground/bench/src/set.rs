@@ -4,8 +4,8 @@
 //! temperatures, part identities, and the SHA-256 of every file it came from. Out of calibrations, merged by channel; in
 //! for [`diff`], for the twin's [`mod@unit`] and, in single precision, for the unit itself ([`image`]).
 //!
-//! Refused: another format, a covariance that is not square or not positive, an axis without length, two channels with
-//! one name.
+//! Refused: another format, a key that there is not (with the nearest that there is), a covariance that is not square or not
+//! positive, an axis without length, two channels with one name.
 
 pub mod diff;
 pub mod image;
@@ -17,6 +17,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use twin::keys::meant;
 
 use crate::{controlled::Calibration, ellipsoid::Ellipsoid, experiment::Kind};
 
@@ -25,6 +26,7 @@ pub const FORMAT: &str = "calibration-set/1";
 
 /// A calibration set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Set {
     /// [`FORMAT`].
     pub format: String,
@@ -46,6 +48,7 @@ pub struct Set {
 
 /// A file the set came from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Source {
     /// Its name, without folders.
     pub file: String,
@@ -55,6 +58,7 @@ pub struct Source {
 
 /// A channel of a set: `counts = (1 + scale_per_k.. ) sensitivity_b . x + bias_counts..`, `x` in SI (field in uT).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Entry {
     /// Its name.
     pub name: String,
@@ -126,7 +130,7 @@ impl Set {
     /// # Errors
     /// When it is no set, or means nothing.
     pub fn parse(text: &str) -> Result<Self, SetError> {
-        let set: Set = toml::from_str(text).map_err(|error| SetError::Syntax(error.to_string()))?;
+        let set: Set = toml::from_str(text).map_err(|error| SetError::Syntax(meant(&error.to_string())))?;
         if set.format != FORMAT {
             return Err(SetError::Format(set.format));
         }

@@ -5,6 +5,7 @@ mod seeds;
 use std::path::Path;
 
 use bench::{
+    allan::{self, AllanError},
     calibrate::{self, CalibrateError},
     calibration,
     design::command as design,
@@ -219,4 +220,27 @@ fn every_hold_of_a_recorded_log_is_found_once_and_no_movement_is_taken_for_one()
         }
     }
     assert_eq!(holds, 39, "26 positions, and those after the rolling");
+}
+
+#[test]
+fn a_record_that_moves_is_not_good_and_one_at_rest_is() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    // A fixed sequence that looks like noise: fractions of the multiples of the golden ratio, three to a sample.
+    let noise = |k: usize| -> f64 {
+        let fraction = |n: usize| (n as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        fraction(7 * k + 1) + fraction(13 * k * k + 5) + fraction(31 * k * k * k % 99_991)
+    };
+    let table = |name: &str, also: &dyn Fn(f64) -> f64| {
+        let rows: String = (0..2000)
+            .map(|k| format!("{}\n", noise(k) + also(0.2 * k as f64)))
+            .collect();
+        write(place.path(), name, format!("g1\n{rows}").as_bytes())
+    };
+    let out = place.path().join("report").display().to_string();
+    let run = |file: &str| allan::run(&parse(&format!("{file} --rate-hz 5 --out {out}")));
+    assert!(run(&table("rest.csv", &|_| 0.0)).is_ok());
+    let moves = table("moves.csv", &|t_s| 10.0 * (t_s / 3.0).sin());
+    assert!(matches!(run(&moves), Err(AllanError::NotGood)));
+    let page = std::fs::read_to_string(place.path().join("report/index.html")).expect("a page all the same");
+    assert!(page.contains("the record moves") && page.contains("(sample "));
 }

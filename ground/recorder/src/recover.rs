@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Write the table to FILE instead of standard output; Parquet if it ends in .parquet
     #[arg(long, alias = "out", value_name = "FILE")]
     pub table: Option<PathBuf>,
+    /// Print boots, changes of mode, gaps and damage on standard output as JSON instead; needs --table
+    #[arg(long, requires = "table")]
+    pub json: bool,
 }
 
 /// Why nothing was recovered.
@@ -101,8 +104,66 @@ pub fn run(arguments: &Arguments) -> Result<(), RecoverError> {
         Some(out) => output::replace(out, |file| write_rows(&log, arguments, file))?,
         None => write_rows(&log, arguments, &mut BufWriter::new(io::stdout().lock()))?,
     }
-    write_remarks(&log, arguments.all_epochs, &mut BufWriter::new(io::stderr().lock()))?;
+    if arguments.json {
+        // Through a writer, so that a closed pipe is an error and no panic.
+        writeln!(io::stdout().lock(), "{}", json(&log, arguments.all_epochs))?;
+    } else {
+        write_remarks(&log, arguments.all_epochs, &mut BufWriter::new(io::stderr().lock()))?;
+    }
     Ok(())
+}
+
+/// What [`write_remarks`] says, for programs. Nothing is cut short.
+fn json(log: &Log, all_epochs: bool) -> serde_json::Value {
+    let written = log.packets_of(all_epochs).count();
+    let boots = log.headers.iter().map(|(key, header)| {
+        serde_json::json!({
+            "epoch": key.epoch,
+            "boot": key.boot,
+            "unit": header.unit.as_str(),
+            "firmware": header.firmware.as_str(),
+            "calibration": header.calibration.as_str(),
+            "period_us": header.period_us,
+            "opened_us": header.opened_us,
+            "started": header.start.as_ref().map(started),
+        })
+    });
+    let changes = log.changes.iter().map(|(key, change)| {
+        serde_json::json!({
+            "epoch": key.epoch,
+            "boot": key.boot,
+            "at_us": change.at_us,
+            "mode": change.mode.name(),
+            "by": change.cause.name(),
+        })
+    });
+    let gaps = log.gaps().into_iter().map(|gap| {
+        let first = gap.first;
+        serde_json::json!({
+            "epoch": first.epoch, "boot": first.boot, "first": first.seq, "last": gap.last, "after_us": gap.after_us,
+        })
+    });
+    let twice = log
+        .damage
+        .conflicts
+        .iter()
+        .map(|key| serde_json::json!([key.epoch, key.boot, key.seq]));
+    let damage = &log.damage;
+    serde_json::json!({
+        "records": written,
+        "left_out": log.packets.len() - written,
+        "boots": boots.collect::<Vec<_>>(),
+        "changes": changes.collect::<Vec<_>>(),
+        "gaps": gaps.collect::<Vec<_>>(),
+        "damage": {
+            "pages_used": damage.used,
+            "bits_corrected": damage.corrected,
+            "halves_lost": damage.lost,
+            "pages_astray": damage.astray,
+            "twice_with_other_content": twice.collect::<Vec<_>>(),
+            "newer_formats": damage.newer.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        },
+    })
 }
 
 /// The file, unless it is too large to be a log; nothing of such a file is read.
@@ -301,6 +362,13 @@ mod tests {
                        after 90.500 s";
         assert!(remarks.contains(started), "{remarks}");
         assert!(remarks.contains("mode FLIGHT at 2.000 s by lift-off"), "{remarks}");
+        let json = json(&log, false);
+        assert_eq!(json["boots"][0]["started"], started);
+        assert_eq!(json["changes"][0]["mode"], "FLIGHT");
+        assert_eq!(
+            (&json["changes"][0]["at_us"], &json["records"]),
+            (&2_000_000.into(), &0.into())
+        );
     }
 
     #[test]
@@ -331,6 +399,7 @@ mod tests {
                 counts: true,
                 all_epochs: false,
                 table: Some(out.clone()),
+                json: false,
             };
             run(&arguments).expect_err(name).to_string()
         };
@@ -368,6 +437,7 @@ mod tests {
             counts: true,
             all_epochs: false,
             table: None,
+            json: false,
         };
         write_rows(&Log::default(), &arguments, &mut rows).expect("written");
         write_remarks(&Log::default(), false, &mut remarks).expect("written");

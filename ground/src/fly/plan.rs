@@ -94,6 +94,9 @@ pub struct Arguments {
     /// Say nothing but where the page is
     #[arg(long)]
     pub quiet: bool,
+    /// Print the summary and where the page is as JSON
+    #[arg(long)]
+    pub json: bool,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
     pub site: site::Arguments,

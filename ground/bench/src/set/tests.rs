@@ -53,6 +53,9 @@ fn what_means_nothing_is_refused() {
         ("[0.01, 0.0,", "[-0.01, 0.0,", "symmetric and positive"),
         ("-12.5", "nan", "no number"),
         ("freedom = 18", "freedom = -1", "invalid"),
+        ("bias_counts = ", "bias_count = ", "is bias_counts meant?"),
+        ("number = ", "numbr = ", "is number meant?"),
+        ("sha256 = ", "sha265 = ", "is sha256 meant?"),
     ] {
         let broken = text.replacen(from, to, 1);
         assert_ne!(broken, text, "{from}");

@@ -162,7 +162,8 @@ fn check_of(slot: usize, why: &str, all_dead: bool, plate_dead: bool) -> String 
             "no I2C part of plate {number} answers: its channel SC{plate} and SD{plate} of the multiplexer, its cable, its 3.3 V"
         );
     }
-    let missing = why.contains("NoAcknowledge");
+    // As the chip's own driver says it, and as embedded-hal does.
+    let missing = why.contains("Nack") || why.contains("NoAcknowledge");
     let identity = why.contains("not this part");
     match slot / 4 {
         1 if missing => {
