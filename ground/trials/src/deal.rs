@@ -319,7 +319,22 @@ mod tests {
     }
 
     #[test]
-    fn every_disturbance_disturbs_what_it_says_it_touches() {
+    fn every_effect_disturbs_what_it_says_it_touches() {
+        let named = disturbance::named();
+        let (one, other) = named.split_at(named.len() / 2);
+        // Minutes of one core: side by side.
+        std::thread::scope(|scope| {
+            scope.spawn(|| disturb(one));
+            disturb(other);
+        });
+    }
+
+    #[test]
+    fn everything_novel_disturbs_what_it_says_it_touches() {
+        disturb(&novel::ALL);
+    }
+
+    fn disturb(disturbances: &[Disturbance]) {
         /// \[s\] long enough for what happens once to have happened.
         const LONG_S: f64 = 250.0;
         let site = Environment::laboratory();
@@ -346,7 +361,7 @@ mod tests {
             sensitivity::marginal_snr([[&flown, &quiet]; 2], &instants, LONG_S, random)
         };
         assert!(snr(&quiet, false) < 1e-6);
-        for disturbance in [disturbance::named(), novel::ALL.to_vec()].concat() {
+        for disturbance in disturbances.iter().copied() {
             let flown = fly(Some(disturbance));
             let snr = snr(&flown, disturbance.random);
             // A fiftieth of a gyro's noise is lost in four minutes: what is counted of it is mostly the rounding of codes.
