@@ -251,6 +251,11 @@ pub fn memory(evidence: &Evidence) -> Vec<Finding> {
         trouble.is_none() && last.capacity.is_some_and(|pages| pages > 0),
         bus,
     )];
+    // By how much a count has grown since the test began.
+    let grown = |of: fn(&Status) -> Option<u32>| {
+        let (after, before) = of(last).zip(of(first))?;
+        Some(after.saturating_sub(before))
+    };
     let bad = last.bad_blocks;
     found.push(finding(
         "recorder",
@@ -260,10 +265,7 @@ pub fn memory(evidence: &Evidence) -> Vec<Finding> {
         bad.is_some_and(|bad| bad <= limits::BAD_BLOCKS),
         "a worn or a counterfeit chip: replace it; many at once are an address or data line",
     ));
-    let written = last
-        .used
-        .zip(first.used)
-        .map(|(after, before)| after.saturating_sub(before));
+    let written = grown(|status| status.used);
     found.push(finding(
         "recorder",
         "written",
@@ -288,10 +290,7 @@ pub fn memory(evidence: &Evidence) -> Vec<Finding> {
         read >= 25 && breaks == 0 && unreadable == 0,
         bus,
     ));
-    let halves = last
-        .lost_halves
-        .zip(first.lost_halves)
-        .map(|(after, before)| after.saturating_sub(before));
+    let halves = grown(|status| status.lost_halves);
     found.push(finding(
         "recorder",
         "halves of pages lost",
@@ -300,10 +299,7 @@ pub fn memory(evidence: &Evidence) -> Vec<Finding> {
         halves == Some(0),
         "data lines and supply of the NAND; then the chip",
     ));
-    let corrected = last
-        .corrected
-        .zip(first.corrected)
-        .map(|(after, before)| after.saturating_sub(before));
+    let corrected = grown(|status| status.corrected);
     found.push(finding(
         "recorder",
         "bits corrected",
