@@ -16,5 +16,6 @@ pub mod joint;
 pub mod misfit;
 pub mod model;
 pub mod normal;
+pub mod point;
 pub mod problem;
 pub mod whitening;

@@ -1,9 +1,9 @@
 //! How far a name is believed: from the odds of its evidence to a probability.
 //!
 //! In: causes with the probability that their evidence gives them among their rivals, and what they leave. Out: the same
-//! causes, believed less where something the library does not have could be like them. Five things speak for that: what
+//! causes, believed less where something the library does not have could be like them. Six things speak for that: what
 //! is left over in a cause's own channels, few nats, a size far below the strongest cause's, blocks that do not confirm it when they are
-//! left out, and another strength on the held-out windows than on the fitted ones.
+//! left out, another strength on the held-out windows than on the fitted ones, and that the point of a reference may be off by as much.
 //!
 //! What is left over speaks against a name by its significance, not by whether it matters: a stand-in that explains a part `r^2` of the
 //! energy of what is really there leaves `1 - r^2` of it, however small that is. So the probability that there is something else is
@@ -19,7 +19,7 @@ use crate::{
     },
     input::hold::Held,
     library::hypotheses::Library,
-    null::{model::Model, problem::Problem},
+    null::{model::Model, point, problem::Problem},
     probability::cause::Cause,
     search::explanation::Explanation,
     thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
@@ -69,7 +69,7 @@ impl<'a> Belief<'a> {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         for cause in causes {
             let trust = self.trust(Some(cause.effect), &cause.channels, explained(cause));
-            let is_no_chance = 1.0 / (1.0 + ((DOUBTED - cause.gain) / DOUBT_STEP).exp());
+            let is_no_chance = above_doubt(cause.gain);
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
             } else {
@@ -78,6 +78,23 @@ impl<'a> Belief<'a> {
             cause.probability *= trust * is_no_chance * is_no_remainder;
         }
     }
+}
+
+/// Believes causes less, which are the model's effects in their order, that may be an error of the point whose position the reference
+/// tells.
+pub fn beyond_reference(problem: &Problem, model: &Model, causes: &mut [Cause]) {
+    if causes.len() != model.components.len() {
+        // They were withdrawn.
+        return;
+    }
+    for (index, cause) in causes.iter_mut().enumerate() {
+        cause.probability *= above_doubt(point::beyond(problem, &model.components, index));
+    }
+}
+
+/// How far so many nats are no chance.
+fn above_doubt(nats: f64) -> f64 {
+    1.0 / (1.0 + ((DOUBTED - nats) / DOUBT_STEP).exp())
 }
 
 /// What cross-validation says of the model's effects; the causes, which are those in their order, are believed no more.

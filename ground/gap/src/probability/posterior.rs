@@ -14,7 +14,7 @@ use crate::{
     probability::{
         cause::{Cause, cause_of_scatter, causes_of},
         contribution,
-        doubt::{Belief, Promised, promises, second_keys},
+        doubt::{Belief, Promised, beyond_reference, promises, second_keys},
     },
     search::{explanation::Explanation, odds::alternatives},
     thresholds::{NOISE_TAILS, SAID},
@@ -50,6 +50,7 @@ impl Believed {
     ) -> Self {
         let mut causes = causes_of(problem, library, &explanation.found);
         contribution::settle(problem, library, &explanation.found, &mut causes);
+        beyond_reference(problem, &explanation.model, &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
         let loud = loud(problem, explanation, floor);
