@@ -41,7 +41,10 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
     let problem = Problem::new(&twin, &fit, &reference);
     let motion = smoothed.smoothing(&problem, &course, &start);
     let space = Space::new(&problem, &motion, Vec::new());
-    let residual = space.project_residual(problem.residuals(&[]).into_iter().enumerate().collect());
+    let residual = space.project_residual(
+        problem.residuals(&[]).into_iter().enumerate().collect(),
+        &motion.prior(),
+    );
     let kept = space.kept(&residual);
     let (energy, free) = kept.iter().fold((0.0, 0.0), |(e, f), own| (e + own.0, f + own.1));
     let kinds = [
@@ -94,8 +97,9 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         }
     }
     Ok(format!(
-        "turns {:.4?} rests {:?} gap {:.4} [{}] error {:.3} deg, worst {:.3}, said {:.3}, NEES {:.2}; {stepped:.1} s, {:.1} s in all",
+        "turns {:.4?} settled {} rests {:?} gap {:.4} [{}] error {:.3} deg, worst {:.3}, said {:.3}, NEES {:.2}; {stepped:.1} s, {:.1} s in all",
         smoothed.turns,
+        smoothed.is_settled(),
         smoothed
             .rests
             .iter()

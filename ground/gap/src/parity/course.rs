@@ -70,8 +70,6 @@ pub struct Start {
     pub span_s: (f64, f64),
     /// \[s\] distance of its knots.
     pub knot_s: f64,
-    /// [m/s2] specific force in n.
-    pub forces_n: Spline<3>,
     /// [m/s2] row by row, how far the acceleration may be off nothing.
     pub acc_sigmas: Vec<f64>,
     rates: Spline<3>,
@@ -88,6 +86,21 @@ impl Start {
     /// [rad/s2] its derivative.
     pub fn rate_dot(&self, t_s: f64) -> Vector3<f64> {
         self.rates.derivative(t_s, 1) + self.towards.derivative(t_s, 1)
+    }
+}
+
+#[cfg(test)]
+impl Start {
+    /// A unit that may do what it likes, in rows that many.
+    pub fn at_will(span_s: (f64, f64), knot_s: f64, rows: usize) -> Self {
+        let none = || Spline::fit(span_s, knot_s, 1.0, std::iter::empty());
+        Self {
+            span_s,
+            knot_s,
+            acc_sigmas: vec![1.0; rows],
+            rates: none(),
+            towards: none(),
+        }
     }
 }
 
@@ -180,7 +193,6 @@ impl Course {
             towards: turned.towards(span_s),
             acc_sigmas: goes_nowhere(&forces_n, &log.start_s, environment.gravity),
             rates,
-            forces_n,
         };
         (course, start)
     }

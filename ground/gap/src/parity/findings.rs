@@ -9,6 +9,7 @@
 //!
 //! Refuses a unit whose sensors are no more than what a motion has: one plate. Then parity is empty.
 
+use nalgebra::DVector;
 use statrs::function::erf::erfc;
 use twin::{
     effect::{Parameter, by_name},
@@ -183,7 +184,7 @@ fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
 }
 
 fn projected(space: &Space, column: Entries) -> Projected {
-    space.project_residual(column)
+    space.project_residual(column, &DVector::zeros(0))
 }
 
 fn components(library: &Library, said: &[&Chosen]) -> Vec<Component> {

@@ -11,6 +11,10 @@
 //! | 4 | [`smoothing`], [`banded`] | the normal matrix of the motion, its factor, its covariance |
 //! | 5 | this one | Gauss and Newton's steps with the calibration beside, until no attitude turns any more |
 //!
+//! A step that does not make the energy of residuals and prior smaller is halved. Within [`LINEAR_RAD`] one factor serves several
+//! steps (the chord method: Ortega and Rheinboldt 1970, 7.1). It has settled where the last step turned nothing by more than
+//! [`SETTLED_RAD`] and made that energy smaller by no more than its standard deviation `sqrt(2 n)`; where it has not, it says so.
+//!
 //! Known of the motion: the field in n, gravity, and how lively it is ([`crate::parity::course`]). Where the unit
 //! goes is not known, but that it does not accelerate for long: field, gravity and gyros together give the attitude.
 //!
@@ -24,16 +28,17 @@ pub mod smoothing;
 pub mod told;
 pub mod trajectory;
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 use twin::{
     environment::Environment,
-    predict::{Twin, UnitDescription},
+    predict::{Memory, Twin, UnitDescription},
 };
 
 use crate::{
     input::{case::CaseError, log::Log, reference::Reference, windows::Fit},
+    library::products::Entries,
     null::problem::Problem,
-    parity::smooth::{basis::Knots, rows::UNKNOWNS, smoothing::Smoothing, trajectory::Trajectory},
+    parity::smooth::{basis::Knots, rows::UNKNOWNS, rows::past_s, smoothing::Smoothing, trajectory::Trajectory},
     parity::{
         course::{Course, Start},
         space::Space,
@@ -41,16 +46,44 @@ use crate::{
 };
 
 /// Gauss and Newton's steps at most.
-const MOST_STEPS: usize = 20;
+const MOST_STEPS: usize = 40;
 
-/// \[rad\] the largest turn of a step after which nothing is left to turn: its square is far below any sigma.
-const SETTLED_RAD: f64 = 3e-3;
+/// \[rad\] that steps may turn the attitude together before everything is made linear again: what columns are off by within
+/// it moves nothing by more than a tenth of what the step itself did.
+const LINEAR_RAD: f64 = 0.1;
+
+/// \[rad\] the largest turn of a step after which nothing is left to turn: a fifth of the smallest sigma that was seen.
+const SETTLED_RAD: f64 = 1e-3;
+
+/// \[rad\] of one step: beyond it the columns that asked for it no longer hold.
+const LONGEST_RAD: f64 = 0.5;
+
+/// Part of a step below which none is taken: where a twentieth of it makes nothing better, it leads nowhere.
+const LEAST_PART: f64 = 0.05;
 
 /// [m/s2] how still a unit stands that rests.
 const STILL: f64 = 0.003;
 
 /// Knots a packet: two instants of field and force, and gyros between.
 const KNOTS_A_ROW: f64 = 2.0;
+
+/// What is left along a trajectory.
+struct At {
+    /// What a step makes smaller: the energy of the residuals with the calibration fitted, and that of the prior rows.
+    cost: f64,
+    /// In units of noise.
+    residuals: Entries,
+    /// In their sigmas.
+    prior: Vec<f64>,
+}
+
+impl At {
+    /// Standard deviation of a sum of as many squares of normal numbers.
+    fn chance(&self) -> f64 {
+        let samples: usize = self.residuals.iter().map(|(_, values)| values.len()).sum();
+        (2.0 * (samples + self.prior.len()) as f64).sqrt()
+    }
+}
 
 /// A flight as its log tells it.
 pub struct Smoothed {
@@ -62,6 +95,10 @@ pub struct Smoothed {
     pub knots: Knots,
     /// \[rad\] the largest turn of each step.
     pub turns: Vec<f64>,
+    /// By how much the last step made the energy of residuals and prior smaller.
+    gain: f64,
+    /// Standard deviation that this energy has by chance.
+    chance: f64,
 }
 
 impl Smoothed {
@@ -77,31 +114,98 @@ impl Smoothed {
         progress: &dyn Fn(f64),
     ) -> Result<Self, CaseError> {
         let rests = rests::rests(log, unit, environment);
+        let (first_s, last_s) = (log.start_s[0], log.start_s[log.start_s.len() - 1]);
+        let slots_s = || unit.channels.iter().map(|channel| channel.slot_s);
+        let (earliest_s, latest_s) = (slots_s().fold(0.0, f64::min), slots_s().fold(0.0, f64::max));
+        // No further than samples reach: nothing holds the motion there.
+        let span_s = (first_s + earliest_s - past_s(unit), last_s + latest_s);
+        let knots = Knots::over(span_s, start.knot_s / KNOTS_A_ROW);
         let mut smoothed = Self {
-            trajectory: Trajectory::of(start, &course.scene, environment),
+            trajectory: Trajectory::of(start, &knots, &course.scene, environment),
             rests,
-            knots: Knots::over(start.span_s, start.knot_s / KNOTS_A_ROW),
+            knots,
             turns: Vec::new(),
+            gain: f64::INFINITY,
+            chance: 0.0,
         };
         while smoothed.turns.len() < MOST_STEPS && !smoothed.is_settled() {
-            progress(smoothed.turns.len() as f64 / MOST_STEPS as f64);
-            let twin = smoothed.twin(log, unit, environment)?;
-            let (fit, reference) = (fit(log), Reference::default());
-            let problem = Problem::new(&twin, &fit, &reference);
-            let motion = smoothed.smoothing(&problem, course, start);
-            let space = Space::new(&problem, &motion, Vec::new());
-            let residual = space.project_residual(problem.residuals(&[]).into_iter().enumerate().collect());
-            let correction = motion.correction(&space.motion_part(&residual));
-            let within_s = (log.start_s[0], log.start_s[log.start_s.len() - 1]);
-            let turn = smoothed.trajectory.correct(&smoothed.knots, &correction, within_s);
-            smoothed.turns.push(turn);
+            if !smoothed.steps(log, unit, environment, (course, start), progress)? {
+                break;
+            }
         }
         Ok(smoothed)
     }
 
-    /// Whether the last step turned nothing any more.
+    /// Linearises about the trajectory, and steps as long as that holds. A step that makes the cost no smaller is halved; whether
+    /// some part of each did.
+    fn steps(
+        &mut self,
+        log: &Log,
+        unit: &UnitDescription,
+        environment: &Environment,
+        course: (&Course, &Start),
+        progress: &dyn Fn(f64),
+    ) -> Result<bool, CaseError> {
+        let (fit, reference) = (fit(log), Reference::default());
+        let twin = self.twin(log, unit, environment)?;
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = self.smoothing(&problem, course.0, course.1);
+        let space = Space::new(&problem, &motion, Vec::new());
+        let mut now = self.at(&problem, log, course)?;
+        let mut turned = 0.0;
+        while self.turns.len() < MOST_STEPS && turned < LINEAR_RAD && !self.is_settled() {
+            progress(self.turns.len() as f64 / MOST_STEPS as f64);
+            let prior = motion.prior_of(now.prior.iter().copied());
+            let residual = space.project_residual(now.residuals, &prior);
+            let correction = motion.correction(&space.motion_part(&residual));
+            let turn = self.trajectory.turn(&self.knots, &correction);
+            self.turns.push(turn);
+            turned += turn;
+            let (before, cost) = (self.trajectory.clone(), now.cost);
+            let mut part = (LONGEST_RAD / turn).min(1.0);
+            let next = loop {
+                self.trajectory.correct(&self.knots, &correction, part);
+                let next = self.at(&problem, log, course)?;
+                if next.cost < cost {
+                    break Some(next);
+                }
+                self.trajectory = before.clone();
+                part /= 2.0;
+                if part < LEAST_PART {
+                    break None;
+                }
+            };
+            let Some(next) = next else {
+                self.gain = 0.0;
+                return Ok(false);
+            };
+            (self.gain, self.chance) = (cost - next.cost, next.chance());
+            now = next;
+        }
+        Ok(true)
+    }
+
+    /// What the log leaves along the trajectory, with the calibration as a problem has it.
+    fn at(&self, problem: &Problem, log: &Log, course: (&Course, &Start)) -> Result<At, CaseError> {
+        let twin = self.twin(log, problem.twin.unit(), problem.twin.environment())?;
+        let prior = smoothing::off(&log.start_s, &self.trajectory, course, &self.knots, &self.still());
+        let mut cost: f64 = prior.iter().map(|off| off * off).sum();
+        let mut residuals = Entries::new();
+        let mut memory = Memory::default();
+        for (channel, frame) in problem.frames.iter().enumerate() {
+            let predicted = twin.channel_with(channel, &[], &mut memory);
+            let samples = (frame.series.rows.iter().zip(&frame.series.values)).zip(frame.weights.iter());
+            let values = samples.map(|((row, value), weight)| (value - predicted[*row as usize]) / weight);
+            let residual = DVector::from_iterator(frame.weights.len(), values);
+            cost += residual.norm_squared() - frame.open_part(&residual).norm_squared();
+            residuals.push((channel, residual));
+        }
+        Ok(At { cost, residuals, prior })
+    }
+
+    /// Whether the last step turned nothing any more, and made the residuals no smaller than chance makes them.
     pub fn is_settled(&self) -> bool {
-        self.turns.last().is_some_and(|turn| *turn < SETTLED_RAD)
+        self.turns.last().is_some_and(|turn| *turn < SETTLED_RAD) && self.gain.abs() < self.chance
     }
 
     /// The twin along it.
@@ -115,8 +219,11 @@ impl Smoothed {
 
     /// The motion about it, to be eliminated.
     pub fn smoothing(&self, problem: &Problem, course: &Course, start: &Start) -> Smoothing {
-        let rests: Vec<((f64, f64), f64)> = self.rests.iter().map(|span| (*span, STILL)).collect();
-        Smoothing::of(problem, &self.trajectory, (course, start), self.knots, &rests)
+        Smoothing::of(problem, &self.trajectory, (course, start), self.knots, &self.still())
+    }
+
+    fn still(&self) -> Vec<((f64, f64), f64)> {
+        self.rests.iter().map(|span| (*span, STILL)).collect()
     }
 }
 

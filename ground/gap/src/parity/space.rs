@@ -5,6 +5,8 @@
 //! every channel leaves open and the known nulls. The motion joins the channels, so the calibration is one system of some
 //! four hundred columns.
 
+use std::ops::AddAssign;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::{library::products::Entries, null::problem::Problem};
@@ -16,9 +18,6 @@ const AT_ONCE: usize = 32;
 pub trait Elimination {
     /// `Q'u` of a column, `Q` being orthonormal: what the motion can imitate of it.
     fn part(&self, column: &Entries) -> DVector<f64>;
-
-    /// Adds what a prior that is not about the point of linearisation gives to the part of a residual.
-    fn prior(&self, _part: &mut DVector<f64>) {}
 
     /// What a [`Elimination::part`] is in the samples of a channel.
     fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64>;
@@ -39,7 +38,16 @@ pub struct Imitated {
 pub struct Projected {
     /// In units of noise.
     pub column: Entries,
+    /// Of a residual, what prior rows that are off give to its part in the motion; empty where none are.
+    prior: DVector<f64>,
     imitated: Imitated,
+}
+
+impl Projected {
+    fn with_prior(&self, mut part: DVector<f64>) -> DVector<f64> {
+        part.rows_mut(0, self.prior.len()).add_assign(&self.prior);
+        part
+    }
 }
 
 /// Where effects are looked for.
@@ -100,15 +108,15 @@ impl<'a> Space<'a> {
 
     /// What of columns can be imitated.
     pub fn project(&self, columns: Vec<Entries>) -> Vec<Projected> {
-        self.projected(columns, false)
+        self.projected(columns, &DVector::zeros(0))
     }
 
-    /// What of a residual can be imitated.
-    pub fn project_residual(&self, residual: Entries) -> Projected {
-        self.projected(vec![residual], true).remove(0)
+    /// What of a residual can be imitated, with what prior rows that are off give to its part.
+    pub fn project_residual(&self, residual: Entries, prior: &DVector<f64>) -> Projected {
+        self.projected(vec![residual], prior).remove(0)
     }
 
-    fn projected(&self, columns: Vec<Entries>, are_residuals: bool) -> Vec<Projected> {
+    fn projected(&self, columns: Vec<Entries>, prior: &DVector<f64>) -> Vec<Projected> {
         let mut projected = Vec::with_capacity(columns.len());
         let mut columns = columns.into_iter();
         loop {
@@ -117,8 +125,8 @@ impl<'a> Space<'a> {
                 return projected;
             }
             let mut parts: Vec<DVector<f64>> = some.iter().map(|column| self.motion.part(column)).collect();
-            if are_residuals {
-                parts.iter_mut().for_each(|part| self.motion.prior(part));
+            for part in &mut parts {
+                part.rows_mut(0, prior.len()).add_assign(prior);
             }
             let mut open = match self.factor {
                 Some(_) => -(&self.spread * DMatrix::from_columns(&parts)),
@@ -134,7 +142,11 @@ impl<'a> Space<'a> {
             for (at, (column, motion)) in some.into_iter().zip(parts).enumerate() {
                 let open = open.column(at).into_owned();
                 let imitated = Imitated { motion, open };
-                projected.push(Projected { column, imitated });
+                projected.push(Projected {
+                    column,
+                    prior: prior.clone(),
+                    imitated,
+                });
             }
         }
     }
@@ -203,20 +215,14 @@ impl<'a> Space<'a> {
 
     /// The motion's part of what calibration and nulls leave of a residual.
     pub fn motion_part(&self, residual: &Projected) -> DVector<f64> {
-        self.part_of(&self.left(residual).0)
-    }
-
-    fn part_of(&self, left: &Entries) -> DVector<f64> {
-        let mut part = self.motion.part(left);
-        self.motion.prior(&mut part);
-        part
+        residual.with_prior(self.motion.part(&self.left(residual).0))
     }
 
     /// Of each channel, the energy that a residual keeps and the degrees of freedom that it has there: both are equal on the whole
     /// where noise and calibration are enough.
     pub fn kept(&self, residual: &Projected) -> Vec<(f64, f64)> {
         let (left, price) = self.left(residual);
-        let part = self.part_of(&left);
+        let part = residual.with_prior(self.motion.part(&left));
         let mut kept = vec![(0.0, 0.0); self.problem.frames.len()];
         for (channel, values) in &left {
             let imitated = self.motion.imitated(*channel, &part);

@@ -30,6 +30,11 @@ impl Knots {
         }
     }
 
+    /// \[s\] of the first and of the last, which may lie beyond what was asked for.
+    pub fn span_s(&self) -> (f64, f64) {
+        (self.from_s, self.from_s + self.intervals as f64 * self.step_s)
+    }
+
     /// Coefficients there are.
     pub fn coefficients(&self) -> usize {
         self.intervals + DEGREE

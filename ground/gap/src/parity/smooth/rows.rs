@@ -1,13 +1,13 @@
-//! What a turn and an acceleration of the trajectory change of every sample: the rows of the normal matrix of the motion.
+//! What a turn of the trajectory and a force along it change of every sample: the rows of the normal matrix of the motion.
 //!
 //! In: the problem along a trajectory, and the knots. Out: [`Rows`], channel by channel, in units of noise.
 //!
-//! With `w`, `f`, `m` the rate, force and field at the sample, `a` its axis and `r` its lever, a turn `th` in b and an
-//! acceleration `s` in n change it by
+//! With `w`, `m` the rate and field at the sample, `a` its axis and `r` its lever, a turn `th` and a specific force `s`, both in b,
+//! change it by
 //!
 //! ```text
 //! gyro   a.(th' + w x th)
-//! accel  a.(f x th + C_bn s + dw' x r + dw x (w x r) + w x (dw x r)),  dw = th' + w x th,  dw' = th'' + w' x th + w x th'
+//! accel  a.(s + dw' x r + dw x (w x r) + w x (dw x r)),  dw = th' + w x th,  dw' = th'' + w' x th + w x th'
 //! mag    a.(m x th)
 //! ```
 //!
@@ -15,14 +15,14 @@
 //! order of its time constant.
 
 use nalgebra::Vector3;
-use twin::predict::{Channel, Feel, Kind};
+use twin::predict::{Channel, Feel, Kind, UnitDescription};
 
 use crate::{
     null::problem::Problem,
     parity::smooth::basis::{Knots, SUPPORT},
 };
 
-/// Unknowns a knot: a turn, an acceleration.
+/// Unknowns a knot: a turn, a force.
 pub const UNKNOWNS: usize = 6;
 
 /// Points and weights of the mean over an exponential past (Abramowitz and Stegun, table 25.9).
@@ -43,12 +43,14 @@ pub struct Rows {
 
 /// Unknowns that a sample may depend on.
 pub fn width(problem: &Problem, knots: &Knots) -> usize {
-    let channels = problem.twin.unit().channels.iter();
-    let past_s = channels
-        .filter(|channel| channel.sensor != Kind::Thermometer)
-        .map(|channel| LAGUERRE[2].0 * channel.tau_s())
-        .fold(0.0, f64::max);
-    UNKNOWNS * (SUPPORT + (past_s / knots.step_s).ceil() as usize)
+    UNKNOWNS * (SUPPORT + (past_s(problem.twin.unit()) / knots.step_s).ceil() as usize)
+}
+
+/// \[s\] that the slowest low-pass of a unit looks back.
+pub fn past_s(unit: &UnitDescription) -> f64 {
+    let channels = unit.channels.iter();
+    let moved = channels.filter(|channel| channel.sensor != Kind::Thermometer);
+    moved.map(|channel| LAGUERRE[2].0 * channel.tau_s()).fold(0.0, f64::max)
 }
 
 impl Rows {
@@ -70,14 +72,14 @@ impl Rows {
             for (past, share) in points {
                 let at_s = t_s - tau_s * past;
                 let by = changes(own, &feel(at_s));
-                for (order, [turn, acc]) in by.iter().enumerate() {
+                for (order, [turn, force]) in by.iter().enumerate() {
                     let (knot, weights) = knots.weights(at_s, order);
                     for (at, weight) in weights.iter().enumerate() {
                         let from = UNKNOWNS * (knot + at - first);
                         let scale = share * weight / frame.weights[sample];
                         for axis in 0..3 {
                             slopes[from + axis] += scale * turn[axis];
-                            slopes[from + 3 + axis] += scale * acc[axis];
+                            slopes[from + 3 + axis] += scale * force[axis];
                         }
                     }
                 }
@@ -89,7 +91,7 @@ impl Rows {
     }
 }
 
-/// Derivatives of a reading by turn and acceleration, their first and their second derivatives.
+/// Derivatives of a reading by turn and force, their first and their second derivatives.
 fn changes(channel: &Channel, feel: &Feel) -> [[Vector3<f64>; 2]; 3] {
     let (a, r, w) = (channel.axis_b, channel.lever_m, feel.rate_b);
     let none = Vector3::zeros();
@@ -99,10 +101,7 @@ fn changes(channel: &Channel, feel: &Feel) -> [[Vector3<f64>; 2]; 3] {
             let by_rate_dot = r.cross(&a);
             let by_rate = w.cross(&r).cross(&a) + r.cross(&a.cross(&w));
             [
-                [
-                    a.cross(&feel.force_b) + by_rate.cross(&w) + by_rate_dot.cross(&feel.rate_dot_b),
-                    feel.q_nb * a,
-                ],
+                [by_rate.cross(&w) + by_rate_dot.cross(&feel.rate_dot_b), a],
                 [by_rate + by_rate_dot.cross(&w), none],
                 [by_rate_dot, none],
             ]

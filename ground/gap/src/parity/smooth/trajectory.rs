@@ -2,14 +2,15 @@
 //!
 //! In: the smoothed courses of [`crate::parity::course`] to begin with, and corrections after. Out: [`Scene`], and the state at any node.
 //!
-//! A correction is a turn `th` in b and an acceleration `s` in n. With the right Jacobian of the rotation group
+//! A correction is a turn `th` and a specific force `s`, both in b. With the right Jacobian of the rotation group
 //! (Chirikjian 2012, 10.86) and `u = J_r(th) th'`
 //!
 //! ```text
-//! q  -> q exp(th)      w -> exp(-th) w + u      w' -> exp(-th) w' - u x (exp(-th) w) + u'      a -> a + s
+//! q  -> q exp(th)      w -> exp(-th) w + u      w' -> exp(-th) w' - u x (exp(-th) w) + u'      f -> f + s
 //! ```
 //!
-//! so that the rate stays the derivative of the attitude however large a correction is.
+//! so that the rate stays the derivative of the attitude however large a correction is, and so that one turn of the whole flight in
+//! n changes neither a rate nor a force: gyros and accelerometers are as they were, however hard a motor pushes.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use twin::{
@@ -17,16 +18,16 @@ use twin::{
     predict::{Feel, Scene},
 };
 
-use crate::{parity::course::Start, parity::smooth::basis::Knots};
+use crate::{
+    parity::course::Start,
+    parity::smooth::{basis::Knots, rows::UNKNOWNS},
+};
 
 /// \[s\] between nodes.
 const STEP_S: f64 = 0.02;
 
 /// Steps of the integration between two nodes: the midpoint rule is then off by some 1e-5 rad/s where a hand turns the unit.
 const SUBSTEPS: usize = 8;
-
-/// \[rad\] of one correction: beyond it the columns that asked for it no longer hold.
-const LONGEST_RAD: f64 = 0.5;
 
 /// \[s\] of a difference quotient, short beside the distance of knots.
 const SHORT_S: f64 = 1e-4;
@@ -40,8 +41,8 @@ pub struct State {
     pub rate_b: Vector3<f64>,
     /// [rad/s2]
     pub rate_dot_b: Vector3<f64>,
-    /// [m/s2] of the centre.
-    pub acc_n: Vector3<f64>,
+    /// [m/s2] specific force at the centre.
+    pub force_b: Vector3<f64>,
 }
 
 /// States at equal steps.
@@ -57,9 +58,9 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// To begin with: `begun` has the first attitude and the temperatures.
-    pub fn of(start: &Start, begun: &Scene, environment: &Environment) -> Self {
-        let (from_s, to_s) = start.span_s;
+    /// To begin with, over all knots: `begun` has the first attitude, the forces and the temperatures.
+    pub fn of(start: &Start, knots: &Knots, begun: &Scene, environment: &Environment) -> Self {
+        let (from_s, to_s) = knots.span_s();
         let nodes = ((to_s - from_s) / STEP_S).ceil() as usize;
         let earth_n = environment.earth_rate_n();
         let mut q_nb = begun.feel(from_s).q_nb;
@@ -71,7 +72,7 @@ impl Trajectory {
                 q_nb,
                 rate_b: start.rate(t_s),
                 rate_dot_b: start.rate_dot(t_s),
-                acc_n: start.forces_n.at(t_s) + environment.gravity_n(),
+                force_b: begun.feel(t_s).force_b,
             });
             temperatures_c.push(begun.feel(t_s).temperature_c);
             let step_s = STEP_S / SUBSTEPS as f64;
@@ -93,18 +94,27 @@ impl Trajectory {
         self.from_s + node as f64 * STEP_S
     }
 
-    /// \[s\] first and last node.
-    pub fn span_s(&self) -> (f64, f64) {
-        (self.from_s, self.at_s(self.states.len() - 1))
-    }
-
     /// The node nearest to an instant.
     pub fn nearest(&self, t_s: f64) -> usize {
         let at = ((t_s - self.from_s) / STEP_S).round().max(0.0) as usize;
         at.min(self.states.len() - 1)
     }
 
-    /// The state at an instant: that of the nearest node, its attitude carried on.
+    /// The state at an instant, on the line between two nodes.
+    pub fn state(&self, t_s: f64) -> State {
+        let at = ((t_s - self.from_s) / STEP_S).floor().max(0.0) as usize;
+        let at = at.min(self.states.len() - 2);
+        let part = (t_s - self.at_s(at)) / STEP_S;
+        let (before, after) = (&self.states[at], &self.states[at + 1]);
+        State {
+            q_nb: self.attitude(t_s),
+            rate_b: before.rate_b.lerp(&after.rate_b, part),
+            rate_dot_b: before.rate_dot_b.lerp(&after.rate_dot_b, part),
+            force_b: before.force_b.lerp(&after.force_b, part),
+        }
+    }
+
+    /// The attitude at an instant: that of the nearest node, carried on.
     pub fn attitude(&self, t_s: f64) -> UnitQuaternion<f64> {
         let node = self.nearest(t_s);
         let state = &self.states[node];
@@ -113,39 +123,35 @@ impl Trajectory {
         state.q_nb * UnitQuaternion::from_scaled_axis(since_s * (rate_b + 0.5 * since_s * state.rate_dot_b))
     }
 
-    /// [rad/s3] and [m/s3] second derivative of the rate and jerk in n, by differences of the nodes about an instant.
+    /// [m/s2] acceleration of a state in its own frame: `f + C_bn g`.
+    pub fn acceleration_b(&self, state: &State) -> Vector3<f64> {
+        state.force_b + state.q_nb.inverse() * self.environment.gravity_n()
+    }
+
+    /// [rad/s3] and [m/s3] second derivative of the rate, and in b the change of the force as n has it, by differences of the nodes
+    /// before and after an instant: what they miss of a ripple of the knots is a hundredth.
     pub fn changes(&self, t_s: f64) -> [Vector3<f64>; 2] {
-        let node = self.nearest(t_s).clamp(1, self.states.len() - 2);
-        let (before, after) = (&self.states[node - 1], &self.states[node + 1]);
+        let at = ((t_s - self.from_s) / STEP_S).floor().max(0.0) as usize;
+        let at = at.min(self.states.len() - 2);
+        let (before, after) = (&self.states[at], &self.states[at + 1]);
+        let to_b = self.attitude(t_s).inverse();
+        let force = |state: &State| to_b * (state.q_nb * state.force_b);
         [
-            (after.rate_dot_b - before.rate_dot_b) / (2.0 * STEP_S),
-            (after.acc_n - before.acc_n) / (2.0 * STEP_S),
+            (after.rate_dot_b - before.rate_dot_b) / STEP_S,
+            (force(after) - force(before)) / STEP_S,
         ]
     }
 
-    /// Takes a correction, whose coefficients are three of the turn and three of the acceleration a knot, or so much of it that nothing
-    /// turns by more than [`LONGEST_RAD`]. The largest turn \[rad\] that was asked for within a span \[s\].
-    pub fn correct(&mut self, knots: &Knots, correction: &[f64], within_s: (f64, f64)) -> f64 {
-        let sum = |t_s: f64, order: usize, from: usize| -> Vector3<f64> {
-            let (first, weights) = knots.weights(t_s, order);
-            let terms = weights.iter().enumerate();
-            terms
-                .map(|(at, weight)| {
-                    let own = &correction[6 * (first + at) + from..];
-                    Vector3::new(own[0], own[1], own[2]) * *weight
-                })
-                .sum()
-        };
-        let nodes = 0..self.states.len();
-        let turns = nodes.map(|node| (self.at_s(node), sum(self.at_s(node), 0, 0).norm()));
-        let (mut largest, mut asked): (f64, f64) = (0.0, 0.0);
-        for (t_s, turn) in turns {
-            largest = largest.max(turn);
-            if (within_s.0..=within_s.1).contains(&t_s) {
-                asked = asked.max(turn);
-            }
-        }
-        let part = (LONGEST_RAD / largest).min(1.0);
+    /// \[rad\] the largest turn that a correction asks for, whose coefficients are three of the turn and three of the force a knot.
+    pub fn turn(&self, knots: &Knots, correction: &[f64]) -> f64 {
+        let all = (0..self.states.len()).map(|node| self.at_s(node));
+        all.map(|t_s| part_of(knots, correction, t_s, 0, 0).norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// Takes a part of a correction.
+    pub fn correct(&mut self, knots: &Knots, correction: &[f64], part: f64) {
+        let sum = |t_s: f64, order: usize, from: usize| part_of(knots, correction, t_s, order, from);
         // The rate that a turn adds, at an instant.
         let added = |t_s: f64| right_jacobian(&(part * sum(t_s, 0, 0))) * (part * sum(t_s, 1, 0));
         for node in 0..self.states.len() {
@@ -158,9 +164,8 @@ impl Trajectory {
             state.rate_dot_b = turn.inverse() * state.rate_dot_b - u.cross(&rate_b) + u_dot;
             state.rate_b = rate_b + u;
             state.q_nb *= turn;
-            state.acc_n += part * sum(t_s, 0, 3);
+            state.force_b += part * sum(t_s, 0, 3);
         }
-        asked
     }
 
     /// What the unit feels along it.
@@ -169,7 +174,6 @@ impl Trajectory {
         let mut sign = 1.0;
         let rows: Vec<Feel> = (self.states.iter().zip(&self.temperatures_c))
             .map(|(state, temperature_c)| {
-                let to_b = state.q_nb.inverse();
                 // q and -q are one attitude, but not to a spline.
                 let q = state.q_nb.into_inner();
                 if q.dot(&q_before) < 0.0 {
@@ -180,8 +184,8 @@ impl Trajectory {
                     t_s: 0.0,
                     rate_b: state.rate_b,
                     rate_dot_b: state.rate_dot_b,
-                    force_b: to_b * (state.acc_n - self.environment.gravity_n()),
-                    field_b_ut: to_b * self.environment.field_n_ut,
+                    force_b: state.force_b,
+                    field_b_ut: state.q_nb.inverse() * self.environment.field_n_ut,
                     temperature_c: *temperature_c,
                     temperature_rate: 0.0,
                     q_nb: UnitQuaternion::new_unchecked(q * sign),
@@ -194,6 +198,18 @@ impl Trajectory {
             .collect();
         Scene::through(self.from_s, STEP_S, &rows)
     }
+}
+
+/// A derivative of a correction's turn, or from the third unknown on of its force.
+fn part_of(knots: &Knots, correction: &[f64], t_s: f64, order: usize, from: usize) -> Vector3<f64> {
+    let (first, weights) = knots.weights(t_s, order);
+    let terms = weights.iter().enumerate();
+    terms
+        .map(|(at, weight)| {
+            let own = &correction[UNKNOWNS * (first + at) + from..];
+            Vector3::new(own[0], own[1], own[2]) * *weight
+        })
+        .sum()
 }
 
 /// `J_r` of a turn.
@@ -218,7 +234,7 @@ mod tests {
 
     use super::*;
 
-    /// Along a tumble, without an acceleration.
+    /// Along a tumble about one place.
     fn tumbling() -> (Trajectory, Scene) {
         let environment = Environment::laboratory();
         let scene = Scene::new(&Tumble::new(), &environment, 19.0, 31.0, 0.01);
@@ -228,7 +244,7 @@ mod tests {
                 q_nb: feel.q_nb,
                 rate_b: feel.rate_b,
                 rate_dot_b: feel.rate_dot_b,
-                acc_n: Vector3::zeros(),
+                force_b: feel.force_b,
             }
         });
         let trajectory = Trajectory {
@@ -247,8 +263,9 @@ mod tests {
         let correction: Vec<f64> = (0..6 * knots.coefficients())
             .map(|k| if k % 6 < 3 { 0.3 * (0.031 * k as f64).sin() } else { 0.0 })
             .collect();
-        let asked = trajectory.correct(&knots, &correction, (20.0, 30.0));
+        let asked = trajectory.turn(&knots, &correction);
         assert!((0.3..0.6).contains(&asked), "{asked}");
+        trajectory.correct(&knots, &correction, 1.0);
         let earth_n = trajectory.environment.earth_rate_n();
         for node in 100..110 {
             let (before, now, after) = (
