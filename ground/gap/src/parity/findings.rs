@@ -10,7 +10,10 @@
 //! Refuses a unit whose sensors are no more than what a motion has: one plate. Then parity is empty.
 
 use nalgebra::DVector;
-use statrs::function::erf::erfc;
+use statrs::{
+    distribution::{ChiSquared, ContinuousCDF},
+    function::erf::erfc,
+};
 use twin::{
     effect::{Parameter, by_name},
     predict::{Kind, Twin},
@@ -34,7 +37,7 @@ use crate::{
         visible::{self, Row},
     },
     probability::{cause::Sized, outcome::Outcome},
-    thresholds::{CHANCE, LISTED, PARITY_FREE, PARITY_GAP, SAID, UNKNOWN_PRIOR},
+    thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, UNKNOWN_PRIOR},
 };
 
 /// Probability of a name that codes alone give: chance is ruled out, the library's other effects on codes are not.
@@ -67,6 +70,32 @@ pub struct Name {
     pub confirm_by: &'static str,
 }
 
+/// A channel of the gap.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// Which.
+    pub name: String,
+    /// \[sigma\] of what the others do not explain.
+    pub gap: f64,
+    /// Whether it is larger than chance leaves any channel of a healthy log, and large enough to matter.
+    pub stands_out: bool,
+}
+
+impl Place {
+    /// Of the energy that a channel keeps and its degrees of freedom. Of noise the energy has a chi-square law, and the channel is
+    /// one of so many that are looked at (Bonferroni).
+    fn of(name: String, (energy, free): (f64, f64), channels: usize) -> Self {
+        let gap = (energy / free.max(1.0)).max(0.0).sqrt();
+        let chance = ChiSquared::new(free).map_or(1.0, |law| law.sf(energy));
+        let is_beyond = chance * (channels as f64) < CHANCE;
+        Self {
+            name,
+            gap,
+            stands_out: is_beyond && gap > 1.0 + MATTERS_SIGMA,
+        }
+    }
+}
+
 /// Everything that is said.
 pub struct Findings {
     /// Packets of the fit windows that were used.
@@ -75,8 +104,8 @@ pub struct Findings {
     pub free: [f64; 4],
     /// \[sigma\] before anything is named, and after.
     pub gap: [f64; 2],
-    /// Name and gap of each channel, before.
-    pub channels: Vec<(String, f64)>,
+    /// Each channel, before.
+    pub channels: Vec<Place>,
     /// What can be seen.
     pub visible: Vec<Row>,
     /// Likeliest first.
@@ -148,7 +177,7 @@ impl Findings {
             rows: packets,
             free,
             channels: (twin.unit().channels.iter().zip(&kept))
-                .map(|(channel, (energy, free))| (channel.name.clone(), (energy / free.max(1.0)).max(0.0).sqrt()))
+                .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
                 .collect(),
             outcome: Outcome::of(names.len(), none_of_these, none_of_these, false),
             gap,
@@ -263,6 +292,17 @@ fn by_search(problem: &Problem, library: &Library, chosen: &Chosen) -> Name {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_channel_stands_out_beyond_chance_and_where_it_matters() {
+        let stands_out = |gap: f64, free: f64| Place::of("a1x".to_owned(), (gap * gap * free, free), 40).stands_out;
+        // One in eight hundred: 3.0 standard deviations sqrt(2 n) of the energy.
+        assert!(!stands_out(1.15, 100.0) && stands_out(1.25, 100.0));
+        assert!(!stands_out(1.06, 700.0) && stands_out(1.10, 700.0));
+        // Beyond chance, and too small to matter.
+        assert!(!stands_out(1.04, 20_000.0) && stands_out(1.06, 20_000.0));
+        assert!(!stands_out(9.0, 0.0));
+    }
 
     #[test]
     fn a_gap_and_a_calibration_beyond_chance_are_each_enough_to_be_unexplained() {

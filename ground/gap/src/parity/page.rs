@@ -67,10 +67,10 @@ fn channels(findings: &Findings) -> Result<Figure, ChartError> {
     Figure::map(
         "What the other channels do not explain of each: 0 is noise alone, 100 is three sigma or more",
         &Map {
-            rows: findings.channels.iter().map(|(name, _)| name.clone()).collect(),
+            rows: findings.channels.iter().map(|own| own.name.clone()).collect(),
             columns: vec!["fit windows".to_owned()],
             values: (findings.channels.iter())
-                .map(|(_, gap)| vec![((gap - 1.0) / 2.0).clamp(0.0, 1.0)])
+                .map(|own| vec![((own.gap - 1.0) / 2.0).clamp(0.0, 1.0)])
                 .collect(),
         },
     )

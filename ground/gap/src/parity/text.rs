@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::{
     parity::{
-        findings::{Findings, Name},
+        findings::{Findings, Name, Place},
         flight::Flight,
         nulls::NULLS,
         smooth::told::Told,
@@ -19,9 +19,6 @@ use crate::{
 
 /// Channels that are said to stand out.
 const SHOWN: usize = 6;
-
-/// Gap of a channel from which it stands out.
-const STANDS_OUT: f64 = 1.1;
 
 /// All of it.
 pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
@@ -75,12 +72,12 @@ pub fn effects(rows: &[Row]) -> (Vec<&'static str>, Vec<&'static str>) {
 
 /// Where the gap is.
 pub fn places(findings: &Findings) -> String {
-    let mut channels: Vec<&(String, f64)> = findings.channels.iter().filter(|(_, gap)| *gap > STANDS_OUT).collect();
-    channels.sort_by(|one, other| other.1.total_cmp(&one.1));
+    let mut channels: Vec<&Place> = findings.channels.iter().filter(|own| own.stands_out).collect();
+    channels.sort_by(|one, other| other.gap.total_cmp(&one.gap));
     let told: Vec<String> = channels
         .iter()
         .take(SHOWN)
-        .map(|(name, gap)| format!("{name} {gap:.2}"))
+        .map(|own| format!("{} {:.2}", own.name, own.gap))
         .collect();
     match told.is_empty() {
         true => "WHERE   no channel stands out\n".to_owned(),
