@@ -324,7 +324,7 @@ mod tests {
         let (mut trajectory, course, start, knots, starts_s) = tumbling();
         // A ripple of the knots is in it, and the ends are.
         let correction: Vec<f64> = (0..UNKNOWNS * knots.coefficients())
-            .map(|k| 1e-4 * ((1.7 * k as f64).sin() + if (k / UNKNOWNS) % 2 == 0 { 0.5 } else { -0.5 }))
+            .map(|k| 1e-4 * ((1.7 * k as f64).sin() + if (k / UNKNOWNS).is_multiple_of(2) { 0.5 } else { -0.5 }))
             .collect();
         let rests = [((22.0, 24.0), 0.01)];
         let about = (&course, &start);
