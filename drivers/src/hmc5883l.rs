@@ -6,6 +6,9 @@
 //! were not kept, codes the part cannot produce, and a lock that does not open; the first set after a change of settings
 //! was measured with the old gain and is withheld.
 //!
+//! A configured part measures by its own clock, and a set is up to a period old when it is read. One that is asked
+//! ([`Hmc5883l::measure`]) measures then, once: who asks knows when.
+//!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
 //! use emems_drivers::hmc5883l::{ADDRESS, Config, Hmc5883l};
@@ -65,6 +68,11 @@ const IDENTIFICATION_C: Register = register("Identification C", 0x0C);
 const RDY: u8 = 0x01;
 /// Status: the output registers were read in part, or the mode register was read, and are locked (table 17).
 const LOCK: u8 = 0x02;
+
+/// Mode (table 12): by the part's clock; once, and then idle, which reads as one of two codes.
+const CONTINUOUS: u8 = 0;
+const SINGLE: u8 = 1;
+const IDLE: core::ops::RangeInclusive<u8> = 2..=3;
 
 const fn register(name: &'static str, address: u8) -> Register {
     let part = "HMC5883L";
@@ -132,7 +140,6 @@ pub struct Config {
 impl Config {
     /// Configuration A, Configuration B, Mode.
     const fn registers(self) -> [u8; 3] {
-        const CONTINUOUS: u8 = 0;
         let a = (self.average as u8) << 5 | (self.rate as u8) << 2;
         [a, (self.gain as u8) << 5, CONTINUOUS]
     }
@@ -145,7 +152,7 @@ pub struct Sample {
     pub counts: [i16; 3],
     /// Which of x, y, z overflowed.
     pub overflow: [bool; 3],
-    /// The part had finished writing the set (RDY).
+    /// The part had finished writing the set (RDY), and one that measures when it is asked had been.
     pub ready: bool,
 }
 
@@ -154,12 +161,18 @@ pub struct Hmc5883l<I2C> {
     bus: I2C,
     /// The next set was measured with earlier settings.
     withhold: bool,
+    /// It measures when it is asked; whether it was, since it was read.
+    asked: Option<bool>,
 }
 
 impl<I2C: I2c> Hmc5883l<I2C> {
     /// Nothing is sent.
     pub fn new(bus: I2C) -> Self {
-        Hmc5883l { bus, withhold: true }
+        Hmc5883l {
+            bus,
+            withhold: true,
+            asked: None,
+        }
     }
 
     /// Asks for the identity, "H43".
@@ -180,7 +193,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         Ok(())
     }
 
-    /// Writes the settings and reads them back; the next set read is withheld.
+    /// Writes the settings and reads them back: it measures by its own clock. The next set read is withheld.
     pub async fn configure(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
         self.probe().await?;
         self.write(config.registers()).await?;
@@ -192,6 +205,10 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         let (mut kept, mut data) = ([0; 3], [0; 6]);
         // Reading the mode register locks the outputs (table 17); reading all of them opens the lock.
         self.two_reads((CONFIGURATION_A, &mut kept), &mut data).await?;
+        let [.., mode] = &mut kept;
+        if self.asked.is_some() && (*mode == SINGLE || IDLE.contains(mode)) {
+            *mode = CONTINUOUS;
+        }
         let registers = [CONFIGURATION_A, CONFIGURATION_B, MODE];
         for ((register, wrote), read) in registers.into_iter().zip(config.registers()).zip(kept) {
             Error::unless_kept(register, wrote.into(), read.into())?;
@@ -199,10 +216,21 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         Ok(())
     }
 
+    /// Asks for one measurement, which is there 6 ms later (datasheet, operating modes). Until it is configured again, the part
+    /// measures when it is asked.
+    pub async fn measure(&mut self) -> Result<(), Error<I2C::Error>> {
+        self.asked = Some(false);
+        let asked = self.bus.write(ADDRESS, &[MODE.address, SINGLE]).await;
+        asked.map_err(|e| Error::Bus(MODE, e))?;
+        self.asked = Some(true);
+        Ok(())
+    }
+
     /// Takes the newest set. `None`: it was withheld, being the first since the settings changed; the next is good if it
     /// is read one measurement later.
     pub async fn read(&mut self) -> Result<Option<Sample>, Error<I2C::Error>> {
-        let sample = self.newest().await?;
+        let mut sample = self.newest().await?;
+        sample.ready &= self.asked.as_mut().is_none_or(core::mem::take);
         Ok((!core::mem::take(&mut self.withhold)).then_some(sample))
     }
 
@@ -230,7 +258,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
     }
 
     async fn write(&mut self, [a, b, mode]: [u8; 3]) -> Result<(), Error<I2C::Error>> {
-        self.withhold = true;
+        (self.withhold, self.asked) = (true, None);
         self.bus
             .write(ADDRESS, &[CONFIGURATION_A.address, a, b, mode])
             .await

@@ -5,6 +5,9 @@
 //! again. A read that ran out of time has left the bus in the middle of a transfer: the bus is freed at once, since it never
 //! frees itself. Who held it is not known: the sensor that was being read is first read once more in the next cycle as it is.
 //!
+//! Magnetometers measure when they are asked, each [`ASKED`] before it is read: so it is known when each saw the field, which at
+//! three turns a second turns by a degree in a millisecond.
+//!
 //! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
 //! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
 //! for the estimation alone ([`forces`]). What fails then is left out and nothing is concluded from it: the next cycle will see.
@@ -34,6 +37,17 @@ use crate::{
 
 /// \[ms\] after power-on until the gyros answer (ADIS16265 data sheet, Table 1: 220 ms).
 const GYRO_START_MS: u64 = 250;
+
+/// From the question to a magnetometer to its being read. It measures for 6 ms (HMC5883L data sheet, operating modes), and its set is then
+/// as old as the mean of those that it makes by its own clock, half of 13.3 ms: one delay is true of both
+/// ([`crate::kalman::Delays`]).
+const ASKED: Duration = Duration::from_micros(12_700);
+
+/// From a sensor's read to the next one's where all before it answer, as the slot times of a derived frame have it.
+const READ: Duration = Duration::from_micros(300);
+
+/// A question that comes later is not asked: its answer would be of another instant.
+const LATE: Duration = Duration::from_millis(1);
 
 /// Cycles closed until then make a start a healthy one: the count of those that were not begins anew.
 const HEALTHY: Instant = Instant::from_secs(60);
@@ -144,6 +158,7 @@ pub async fn run<B: Board>(
                 }
             }
         }
+        acquisition.ask_fields(votes, start, limit_us).await;
     }
 }
 
@@ -264,6 +279,34 @@ impl<B: Board> Acquisition<'_, '_, B> {
             force
                 .into_iter()
                 .for_each(|force| self.shared.force.signal((counter, force)));
+        }
+    }
+
+    /// Asks the magnetometers that answer for what the cycle of this start reads. One that could not be asked has nothing new for it.
+    async fn ask_fields(&mut self, votes: &Votes, start: Instant, limit_us: u64) {
+        for (slot, sensor) in SENSORS.into_iter().enumerate() {
+            let is_known = self.standing[slot] != Standing::Lost && self.shared.testing.get() != Some(slot);
+            if sensor.kind != Kind::Magnetometer || !is_known {
+                continue;
+            }
+            let at = start + READ * slot as u32 - ASKED;
+            let mut asked = None;
+            if now() <= at + LATE {
+                votes.waiting(Voter::Acquire, self.shared.clock.until(at)).await;
+                let until = now() + Duration::from_micros(limit_us);
+                for _ in 0..2 {
+                    asked = Some(self.shared.clock.by(until, self.plates.ask_field(sensor.plate)).await);
+                    if !matches!(asked, Some(Ok(Err(_)))) {
+                        break;
+                    }
+                }
+            }
+            if matches!(asked, Some(Err(TimedOut))) {
+                self.recover().await;
+            }
+            if !matches!(asked, Some(Ok(Ok(())))) && self.standing[slot] == Standing::Reading {
+                self.standing[slot] = Standing::Configured;
+            }
         }
     }
 

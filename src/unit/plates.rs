@@ -105,6 +105,11 @@ impl<'a, I2C: I2c> Plates<'a, I2C> {
         }
     }
 
+    /// Asks a plate's magnetometer for a measurement.
+    pub async fn ask_field(&mut self, plate: usize) -> Result<(), PlateError<I2C>> {
+        self.magnetometers[plate].measure().await
+    }
+
     /// Takes a part's newest sample.
     pub async fn read(&mut self, sensor: Sensor) -> Result<Taken, PlateError<I2C>> {
         let none = Taken {

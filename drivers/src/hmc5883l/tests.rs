@@ -107,6 +107,36 @@ fn a_part_that_restarted_is_found_and_its_outputs_are_unlocked() {
 }
 
 #[test]
+fn a_part_that_is_asked_has_a_new_set_for_each_question() {
+    let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+    let ask = || vec![T::write(0x1E, vec![0x02, 0x01])];
+    let refused = vec![ask().remove(0).with_error(nack)];
+    let config = |mode| reads(0x00, &[0x18, 0x20, mode], [0; 6]);
+    let expected = [
+        ask(),
+        config(0x03),
+        set(0x01, [0; 6]),
+        set(0x01, [0; 6]),
+        refused,
+        set(0x01, [0; 6]),
+    ];
+    with(&expected, async |part| {
+        let ready = async |part: &mut Hmc5883l<Mock>| part.read().await.unwrap().unwrap().ready;
+        part.measure().await.unwrap();
+        // It is idle after its measurement, and that is no other setting.
+        assert_eq!(part.verify(Config::default()).await, Ok(()));
+        assert!(ready(part).await);
+        assert!(!ready(part).await, "the same set again");
+        assert_eq!(part.measure().await, Err(Error::Bus(MODE, nack)));
+        assert!(!ready(part).await, "a part that did not hear the question");
+    });
+    // One that measures by its own clock and went idle has lost its settings.
+    let idle = with(&[config(0x03)], async |part| part.verify(Config::default()).await);
+    let (register, wrote, read) = (MODE, 0, 3);
+    assert_eq!(idle, Err(Error::NotKept { register, wrote, read }));
+}
+
+#[test]
 fn another_part_or_none_is_refused() {
     let result = with(&[identity(b"H53")], async |part| part.probe().await);
     let wrong = Error::WrongIdentity {

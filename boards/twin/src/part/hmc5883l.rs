@@ -37,6 +37,8 @@ const OVERFLOW: i16 = -4096;
 
 /// \[ns\] one measurement.
 const MEASUREMENT_NS: Nanos = 6_000_000;
+/// \[ns\] of the clock that times a measurement which it was asked for, from its latest edge on. The data sheet does not tell it.
+const EDGE_NS: Nanos = 100_000;
 /// \[ns\] power-on to the first measurement (operational examples).
 const TURN_ON_NS: Nanos = 56_000_000;
 /// \[ns\] RDY is clear before new data are placed.
@@ -181,9 +183,13 @@ impl Hmc5883l {
                 let latest = clock.latest(now.saturating_add(MEASUREMENT_NS));
                 Activity::Continuous { clock, latest }
             }
-            1 => Activity::Single {
-                due: now.saturating_add(MEASUREMENT_NS),
-            },
+            1 => {
+                let edges = ConversionClock::paced(EDGE_NS, self.specimen.pace);
+                let due = edges.instant_ns(edges.latest(now) + (MEASUREMENT_NS / EDGE_NS) as i64);
+                Activity::Single {
+                    due: due.max(0).cast_unsigned(),
+                }
+            }
             _ => Activity::Idle,
         };
     }

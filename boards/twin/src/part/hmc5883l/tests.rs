@@ -103,6 +103,22 @@ fn single_mode_measures_once_and_goes_idle() {
 }
 
 #[test]
+fn a_single_measurement_is_the_same_whenever_within_an_edge_it_was_asked_for() {
+    let noisy = |asked: Nanos| {
+        let mut part = Hmc5883l::new(
+            Arc::new(|t| Vector3::repeat(t * 1000.0)),
+            Specimen::draw(crate::part::signal::Noise::new(1), 20.0, 0.0, 0),
+        );
+        write(&mut part, &[0x02, 0x01], asked);
+        xzy(&mut part, asked + 10 * MS)
+    };
+    let edge = |specimen: &Specimen<3>| ConversionClock::paced(EDGE_NS, specimen.pace).instant_ns(1_000) as Nanos;
+    let at = edge(&Specimen::draw(crate::part::signal::Noise::new(1), 20.0, 0.0, 0));
+    assert_eq!(noisy(at + 1_000), noisy(at + EDGE_NS - 2_000));
+    assert_ne!(noisy(at + 1_000), noisy(at + EDGE_NS + 1_000));
+}
+
+#[test]
 fn the_self_test_shows_the_strap_and_not_the_field() {
     for (measurement, sign) in [(1, 1), (2, -1)] {
         let mut part = continuous(|_| [40.0; 3]);
