@@ -39,10 +39,10 @@ use crate::{
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
     increments::{Force, Increments},
-    kalman::{Filter, KEPT_BYTES, Outage, Outcome, Step, seconds},
+    kalman::{self, Filter, Outage, Outcome, Step, seconds},
     redundancy::Known,
     sample::{Kind, Sample},
-    triad,
+    spin, triad,
     unit::Settings,
 };
 
@@ -109,6 +109,11 @@ const NEAR_ONE_G: f32 = 0.1;
 
 /// \[s\] a cycle whose increment covers less of it by this much has a gap: more than two fast samples.
 const LARGEST_GAP_S: f32 = 0.03;
+
+/// Bytes that are kept of it for after a reset.
+pub const KEPT_BYTES: usize = kalman::KEPT_BYTES + spin::kept::KEPT_BYTES;
+
+const _: () = assert!(KEPT_BYTES <= crate::retained::ATTITUDE.fits());
 
 /// Everything the step remembers.
 #[derive(Clone, Debug)]
@@ -180,15 +185,28 @@ impl Estimator {
         Estimator::new(Set::compiled_in(Ranges::of(settings)), &settings.site)
     }
 
-    /// Keeps the filter for after a reset; `false` where there is no attitude to keep.
+    /// Keeps the filter for after a reset, and that of the spin while it is on; `false` where there is no attitude to keep.
     pub fn keep(&mut self, bytes: &mut [u8; KEPT_BYTES]) -> bool {
-        self.filter.keep(bytes)
+        let Some((of_filter, of_spin)) = bytes.split_first_chunk_mut() else {
+            return false;
+        };
+        let is_known = self.filter.keep(of_filter);
+        self.boost.keep(of_filter, of_spin);
+        is_known
     }
 
-    /// Goes on, after a reset, from what was kept of the filter.
+    /// \[us\] when what is in these bytes was kept, in its own clock.
+    pub fn kept_at_us(bytes: &[u8; KEPT_BYTES]) -> u64 {
+        bytes.first_chunk().map_or(0, Filter::kept_at_us)
+    }
+
+    /// Goes on, after a reset, from what was kept.
     #[inline(never)]
     pub fn resume(&mut self, bytes: &[u8; KEPT_BYTES], outage: Outage) {
-        self.filter.resume(bytes, outage);
+        if let Some((of_filter, of_spin)) = bytes.split_first_chunk() {
+            self.filter.resume(of_filter, outage);
+            self.resume_boost(of_spin, outage);
+        }
     }
 
     /// Goes on, after a power cut, from the newest record, unless there is an attitude, or the first window finds one.

@@ -48,7 +48,7 @@ pub const STARTS: Place = STATE.before(64);
 pub const PULSE: Place = STARTS.before(64);
 /// What ended the run before: [`crate::crash::CrashRecord`].
 pub const CRASH: Place = PULSE.before(128);
-/// The attitude filter: [`crate::kalman::Filter::keep`].
+/// The attitude filters: [`crate::estimate::Estimator::keep`].
 pub const ATTITUDE: Place = CRASH.before(1536);
 /// The calibration set in use: [`crate::calibration::Set::encode`]; empty for the one compiled in.
 pub const SET: Place = ATTITUDE.before(1280);

@@ -34,13 +34,14 @@
 //! Refuses to go on (and says so) when a number is no longer one, or when there was no slice for a second.
 //!
 //! A cycle's readings are put in order in `cycle`; `motion` carries the state to each; `gyros`, `accelerometers` and
-//! `magnetometers` correct it.
+//! `magnetometers` correct it. [`kept`] is what a reset leaves of it.
 
 mod accelerometers;
 pub mod covariance;
 mod cycle;
 pub mod forces;
 mod gyros;
+pub mod kept;
 mod magnetometers;
 mod motion;
 pub mod pad;
@@ -134,6 +135,8 @@ pub struct Spin {
     usual: f32,
     /// Three gyros saw the latest slice.
     seen: bool,
+    /// Gyros that answered in it, bit `k` the `k`-th.
+    answering: u16,
     /// \[s\] for which a surprise still lasts.
     surprised_s: f32,
     /// Packets in a row whose field was refused.
@@ -208,6 +211,7 @@ impl Spin {
             rough: square(BEGINS_ROUGH),
             usual: BEGINS_USUAL,
             seen: true,
+            answering: 0b1111,
             surprised_s: 0.0,
             refused: 0,
             force: None,
@@ -225,7 +229,7 @@ impl Spin {
     /// What it knows at an instant that is at most some 20 ms from its latest measurement.
     pub fn known(&self, set: &Set, at_us: u64) -> Known {
         let dt_s = seconds_between(self.at_us, at_us);
-        let least_squares = least_squares(set);
+        let least_squares = least_squares(set, self.answering);
         let mut covariance = SMatrix::<f32, 6, 6>::zeros();
         // What follows flies on under the force of now.
         let load = self.load();
@@ -248,6 +252,11 @@ impl Spin {
             rate_b: self.rate_b(),
             bias_b: least_squares * bias,
             covariance,
+            sees_spin_b: least_squares * nalgebra::Vector4::from(self.sees_spin),
+            sees_spin_variance: Vector3::from_fn(|row, _| {
+                let seen = core::array::from_fn::<_, PLATES, _>(|k| (SEES_SPIN + k, least_squares[(row, k)]));
+                self.covariance.along(&seen)
+            }),
         }
     }
 
@@ -321,10 +330,10 @@ fn seconds_between(from_us: u64, to_us: u64) -> f32 {
     us as i32 as f32 * 1e-6
 }
 
-/// The gyros' biases as a vector.
-fn least_squares(set: &Set) -> SMatrix<f32, 3, PLATES> {
+/// What is each gyro's as a vector of those that answer: who carries on takes the rate from them.
+fn least_squares(set: &Set, answering: u16) -> SMatrix<f32, 3, PLATES> {
     let axes_b = set.gyro.map(|axis| axis.axis_b);
-    crate::redundancy::matrix(&axes_b, 0b1111)
+    crate::redundancy::matrix(&axes_b, answering)
         .map(|(matrix, _)| matrix)
         .unwrap_or_default()
 }

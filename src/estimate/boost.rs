@@ -8,7 +8,7 @@
 //! Refuses to begin without an attitude, a field, or slices of the gyros (periods of more than a fifth of a second have no place for
 //! them all): the filter of slow motion then carries on as it can.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{Estimate, Estimator, parts};
 use crate::{
@@ -16,9 +16,9 @@ use crate::{
     faults::Vectors,
     geometry::TRIAD_AXES,
     increments::{Increments, Slice, slices::BEYOND},
-    kalman::Delays,
+    kalman::{self, Delays, Outage, Params},
     sample::Sample,
-    spin::{Place, Spin, Start, pad::Pad},
+    spin::{self, Place, Spin, Start, pad::Pad},
 };
 
 /// [rad/s] the spin at which it begins: 77 % of what the first gyro to stop can see of it, so that a second of spin-up at half a
@@ -55,6 +55,19 @@ impl Boost {
         quiet: 0,
     };
 
+    /// Keeps the spin's filter, if it has the cycles: then what was kept is as old as it is, and the filter's own bytes have that time.
+    pub fn keep(&mut self, of_filter: &mut [u8; kalman::KEPT_BYTES], of_spin: &mut [u8]) {
+        let of_spin = of_spin.first_chunk_mut();
+        match (&mut self.spin, of_spin) {
+            (Some(spin), Some(bytes)) => {
+                spin.keep(bytes);
+                of_filter[..8].copy_from_slice(&spin.at_us().to_le_bytes());
+            }
+            (_, Some(bytes)) => *bytes = [0; spin::kept::KEPT_BYTES],
+            _ => {}
+        }
+    }
+
     /// Whether the spin's filter has the cycles.
     pub fn is_on(&self) -> bool {
         self.spin.is_some()
@@ -87,9 +100,11 @@ impl Estimator {
             let each = core::array::from_fn::<f32, TRIAD_AXES, _>(beyond);
             (vectors.force_b.vector_b.x, each)
         });
-        self.boost
-            .pad
-            .take(&self.set, &measured.gyros_above_c, increments, force);
+        let pad = &mut self.boost.pad;
+        pad.take(&self.set, &measured.gyros_above_c, increments, force);
+        if let Some(sd) = pad.force_sd() {
+            self.filter.params.acc_error = Params::ROOM.acc_error.max(sd);
+        }
     }
 
     /// A cycle outside the spin: whether the spin begins.
@@ -144,6 +159,27 @@ impl Estimator {
         };
         self.boost.spin = Some(Spin::begin(&start, &self.set));
         self.boost.quiet = 0;
+    }
+
+    /// Goes on in the spin after a reset, if it was on.
+    pub(super) fn resume_boost(&mut self, of_spin: &[u8], outage: Outage) {
+        let (Some(bytes), Some(place)) = (of_spin.first_chunk(), self.place(self.filter.params.delays)) else {
+            return;
+        };
+        let start = Start {
+            at_us: 0,
+            q_nb: self.filter.q_nb,
+            covariance_n: Matrix3::zeros(),
+            rate_b: Vector3::zeros(),
+            rate_sd: 0.0,
+            bias_b: Vector3::zeros(),
+            bias_variance: 0.0,
+            pad: &Pad::EMPTY,
+            iron_b: Vector3::zeros(),
+            iron_covariance: Matrix3::zeros(),
+            place,
+        };
+        self.boost.spin = Spin::resumed(bytes, outage, &start, &self.set);
     }
 
     fn place(&self, delays: Delays) -> Option<Place> {

@@ -91,6 +91,11 @@ impl Covariance {
         if level > down { level } else { down }
     }
 
+    /// Variance of a driver.
+    pub(super) fn of_driver_itself(&self, driver: usize) -> f32 {
+        self.drivers[driver][driver]
+    }
+
     /// The column of a driver.
     pub(super) fn of_driver(&self, driver: usize) -> State {
         State {
@@ -259,7 +264,7 @@ impl Covariance {
         self.driven[k][k] = variance;
     }
 
-    fn forget_driver(&mut self, k: usize, variance: f32) {
+    pub(super) fn forget_driver(&mut self, k: usize, variance: f32) {
         for row in self.across.iter_mut().chain(&mut self.drivers) {
             row[k] = 0.0;
         }

@@ -1,11 +1,12 @@
 //! What another filter hands over, and taking it.
 //!
-//! In: attitude, rate, bias and their covariance at the gyros' latest true instant. Out: this filter, going on from there. What it
-//! knows of the gyro matrix, of the iron and of the field stays; what it had gathered and not used is dropped.
+//! In: attitude, rate, bias and their covariance at the gyros' latest true instant, and what the gyros see of a spin about x_b beyond
+//! it. Out: this filter, going on from there. What it knows of the rest of the gyro matrix, of the iron and of the field stays;
+//! what it had gathered and not used is dropped.
 
 use nalgebra::{SMatrix, UnitQuaternion, Vector2, Vector3};
 
-use super::{Covariance, Filter, pending::Pending, window::Window};
+use super::{Covariance, Filter, pending::Pending, state::GYRO_MATRIX, window::Window};
 
 /// Attitude and bias, and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,10 @@ pub struct Known {
     pub bias_b: Vector3<f32>,
     /// Covariance of the attitude's error (\[rad\], in n) and of the bias (\[rad/s\], in b).
     pub covariance: SMatrix<f32, 6, 6>,
+    /// \[1\] first column of the gyro matrix: the rate that a rate of one about x_b is taken for, beyond itself.
+    pub sees_spin_b: Vector3<f32>,
+    /// \[1\] variance of each of its components.
+    pub sees_spin_variance: Vector3<f32>,
 }
 
 impl Filter {
@@ -29,6 +34,11 @@ impl Filter {
         self.velocity_n = Vector2::zeros();
         self.pending = Pending::nothing();
         self.covariance.take_over(&known.covariance, self.params.velocity_sd);
+        for row in 0..3 {
+            if self.covariance.knows_spin(row, known.sees_spin_variance[row]) {
+                self.gyro_matrix[(row, 0)] = known.sees_spin_b[row];
+            }
+        }
         self.window = Window::EMPTY;
         self.gyro_b = None;
         self.last_us = Some(at_us);
@@ -37,6 +47,7 @@ impl Filter {
         self.disturbed_s = 0.0;
         self.contradicted = None;
         self.rested = false;
+        self.going = None;
         self.aligned = true;
         self.settlements = self.settlements.wrapping_add(1);
         self.keep_finite();
@@ -54,5 +65,16 @@ impl Covariance {
         self.align(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
         self.forget_velocity(velocity_sd);
         self.set_bias(covariance);
+    }
+
+    /// What the first column of the gyro matrix has in this row is known with this variance, and independent of the rest; `false` if
+    /// it was known better.
+    fn knows_spin(&mut self, row: usize, variance: f32) -> bool {
+        let driver = GYRO_MATRIX + 3 * row;
+        let better = variance < self.of_driver_itself(driver);
+        if better {
+            self.forget_driver(driver, variance);
+        }
+        better
     }
 }

@@ -92,9 +92,12 @@ impl Spin {
             self.surprised_s = SURPRISED_S;
             self.covariance.open(SPIN_UP, square(SURPRISED_WALK) * 0.1);
             self.covariance.open(SPIN, square(SURPRISED_WALK * 0.02));
-            for axis in 0..2 {
-                self.covariance.open(ACROSS_UP + axis, square(1.0));
-                self.covariance.open(ACROSS + axis, square(0.05));
+            // What a change of the spin does not explain is one of the rate across it.
+            if off(&self.covariance) > surprising {
+                for axis in 0..2 {
+                    self.covariance.open(ACROSS_UP + axis, square(1.0));
+                    self.covariance.open(ACROSS + axis, square(0.05));
+                }
             }
         }
         // A reading that contradicts itself weighs less.

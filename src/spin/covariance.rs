@@ -90,6 +90,19 @@ impl Covariance {
         self.p[state][state]
     }
 
+    /// What is kept over a reset, and in which order: of the attitude all, of the others their variances.
+    pub fn each_kept(&mut self, visit: &mut dyn FnMut(&mut f32)) {
+        for row in 0..SPIN {
+            for column in row..SPIN {
+                visit(&mut self.p[row][column]);
+                self.p[column][row] = self.p[row][column];
+            }
+        }
+        for state in SPIN..STATES {
+            visit(&mut self.p[state][state]);
+        }
+    }
+
     /// More is unknown of a state.
     pub fn open(&mut self, state: usize, variance: f32) {
         self.p[state][state] += variance;
@@ -139,6 +152,12 @@ impl Covariance {
             row[ACROSS] += dt_s * row[ACROSS_UP];
             row[ACROSS + 1] += dt_s * row[ACROSS_UP + 1];
         }
+    }
+
+    /// Variance of what a scalar sees.
+    pub fn along(&self, row: Row) -> f32 {
+        let of = |&(i, a): &(usize, f32)| -> f32 { row.iter().map(|&(j, b)| a * b * self.p[i][j]).sum() };
+        row.iter().map(of).sum()
     }
 
     /// How far a residual is off in variances, `r` being its noise's; and the residual after the scalars before it.

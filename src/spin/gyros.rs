@@ -41,6 +41,8 @@ impl Spin {
         let load = self.load();
         let gives = |quarters: &&i16| **quarters != NOT_READ && quarters.unsigned_abs() != BEYOND.unsigned_abs();
         self.seen = quarters.iter().filter(gives).count() >= 3;
+        self.answering =
+            (quarters.iter().enumerate()).fold(0, |all, (k, quarters)| all | u16::from(*quarters != NOT_READ) << k);
         for (k, (quarters, axis)) in quarters.iter().zip(&set.gyro).enumerate() {
             if *quarters == NOT_READ {
                 continue;

@@ -25,6 +25,8 @@ const ACROSS_WALK: f32 = 0.2;
 const ANGLE_WALK: f32 = 1e-4;
 /// [rad/s/sqrt(s)] walk of a gyro's bias.
 const BIAS_WALK: f32 = 1.5e-6;
+/// \[s\] longest step of the covariance: between two slices of the gyros there are 20 ms.
+const LONGEST_STEP_S: f32 = 0.03;
 /// [uT/sqrt(s)] walk of the iron.
 const IRON_WALK: f32 = 0.01;
 
@@ -46,6 +48,13 @@ impl Spin {
         if dt_s == 0.0 {
             return;
         }
+        let steps = (dt_s.abs() / LONGEST_STEP_S) as u16 + 1;
+        for _ in 0..steps {
+            self.carry_by(dt_s / f32::from(steps));
+        }
+    }
+
+    fn carry_by(&mut self, dt_s: f32) {
         let dcm = dcm_nb(&self.q_nb);
         let [y_b, z_b] = self.across_b();
         let axes_n = [dcm.column(0).into_owned(), dcm * y_b, dcm * z_b];

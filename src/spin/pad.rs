@@ -2,9 +2,12 @@
 //!
 //! In: cycles before lift-off. Out: the mean rate of each gyro with its variance, and of each accelerometer axis the mean of what
 //! it has beyond the force that all of them found. A vector of three gives neither: four gyros have one bias more, twelve
-//! accelerometers nine, and in the spin each of them is used for itself.
+//! accelerometers nine, and in the spin each of them is used for itself. And what the twelve disagree by says how far the force of all
+//! is off, better than a set that fits every unit.
 //!
 //! A cycle in which a gyro moves begins the means afresh: rails are set up, and payloads handled.
+
+use nalgebra::ComplexField;
 
 use crate::{
     calibration::Set,
@@ -17,6 +20,9 @@ const LARGEST_SPREAD: i16 = 40;
 
 /// \[counts\] by how much a period's mean may be off the mean of all: 2.7/sqrt(20) is 0.6.
 const LARGEST_CHANGE: f32 = 5.0;
+
+/// Cycles that make a mean.
+const LEAST: f32 = 5.0;
 
 /// Cycles after which the means forget: a quarter of an hour at 5 Hz; slower changes of a bias are followed.
 const MOST: f32 = 4_500.0;
@@ -52,7 +58,20 @@ impl Pad {
     pub fn rate_variance(&self, set: &Set) -> Option<f32> {
         let noise = set.gyro[0].noise;
         // Twenty samples a cycle.
-        (self.cycles >= 5.0).then(|| noise * noise / (20.0 * self.cycles) + CHANGED * CHANGED)
+        (self.cycles >= LEAST).then(|| noise * noise / (20.0 * self.cycles) + CHANGED * CHANGED)
+    }
+
+    /// [m/s2] what a component of the force that all accelerometers find is off by, standard deviation; `None` before it is known.
+    ///
+    /// Twelve axes whose errors are their own, of one variance `s`, leave `9 s` of squares beside the three components found, and a
+    /// component, the mean of four plates, has `s / 4` of it. A variance that is itself found of nine squares gives errors by
+    /// Student's distribution, whose variance is `9 / 7` of that. It holds in any attitude: the sum over the axes of what gravity
+    /// makes of scale and direction does not depend on where it points, since their squared cosines add up to four.
+    pub fn force_sd(&self) -> Option<f32> {
+        const LEFT: f32 = (TRIAD_AXES - 3) as f32;
+        let squares: f32 = self.force.iter().map(|beyond| beyond * beyond).sum();
+        let known = self.cycles >= LEAST && squares > 0.0;
+        known.then(|| ComplexField::sqrt(squares / (4.0 * (LEFT - 2.0))))
     }
 
     /// Takes a cycle: its gyros, and if all accelerometers were used the force along x_b and what each axis had beyond it.
@@ -90,5 +109,59 @@ impl Pad {
                 *mean += (now - *mean) * part;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        calibration::{Ranges, Set},
+        geometry::triad_axes_b,
+        increments::{Fast, Integrator},
+        unit::Settings,
+    };
+    use nalgebra::Vector3;
+
+    /// The mean of how far off the force is, over units whose axes are off by numbers of one deviation, is what is said of it.
+    #[test]
+    fn what_the_accelerometers_disagree_by_says_how_far_the_force_is_off() {
+        const UNITS: u32 = 400;
+        const OFF: f32 = 0.05;
+        let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+        let mut integrator = Integrator::new(1.0);
+        (0..=20).for_each(|sample| {
+            integrator.add(Fast {
+                at_us: 10_000 * sample,
+                counts: [0; PLATES],
+            });
+        });
+        let still = integrator.take();
+        let mut random = 1_u32;
+        let mut uniform = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / (1 << 24) as f32 - 0.5
+        };
+        let (mut said, mut was) = (0.0, 0.0);
+        for _ in 0..UNITS {
+            // Twelve uniform numbers have a variance of one.
+            let off: [f32; TRIAD_AXES] = core::array::from_fn(|_| OFF * (0..12).map(|_| uniform()).sum::<f32>());
+            let axes_b = triad_axes_b();
+            let mean_b: Vector3<f32> = axes_b
+                .iter()
+                .zip(off)
+                .map(|(axis_b, off)| axis_b * off)
+                .sum::<Vector3<f32>>()
+                / 4.0;
+            let beyond = core::array::from_fn(|k| off[k] - axes_b[k].dot(&mean_b));
+            let mut pad = Pad::EMPTY;
+            assert_eq!(pad.force_sd(), None);
+            (0..10).for_each(|_| pad.take(&set, &[0.0; PLATES], &still, Some((0.0, beyond))));
+            said += pad.force_sd().map_or(0.0, |sd| sd * sd);
+            was += mean_b.norm_squared() / 3.0;
+        }
+        let ratio = said / was;
+        // 9/7, and two deviations of a mean over 400 units of three components.
+        assert!((ratio - 9.0 / 7.0).abs() < 0.15, "{ratio}");
     }
 }

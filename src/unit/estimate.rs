@@ -22,8 +22,7 @@ use super::{
 use crate::{
     board::{Oscillator, Retained},
     derived::{Derived, Health, Start},
-    estimate::{Estimate, Estimator},
-    kalman::{Filter, KEPT_BYTES},
+    estimate::{Estimate, Estimator, KEPT_BYTES},
     mode::{Mode, State},
     resume::{self, POWER_CUT, Pulse},
     retained::ATTITUDE,
@@ -98,7 +97,7 @@ fn go_on(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kep
     let found = ATTITUDE.recall(memory, kept).map(<[u8]>::len);
     if was_in_flight && found == Some(KEPT_BYTES) {
         let pulse = Pulse::recall(memory).unwrap_or_default();
-        let outage = resume::outage(Filter::kept_at_us(kept), start.reset, pulse, start.crash.as_ref());
+        let outage = resume::outage(Estimator::kept_at_us(kept), start.reset, pulse, start.crash.as_ref());
         estimator.resume(kept, outage);
     }
 }
