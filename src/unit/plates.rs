@@ -107,7 +107,10 @@ impl<'a, I2C: I2c> Plates<'a, I2C> {
 
     /// Asks a plate's magnetometer for a measurement.
     pub async fn ask_field(&mut self, plate: usize) -> Result<(), PlateError<I2C>> {
-        self.magnetometers[plate].measure().await
+        match self.plates.get_mut(plate) {
+            Some(plate) => plate.magnetometer.measure().await,
+            None => Ok(()),
+        }
     }
 
     /// Takes a part's newest sample.
