@@ -46,8 +46,9 @@ const ASKED: Duration = Duration::from_micros(12_700);
 /// From a sensor's read to the next one's where all before it answer, as the slot times of a derived frame have it.
 const READ: Duration = Duration::from_micros(300);
 
-/// A question that comes later is not asked: its answer would be of another instant.
-const LATE: Duration = Duration::from_millis(1);
+/// A question that comes later has no answer yet when the magnetometer is read. One that comes late, after a part that had to be cut
+/// off, gives a set that is so much younger.
+const LATE: Duration = Duration::from_millis(6);
 
 /// Cycles closed until then make a start a healthy one: the count of those that were not begins anew.
 const HEALTHY: Instant = Instant::from_secs(60);
