@@ -89,12 +89,13 @@ impl Settings {
         }
     }
 
-    /// The magnetometers': as fast as they go, so that a set is at most 13 ms old.
+    /// The magnetometers': they measure when they are asked. The rate is the one to which their delay is the same by their own clock.
     fn magnetometer(&self) -> hmc5883l::Config {
         hmc5883l::Config {
             gain: self.field,
             rate: hmc5883l::Rate::Hz75,
             average: hmc5883l::Average::Of1,
+            mode: hmc5883l::Mode::Asked,
         }
     }
 

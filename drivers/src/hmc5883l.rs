@@ -6,8 +6,8 @@
 //! were not kept, codes the part cannot produce, and a lock that does not open; the first set after a change of settings
 //! was measured with the old gain and is withheld.
 //!
-//! A configured part measures by its own clock, and a set is up to a period old when it is read. One that is asked
-//! ([`Hmc5883l::measure`]) measures then, once: who asks knows when.
+//! A part measures by its own clock, and a set is up to a period old when it is read; or once, when it is asked
+//! ([`Mode::Asked`], [`Hmc5883l::measure`]): who asks knows when.
 //!
 //! ```
 //! use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
@@ -126,7 +126,17 @@ pub enum Average {
     Of8 = 3,
 }
 
-/// Settings; the mode is always continuous.
+/// When it measures (datasheet table 12).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// By its own clock, at the output rate.
+    #[default]
+    Continuous,
+    /// Once when it is configured, and whenever it is asked.
+    Asked,
+}
+
+/// Settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Config {
     /// Gain of all axes.
@@ -135,13 +145,19 @@ pub struct Config {
     pub rate: Rate,
     /// Averaging.
     pub average: Average,
+    /// When it measures.
+    pub mode: Mode,
 }
 
 impl Config {
     /// Configuration A, Configuration B, Mode.
     const fn registers(self) -> [u8; 3] {
         let a = (self.average as u8) << 5 | (self.rate as u8) << 2;
-        [a, (self.gain as u8) << 5, CONTINUOUS]
+        let mode = match self.mode {
+            Mode::Continuous => CONTINUOUS,
+            Mode::Asked => SINGLE,
+        };
+        [a, (self.gain as u8) << 5, mode]
     }
 }
 
@@ -152,7 +168,7 @@ pub struct Sample {
     pub counts: [i16; 3],
     /// Which of x, y, z overflowed.
     pub overflow: [bool; 3],
-    /// The part had finished writing the set (RDY), and one that measures when it is asked had been.
+    /// The part had finished writing the set (RDY), and one that measures when it is asked had been since the set before.
     pub ready: bool,
 }
 
@@ -161,7 +177,7 @@ pub struct Hmc5883l<I2C> {
     bus: I2C,
     /// The next set was measured with earlier settings.
     withhold: bool,
-    /// It measures when it is asked; whether it was, since it was read.
+    /// Of one that measures when it is asked, whether it was since it was read.
     asked: Option<bool>,
 }
 
@@ -193,7 +209,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         Ok(())
     }
 
-    /// Writes the settings and reads them back: it measures by its own clock. The next set read is withheld.
+    /// Writes the settings and reads them back; the next set read is withheld.
     pub async fn configure(&mut self, config: Config) -> Result<(), Error<I2C::Error>> {
         self.probe().await?;
         self.write(config.registers()).await?;
@@ -206,8 +222,9 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         // Reading the mode register locks the outputs (table 17); reading all of them opens the lock.
         self.two_reads((CONFIGURATION_A, &mut kept), &mut data).await?;
         let [.., mode] = &mut kept;
-        if self.asked.is_some() && (*mode == SINGLE || IDLE.contains(mode)) {
-            *mode = CONTINUOUS;
+        // It is idle after its measurement.
+        if config.mode == Mode::Asked && IDLE.contains(mode) {
+            *mode = SINGLE;
         }
         let registers = [CONFIGURATION_A, CONFIGURATION_B, MODE];
         for ((register, wrote), read) in registers.into_iter().zip(config.registers()).zip(kept) {
@@ -216,9 +233,12 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         Ok(())
     }
 
-    /// Asks for one measurement, which is there 6 ms later (datasheet, operating modes). Until it is configured again, the part
-    /// measures when it is asked.
+    /// Asks for one measurement, which is there 6 ms later (datasheet, operating modes): of a part that is configured so. What it made
+    /// of the settings before, if it has, is not withheld from the set after it.
     pub async fn measure(&mut self) -> Result<(), Error<I2C::Error>> {
+        if self.withhold {
+            self.withhold = !self.newest().await?.ready;
+        }
         self.asked = Some(false);
         let asked = self.bus.write(ADDRESS, &[MODE.address, SINGLE]).await;
         asked.map_err(|e| Error::Bus(MODE, e))?;
@@ -258,7 +278,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
     }
 
     async fn write(&mut self, [a, b, mode]: [u8; 3]) -> Result<(), Error<I2C::Error>> {
-        (self.withhold, self.asked) = (true, None);
+        (self.withhold, self.asked) = (true, (mode == SINGLE).then_some(true));
         self.bus
             .write(ADDRESS, &[CONFIGURATION_A.address, a, b, mode])
             .await

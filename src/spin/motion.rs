@@ -48,7 +48,7 @@ impl Spin {
         if dt_s == 0.0 {
             return;
         }
-        let steps = (dt_s.abs() / LONGEST_STEP_S) as u16 + 1;
+        let steps = ((dt_s.abs() / LONGEST_STEP_S) as u16).saturating_add(1);
         for _ in 0..steps {
             self.carry_by(dt_s / f32::from(steps));
         }

@@ -43,8 +43,8 @@ const GYRO_START_MS: u64 = 250;
 /// ([`crate::kalman::Delays`]).
 const ASKED: Duration = Duration::from_micros(12_700);
 
-/// From a sensor's read to the next one's where all before it answer, as the slot times of a derived frame have it.
-const READ: Duration = Duration::from_micros(300);
+/// \[us\] from a sensor's read to the next one's where all before it answer, as the slot times of a derived frame have it.
+const READ_US: u64 = 300;
 
 /// A question that comes later has no answer yet when the magnetometer is read. One that comes late, after a part that had to be cut
 /// off, gives a set that is so much younger.
@@ -113,9 +113,11 @@ pub async fn run<B: Board>(
     votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
     acquisition.cycle(counter, start).await;
     start = start.saturating_add(period / 4);
+    let limit_us = acquisition.budget.limit_us(0, 0, true);
     let mut to_verify = slots().cycle();
     let mut healthy = false;
     loop {
+        acquisition.ask_fields(votes, start, limit_us).await;
         votes.waiting(Voter::Acquire, shared.clock.until(start)).await;
         let cycle = acquisition.cycle(counter, start).await;
         votes
@@ -141,7 +143,6 @@ pub async fn run<B: Board>(
             starts.keep(memory);
         }
         start = start.saturating_add(period);
-        let limit_us = acquisition.budget.limit_us(0, 0, true);
         if after(Duration::from_micros(limit_us.saturating_mul(2))) < start
             && let Some(slot) = to_verify.next()
         {
@@ -159,7 +160,6 @@ pub async fn run<B: Board>(
                 }
             }
         }
-        acquisition.ask_fields(votes, start, limit_us).await;
     }
 }
 
@@ -285,28 +285,32 @@ impl<B: Board> Acquisition<'_, '_, B> {
 
     /// Asks the magnetometers that answer for what the cycle of this start reads. One that could not be asked has nothing new for it.
     async fn ask_fields(&mut self, votes: &Votes, start: Instant, limit_us: u64) {
-        for (slot, sensor) in SENSORS.into_iter().enumerate() {
-            let is_known = self.standing[slot] != Standing::Lost && self.shared.testing.get() != Some(slot);
+        for (number, sensor) in slots() {
+            let standing = self.standing(number);
+            let is_known = standing != Standing::Lost && self.shared.testing.get() != Some(number);
             if sensor.kind != Kind::Magnetometer || !is_known {
                 continue;
             }
-            let at = start + READ * slot as u32 - ASKED;
-            let mut asked = None;
-            if now() <= at + LATE {
+            let slot = Duration::from_micros(READ_US.saturating_mul(number as u64));
+            let at = start.saturating_add(slot).saturating_sub(ASKED);
+            let mut is_asked = false;
+            if now() <= at.saturating_add(LATE) {
                 votes.waiting(Voter::Acquire, self.shared.clock.until(at)).await;
-                let until = now() + Duration::from_micros(limit_us);
+                let until = after(Duration::from_micros(limit_us));
+                // A byte that one disturbance has spoilt is sent again, as in a read.
                 for _ in 0..2 {
-                    asked = Some(self.shared.clock.by(until, self.plates.ask_field(sensor.plate)).await);
-                    if !matches!(asked, Some(Ok(Err(_)))) {
+                    let asked = self.shared.clock.by(until, self.plates.ask_field(sensor.plate)).await;
+                    is_asked = matches!(asked, Ok(Ok(())));
+                    if asked.is_err() {
+                        self.recover().await;
+                    }
+                    if is_asked || asked.is_err() {
                         break;
                     }
                 }
             }
-            if matches!(asked, Some(Err(TimedOut))) {
-                self.recover().await;
-            }
-            if !matches!(asked, Some(Ok(Ok(())))) && self.standing[slot] == Standing::Reading {
-                self.standing[slot] = Standing::Configured;
+            if !is_asked && standing == Standing::Reading {
+                self.stand(number, Standing::Configured);
             }
         }
     }

@@ -6,7 +6,7 @@
 
 use embedded_hal_async::{delay::DelayNs, i2c::I2c};
 
-use super::{Config, DATA_X, DATA_Y, DATA_Z, Error, Gain, Hmc5883l, Rate};
+use super::{Config, DATA_X, DATA_Y, DATA_Z, Error, Gain, Hmc5883l, Mode, Rate};
 
 /// \[counts\] what self-test must move each axis by at 390 counts a gauss (datasheet, specifications).
 const COUNTS_AT_390: (i32, i32) = (243, 575);
@@ -56,8 +56,8 @@ impl<I2C: I2c> Hmc5883l<I2C> {
         bias: Bias,
         delay: &mut impl DelayNs,
     ) -> Result<[i16; 3], Error<I2C::Error>> {
-        let rate = Rate::Hz15;
-        let [a, b, mode] = Config { rate, ..config }.registers();
+        let (rate, mode) = (Rate::Hz15, Mode::Continuous);
+        let [a, b, mode] = Config { rate, mode, ..config }.registers();
         self.write([a | bias as u8, b, mode]).await?;
         delay.delay_ms(WAIT_MS).await;
         // The first set is of the old settings, as after any change.
@@ -84,13 +84,15 @@ mod tests {
         let check = |gain: Gain, bias, (a, b), data, result| {
             let config = Config {
                 gain,
+                // Which it measures in is the self-test's own business.
+                mode: Mode::Asked,
                 ..Config::default()
             };
             let expected = [
                 vec![T::write(0x1E, vec![0x00, a, b, 0x00])],
                 set(0x01, [0; 6]),
                 set(0x01, data),
-                configuration([0x18, b, 0x00], [0x18, b, 0x00]),
+                configuration([0x18, b, 0x01], [0x18, b, 0x03]),
             ];
             let mut delay = NoopDelay::new();
             let moved = with(&expected, async |part| part.self_test(config, bias, &mut delay).await);

@@ -88,7 +88,12 @@ fn a_lock_left_by_a_partial_reading_is_opened_and_the_held_set_not_used() {
 fn the_first_set_after_configuring_is_withheld() {
     let wrote = [0x78, 0xA0, 0x00];
     let (gain, rate, average) = (Gain::PerGauss390, Rate::Hz75, Average::Of8);
-    let config = Config { gain, rate, average };
+    let config = Config {
+        gain,
+        rate,
+        average,
+        ..Config::default()
+    };
     let expected = [configuration(wrote, wrote), set(0x01, [0; 6]), set(0x01, [0; 6])];
     with(&expected, async |part| {
         part.configure(config).await.unwrap();
@@ -111,29 +116,48 @@ fn a_part_that_is_asked_has_a_new_set_for_each_question() {
     let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
     let ask = || vec![T::write(0x1E, vec![0x02, 0x01])];
     let refused = vec![ask().remove(0).with_error(nack)];
-    let config = |mode| reads(0x00, &[0x18, 0x20, mode], [0; 6]);
+    let config = Config {
+        mode: Mode::Asked,
+        ..Config::default()
+    };
+    let wrote = [0x18, 0x20, 0x01];
     let expected = [
+        // It may be done already with the measurement that comes with its configuration, and idle reads as one of two codes.
+        configuration(wrote, [0x18, 0x20, 0x02]),
+        set(0x01, [0; 6]),
         ask(),
-        config(0x03),
+        reads(0x00, &[0x18, 0x20, 0x03], [0; 6]),
         set(0x01, [0; 6]),
         set(0x01, [0; 6]),
         refused,
         set(0x01, [0; 6]),
+        // Asked before that measurement is done, it makes the next one with the settings before.
+        configuration(wrote, wrote),
+        set(0x00, [0; 6]),
+        ask(),
+        set(0x01, [0; 6]),
     ];
     with(&expected, async |part| {
         let ready = async |part: &mut Hmc5883l<Mock>| part.read().await.unwrap().unwrap().ready;
+        part.configure(config).await.unwrap();
         part.measure().await.unwrap();
-        // It is idle after its measurement, and that is no other setting.
-        assert_eq!(part.verify(Config::default()).await, Ok(()));
+        assert_eq!(part.verify(config).await, Ok(()));
         assert!(ready(part).await);
         assert!(!ready(part).await, "the same set again");
         assert_eq!(part.measure().await, Err(Error::Bus(MODE, nack)));
         assert!(!ready(part).await, "a part that did not hear the question");
+        part.configure(config).await.unwrap();
+        part.measure().await.unwrap();
+        assert_eq!(part.read().await, Ok(None), "of the settings before");
     });
-    // One that measures by its own clock and went idle has lost its settings.
-    let idle = with(&[config(0x03)], async |part| part.verify(Config::default()).await);
-    let (register, wrote, read) = (MODE, 0, 3);
-    assert_eq!(idle, Err(Error::NotKept { register, wrote, read }));
+    // Each that measures as the other should has lost its settings.
+    for (mode, wrote, read) in [(Mode::Continuous, 0, 3), (Mode::Asked, 1, 0)] {
+        let kept = reads(0x00, &[0x18, 0x20, read], [0; 6]);
+        let config = Config { mode, ..config };
+        let lost = with(&[kept], async |part| part.verify(config).await);
+        let (register, read) = (MODE, read.into());
+        assert_eq!(lost, Err(Error::NotKept { register, wrote, read }));
+    }
 }
 
 #[test]
