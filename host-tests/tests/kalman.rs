@@ -161,6 +161,7 @@ impl Flight {
             Some(Sampled {
                 value_b: value_b.cast(),
                 variance: (sd * sd) as f32,
+                scatter: 0.0,
                 at_us,
             })
         };

@@ -12,9 +12,14 @@
 //! temperature is enough. The rotations up to the readings are nominal; what the calibration says of the period's is spread
 //! evenly over it when the cycle comes.
 //!
+//! **What the mean hides.** Vibration that is folded down to nothing that moves from packet to packet still moves from reading to
+//! reading: what each is off the line through the two before it has a sixth of its square as a variance of a reading. The mean of `n`
+//! readings has an `n`-th of it, and its [`Sampled::scatter`] says that nothing is at rest.
+//!
 //! Leaves out a reading of which a used axis was not read or stands at the end of its range, one whose axes do not agree on
 //! a vector (parity: what is left of `y` has three degrees of freedom less than there are axes), and all of a period after
-//! which other axes are used than before it. So a fault costs the mean, not the attitude.
+//! which other axes are used than before it. So a fault costs the mean, not the attitude. One whose axes do not agree still shows
+//! how far the force scatters: parts that measure some milliseconds apart disagree where it moves fast.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -43,6 +48,11 @@ pub(super) struct Averager {
     kept: f32,
     /// \[s\] sum of what the rotations up to them cover.
     covered_s: f32,
+    /// The two forces before, the latest first, in the same b.
+    before_b: [Option<Vector3<f32>>; 2],
+    /// [m2/s4] sum of a sixth of the square by which each is off the line through the two before it, and how many.
+    unforeseen: f32,
+    lines: f32,
 }
 
 /// How far b turned in a period.
@@ -80,6 +90,9 @@ impl Averager {
         sum_b: Vector3::new(0.0, 0.0, 0.0),
         kept: 0.0,
         covered_s: 0.0,
+        before_b: [None; 2],
+        unforeseen: 0.0,
+        lines: 0.0,
     };
 
     /// Takes the next reading before the packet with this counter. Those taken before another are of a cycle that was lost,
@@ -90,18 +103,26 @@ impl Averager {
             self.counter = counter;
         }
         self.taken = self.taken.saturating_add(1);
-        if let Some(change_b) = self.change(reading, set) {
+        if let Some((change_b, agrees)) = self.change(reading, set) {
             let nominal_b = Vector3::from(reading.angle_b);
             let covered_us = reading.covered_us.max(1) as f32;
             let angle_b = nominal_b + nominal_b * (reading.after_us as f32 / covered_us);
-            self.sum_b += turned(self.force_b + change_b, &-angle_b);
-            self.kept += 1.0;
-            self.covered_s += reading.covered_us as f32 * 1e-6;
+            let force_b = turned(self.force_b + change_b, &-angle_b);
+            if let [Some(last_b), Some(last_but_one_b)] = self.before_b {
+                self.unforeseen += off(&force_b, &line_b(&last_b, &last_but_one_b));
+                self.lines += 1.0;
+            }
+            self.before_b = [Some(force_b), self.before_b[0]];
+            if agrees {
+                self.sum_b += force_b;
+                self.kept += 1.0;
+                self.covered_s += reading.covered_us as f32 * 1e-6;
+            }
         }
     }
 
-    /// [m/s2] what a reading's force is more than that of the cycle before, in b of the reading.
-    fn change(&self, reading: &Force, set: &Set) -> Option<Vector3<f32>> {
+    /// [m/s2] what a reading's force is more than that of the cycle before, in b of the reading, and whether its axes agree on it.
+    fn change(&self, reading: &Force, set: &Set) -> Option<(Vector3<f32>, bool)> {
         let covariance_b = self.covariance_b.as_ref()?;
         let (mut along_b, mut squares, mut white) = (Vector3::zeros(), 0.0, 0.0);
         let mut left = self.used;
@@ -124,12 +145,25 @@ impl Averager {
         // A difference has twice the variance of a reading.
         let each = 2.0 * PARITY * white + APART * APART * axes;
         let most = each * (axes - 3.0) / axes + MISALIGNED * MISALIGNED * squares;
-        (over <= most).then_some(change_b)
+        Some((change_b, over <= most))
     }
 
-    /// Makes the force of a cycle, found with the axes `used`, the mean of itself and of the readings before it.
+    /// Makes the force of a cycle, found with the axes `used`, the mean of itself and of the readings before it, with the variance
+    /// that they show.
     pub fn average(&self, force: &mut Sampled, used: u16, turn: &Turn) {
-        if self.kept <= 0.0 || self.used != used {
+        if self.used != used {
+            return;
+        }
+        let turned_b = turn.calibrated_b + turn.since_b;
+        let (mut unforeseen, mut lines) = (self.unforeseen, self.lines);
+        if let [Some(last_b), Some(last_but_one_b)] = self.before_b {
+            unforeseen += off(&force.value_b, &turned(line_b(&last_b, &last_but_one_b), &turned_b));
+            lines += 1.0;
+        }
+        if lines > 0.0 {
+            force.is_of_readings_with(unforeseen / (3.0 * lines));
+        }
+        if self.kept <= 0.0 {
             return;
         }
         // What the calibration adds to the nominal turn up to a reading, in the mean.
@@ -137,7 +171,7 @@ impl Averager {
         let added_b = (turn.calibrated_b - Vector3::from(turn.nominal_b)) * part;
         let sum_b = self.sum_b + added_b.cross(&self.sum_b);
         let each = 1.0 / (self.kept + 1.0);
-        force.value_b = (force.value_b + turned(sum_b, &(turn.calibrated_b + turn.since_b))) * each;
+        force.value_b = (force.value_b + turned(sum_b, &turned_b)) * each;
         force.variance *= each;
     }
 
@@ -154,11 +188,12 @@ impl Averager {
     fn forget(&mut self) {
         (self.taken, self.kept, self.covered_s) = (0, 0.0, 0.0);
         self.sum_b = Vector3::zeros();
+        self.before_b = [Some(self.force_b), None];
+        (self.unforeseen, self.lines) = (0.0, 0.0);
     }
 
     /// The next period begins with a cycle's reading and its force.
     pub fn begin(&mut self, acc_p: &[[i16; 3]; 4], force: &Solution, set: &Set) {
-        self.forget();
         let used = if force.known == Known::All { force.used } else { 0 };
         if self.used != used {
             self.used = used;
@@ -166,6 +201,7 @@ impl Averager {
         }
         self.acc_p = *acc_p;
         self.force_b = force.vector_b;
+        self.forget();
     }
 }
 
@@ -174,6 +210,16 @@ fn covariance(set: &Set, used: u16) -> Option<Matrix3<f32>> {
     let axes_b = set.acc.map(|axis| axis.axis_b);
     let found = solve(&axes_b, &[0.0; TRIAD_AXES], &[1.0; TRIAD_AXES], used);
     (found.known == Known::All).then_some(found.covariance_b)
+}
+
+/// Where the line through two forces goes.
+fn line_b(last_b: &Vector3<f32>, last_but_one_b: &Vector3<f32>) -> Vector3<f32> {
+    last_b * 2.0 - last_but_one_b
+}
+
+/// By how much a force is off that line, as the square that has the variance of one of the three.
+fn off(force_b: &Vector3<f32>, foreseen_b: &Vector3<f32>) -> f32 {
+    (force_b - foreseen_b).norm_squared() / 6.0
 }
 
 /// Components of a vector that stands still, after b turned: `exp(-d x) v` by the Gibbs vector `tan(d/2)`, whose series to

@@ -43,6 +43,7 @@ impl Estimator {
         Some(Sampled {
             value_b: solution.vector_b,
             variance,
+            scatter: 0.0,
             at_us: sample.start_us.saturating_add(mean_us),
         })
     }

@@ -66,8 +66,7 @@ impl Filter {
             near.then(|| (sampled, dcm * dcm_nb(&from_rotation_vector(rate_b * offset_s))))
         };
         if let Some((acc, dcm)) = carried(step.acc, delays.acc_s) {
-            self.window
-                .take_acc(&(dcm * acc.value_b), acc.variance, self.params.gravity);
+            self.window.take_acc(&(dcm * acc.value_b), &acc, self.params.gravity);
         }
         if let Some((mag, dcm)) = carried(step.mag, delays.mag_s) {
             self.window.take_mag(&mag.value_b, &dcm, mag.variance);

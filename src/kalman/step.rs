@@ -11,6 +11,8 @@ pub struct Sampled {
     pub value_b: Vector3<f32>,
     /// White variance of each component, in the square of that unit.
     pub variance: f32,
+    /// Mean square by which the readings that it is the mean of scatter beyond their noise, of all components; zero of a single one.
+    pub scatter: f32,
     /// \[us\] when it was sampled, as stamped; `Params::delays` are taken off.
     pub at_us: u64,
 }
@@ -76,14 +78,27 @@ impl Step {
     }
 }
 
+/// What no line through the samples before foresees is noise up to so many times the variance of that, and motion beyond.
+pub(super) const BEYOND_NOISE: f32 = 2.0;
+
 /// Longer than any specific force or field that a sensor could give: what is beyond is a fault.
 const LONGEST_SAMPLE: f32 = 1e4;
 
 impl Sampled {
+    /// It is one of readings that have this variance in each component, found from how they move, or will be their mean.
+    pub fn is_of_readings_with(&mut self, variance: f32) {
+        if variance > BEYOND_NOISE * self.variance {
+            self.scatter = 3.0 * (variance - self.variance);
+            self.variance = variance;
+        }
+    }
+
     /// Finite, and no larger than a sensor could give.
     pub(super) fn is_believable(&self) -> bool {
         self.value_b.norm_squared() < LONGEST_SAMPLE * LONGEST_SAMPLE
             && self.variance >= 0.0
             && self.variance < LONGEST_SAMPLE
+            && self.scatter >= 0.0
+            && self.scatter < LONGEST_SAMPLE * LONGEST_SAMPLE
     }
 }

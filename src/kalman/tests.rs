@@ -48,6 +48,7 @@ impl World {
                 Some(Sampled {
                     value_b,
                     variance: 0.0,
+                    scatter: 0.0,
                     at_us: self.at_us,
                 })
             };

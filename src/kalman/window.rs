@@ -5,7 +5,14 @@
 
 use nalgebra::{ComplexField, Matrix3, Vector2, Vector3};
 
-use super::{Params, at_least, field_sums::FieldSums, innovation::Noise, square, state::DRIVERS};
+use super::{
+    Params, at_least,
+    field_sums::FieldSums,
+    innovation::Noise,
+    square,
+    state::DRIVERS,
+    step::{BEYOND_NOISE, Sampled},
+};
 
 /// Running sums.
 #[derive(Clone, Debug)]
@@ -37,6 +44,8 @@ struct Sum {
     total_n: Vector3<f32>,
     squares: f32,
     variance: f32,
+    /// Sum of how far the readings scatter that each sample is the mean of.
+    scatter: f32,
     /// Sum of the squares of what each sample is off the line through the two before it, in variances of a sample.
     unforeseen: f32,
     /// The two samples before, the latest first, be they of the window before.
@@ -51,12 +60,13 @@ impl Sum {
         total_n: Vector3::new(0.0, 0.0, 0.0),
         squares: 0.0,
         variance: 0.0,
+        scatter: 0.0,
         unforeseen: 0.0,
         before_n: [None; 2],
         began_n: None,
     };
 
-    fn take(&mut self, sample_n: &Vector3<f32>, variance: f32) {
+    fn take(&mut self, sample_n: &Vector3<f32>, variance: f32, scatter: f32) {
         self.count += 1.0;
         self.total_n += sample_n;
         if let [Some(last_n), Some(last_but_one_n)] = self.before_n {
@@ -65,6 +75,7 @@ impl Sum {
         self.before_n = [Some(*sample_n), self.before_n[0]];
         self.squares += sample_n.norm_squared();
         self.variance += variance;
+        self.scatter += scatter;
     }
 
     fn mean(&self) -> Vector3<f32> {
@@ -76,12 +87,12 @@ impl Sum {
         self.variance / self.count
     }
 
-    /// Mean square distance from the mean, all axes, without the samples' own noise.
+    /// Mean square distance from the mean, all axes, without the samples' own noise; with what a sample that is a mean hides.
     fn spread(&self) -> f32 {
         at_least(
             0.0,
             self.squares / self.count - self.mean().norm_squared() - 3.0 * self.noise(),
-        )
+        ) + self.scatter / self.count
     }
 
     /// Variance of a component of a sample: the sensor's, or that of what moved too fast for the samples if it shows
@@ -89,7 +100,11 @@ impl Sum {
     fn missed(&self) -> f32 {
         let unforeseen = self.unforeseen / (3.0 * self.count);
         let noise = self.noise();
-        if unforeseen > 2.0 * noise { unforeseen } else { noise }
+        if unforeseen > BEYOND_NOISE * noise {
+            unforeseen
+        } else {
+            noise
+        }
     }
 
     /// Mean by trapezoids over the whole window: of the samples at its two ends half each.
@@ -200,10 +215,10 @@ impl Window {
         }
     }
 
-    /// A sample of specific force.
-    pub fn take_acc(&mut self, acc_n: &Vector3<f32>, variance: f32, gravity: f32) {
+    /// A sample of specific force, in n.
+    pub fn take_acc(&mut self, acc_n: &Vector3<f32>, sampled: &Sampled, gravity: f32) {
         self.far_from_one_g |= !is_near(acc_n, gravity, SAMPLE_NEAR_ONE_G);
-        self.acc.take(acc_n, variance);
+        self.acc.take(acc_n, sampled.variance, sampled.scatter);
     }
 
     /// Becomes the window that follows this one, whose means are these, in the same axes.

@@ -105,6 +105,7 @@ mod counted {
                 Some(Sampled {
                     value_b,
                     variance,
+                    scatter: 0.0,
                     at_us: sample.at_us,
                 })
             };

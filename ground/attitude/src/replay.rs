@@ -74,6 +74,7 @@ impl Replay {
             value.map(|value| Sampled {
                 value_b: value.cast(),
                 variance,
+                scatter: 0.0,
                 at_us,
             })
         };

@@ -32,9 +32,9 @@ fn counts(set: &Set, force_b: &Vector3<f32>) -> [[i16; 3]; 4] {
     core::array::from_fn(|plate| core::array::from_fn(|k| along[3 * plate + k]))
 }
 
-/// Force in b at the packet and its variance, by a unit that turns at `RATE_B` and whose gyros see `seen_b`, after
+/// Force in b at the packet, by a unit that turns at `RATE_B` and whose gyros see `seen_b`, after
 /// the pushes in n at the two readings and the packet; `spoil` may change what was read between.
-fn mean(seen_b: Vector3<f32>, pushes_n: [f32; 3], spoil: impl Fn(&mut Increments)) -> (Vector3<f32>, f32) {
+fn mean(seen_b: Vector3<f32>, pushes_n: [f32; 3], spoil: impl Fn(&mut Increments)) -> Sampled {
     let set = set();
     let force_b = |reading: usize| {
         let turned = from_rotation_vector(RATE_B * APART_S * (reading as f32 + 1.0));
@@ -67,6 +67,7 @@ fn mean(seen_b: Vector3<f32>, pushes_n: [f32; 3], spoil: impl Fn(&mut Increments
     let mut force = Sampled {
         value_b: force_b(2),
         variance: 3e-4,
+        scatter: 0.0,
         at_us: 0,
     };
     let turn = Turn {
@@ -76,7 +77,7 @@ fn mean(seen_b: Vector3<f32>, pushes_n: [f32; 3], spoil: impl Fn(&mut Increments
         covered_s,
     };
     averager.average(&mut force, ALL, &turn);
-    (force.value_b, force.variance)
+    force
 }
 
 fn at_the_packet(push_n: f32) -> Vector3<f32> {
@@ -89,29 +90,51 @@ const ROUNDING: f32 = 0.02;
 
 #[test]
 fn what_stands_still_is_seen_alike_by_a_unit_that_turns() {
-    let (force_b, variance) = mean(RATE_B, [0.0; 3], |_| {});
+    let force = mean(RATE_B, [0.0; 3], |_| {});
+    let force_b = force.value_b;
     assert!((force_b - at_the_packet(0.0)).norm() < ROUNDING, "{force_b}");
-    assert!((variance - 1e-4).abs() < 1e-9);
+    assert!((force.variance - 1e-4).abs() < 1e-9);
+    assert_eq!(force.scatter, 0.0);
     // As it is without turning what was read.
     let unturned = |increments: &mut Increments| {
         let angle_b = increments.angle_b;
         increments.forces.iter_mut().for_each(|force| force.angle_b = angle_b);
     };
-    let (force_b, _) = mean(RATE_B, [0.0; 3], unturned);
+    let force_b = mean(RATE_B, [0.0; 3], unturned).value_b;
     assert!((force_b - at_the_packet(0.0)).norm() > 10.0 * ROUNDING, "{force_b}");
 }
 
 #[test]
 fn the_calibration_of_the_gyros_holds_for_the_turn_up_to_a_reading_too() {
     let biased = RATE_B + Vector3::new(0.05, -0.04, 0.03);
-    let (force_b, _) = mean(biased, [0.0; 3], |_| {});
+    let force_b = mean(biased, [0.0; 3], |_| {}).value_b;
     assert!((force_b - at_the_packet(0.0)).norm() < ROUNDING, "{force_b}");
 }
 
 #[test]
 fn a_push_between_two_packets_counts_for_its_part() {
-    let (force_b, _) = mean(RATE_B, [3.0, 0.0, -1.5], |_| {});
+    let force_b = mean(RATE_B, [3.0, 0.0, -1.5], |_| {}).value_b;
     assert!((force_b - at_the_packet(0.5)).norm() < ROUNDING, "{force_b}");
+}
+
+/// Once a packet the push is as it was: from packet to packet nothing moves.
+#[test]
+fn what_moves_between_two_packets_is_in_the_variance_of_the_mean() {
+    const PUSH: f32 = 3.0;
+    // 0, 1, -1, 0: twice off the line through the two before, by three times the push each.
+    let force = mean(RATE_B, [PUSH, -PUSH, 0.0], |_| {});
+    let of_a_reading = PUSH * PUSH * 9.0 / 6.0 / 3.0;
+    assert!(
+        (force.scatter - 3.0 * of_a_reading).abs() < 0.05 * of_a_reading,
+        "{force:?}"
+    );
+    assert!(
+        (force.variance - of_a_reading / 3.0).abs() < 0.02 * of_a_reading,
+        "{force:?}"
+    );
+    // A push that grows evenly is a motion that is seen.
+    let force = mean(RATE_B, [PUSH, 2.0 * PUSH, 3.0 * PUSH], |_| {});
+    assert_eq!(force.scatter, 0.0);
 }
 
 #[test]
@@ -140,9 +163,13 @@ fn readings_of_a_cycle_that_was_lost_are_forgotten() {
 #[test]
 fn a_reading_with_an_axis_that_is_wrong_missing_or_at_its_end_is_left_out() {
     for wrong in [NOT_READ, 2047, -2048, 300] {
-        let (force_b, variance) = mean(RATE_B, [0.0; 3], |increments| increments.forces[1].acc_p[2][1] = wrong);
+        let force = mean(RATE_B, [0.0; 3], |increments| increments.forces[1].acc_p[2][1] = wrong);
+        let (force_b, variance) = (force.value_b, force.variance);
         assert!((force_b - at_the_packet(0.0)).norm() < ROUNDING, "{wrong}: {force_b}");
-        assert!((variance - 1.5e-4).abs() < 1e-9, "{wrong}: {variance}");
+        // That an axis moved so far costs the mean its weight, too.
+        let is_in_range = RANGE.contains(&wrong);
+        assert_eq!(force.scatter > 0.0, is_in_range);
+        assert!(is_in_range || (variance - 1.5e-4).abs() < 1e-9, "{wrong}: {variance}");
     }
     // An axis that has just come to its end.
     let set = set();
@@ -172,6 +199,7 @@ fn a_reading_with_an_axis_that_is_wrong_missing_or_at_its_end_is_left_out() {
     let mut force = Sampled {
         value_b: GRAVITY_N,
         variance: 3e-4,
+        scatter: 0.0,
         at_us: 0,
     };
     let turn = Turn {
@@ -182,8 +210,8 @@ fn a_reading_with_an_axis_that_is_wrong_missing_or_at_its_end_is_left_out() {
     };
     averager.average(&mut force, ALL, &turn);
     assert_eq!((force.value_b, force.variance), (GRAVITY_N, 3e-4));
-    let (force_b, variance) = mean(RATE_B, [9.0, 9.0, 0.0], |increments| {
+    let force = mean(RATE_B, [9.0, 9.0, 0.0], |increments| {
         increments.forces = [Force::NONE; crate::increments::forces::READINGS];
     });
-    assert_eq!((force_b, variance), (at_the_packet(0.0), 3e-4));
+    assert_eq!((force.value_b, force.variance), (at_the_packet(0.0), 3e-4));
 }

@@ -146,6 +146,7 @@ fn the_covariance_stays_positive_for_a_day_at_rest() {
             Some(Sampled {
                 value_b,
                 variance: 0.0,
+                scatter: 0.0,
                 at_us: world.at_us,
             })
         };

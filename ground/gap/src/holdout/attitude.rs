@@ -237,6 +237,7 @@ impl<'a> Estimation<'a> {
                 track.vectors[kind][at].map(|value_b| Sampled {
                     value_b: value_b.cast(),
                     variance: variances[kind] as f32,
+                    scatter: 0.0,
                     at_us: micros(start_s + at_s),
                 })
             };
