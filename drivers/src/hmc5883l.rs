@@ -280,7 +280,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
     async fn write(&mut self, [a, b, mode]: [u8; 3]) -> Result<(), Error<I2C::Error>> {
         (self.withhold, self.asked) = (true, (mode == SINGLE).then_some(true));
         self.bus
-            .write(ADDRESS, &[CONFIGURATION_A.address, a, b, mode])
+            .transaction(ADDRESS, &mut [Operation::Write(&[CONFIGURATION_A.address, a, b, mode])])
             .await
             .map_err(|e| Error::Bus(CONFIGURATION_A, e))
     }

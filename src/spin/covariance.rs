@@ -62,8 +62,10 @@ impl Covariance {
     /// Independent states with these variances.
     pub fn of(variances: &[f32; STATES]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
-        for (k, (row, variance)) in p.iter_mut().zip(variances).enumerate() {
-            row[k] = *variance;
+        for ((k, row), variance) in (0..STATES).zip(&mut p).zip(variances) {
+            if let Some(own) = row.get_mut(k) {
+                *own = *variance;
+            }
         }
         Covariance {
             p,
@@ -156,20 +158,19 @@ impl Covariance {
 
     /// Variance of what a scalar sees.
     pub fn along(&self, row: Row) -> f32 {
-        let of = |&(i, a): &(usize, f32)| -> f32 { row.iter().map(|&(j, b)| a * b * self.p[i][j]).sum() };
+        let of = |&(i, a): &(usize, f32)| -> f32 { row.iter().map(|&(j, b)| a * b * self.of_both(i, j)).sum() };
         row.iter().map(of).sum()
+    }
+
+    fn of_both(&self, i: usize, j: usize) -> f32 {
+        self.p.get(i).and_then(|row| row.get(j)).copied().unwrap_or_default()
     }
 
     /// How far a residual is off in variances, `r` being its noise's; and the residual after the scalars before it.
     pub fn look(&self, row: Row, residual: f32, r: f32) -> (f32, f32) {
-        let (mut of_state, mut left) = (0.0, residual);
-        for &(i, a) in row {
-            left -= a * self.error[i];
-            for &(j, b) in row {
-                of_state += a * b * self.p[i][j];
-            }
-        }
-        (left * left / (of_state + r), left)
+        let known = |&(i, a): &(usize, f32)| a * self.error.get(i).copied().unwrap_or_default();
+        let left = residual - row.iter().map(known).sum::<f32>();
+        (left * left / (self.along(row) + r), left)
     }
 
     /// Takes a scalar with white variance `r`. By how many times its variance it was off, squared; used only up to `gate`.

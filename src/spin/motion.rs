@@ -34,7 +34,8 @@ impl Spin {
     /// Attitude and angle spun after so long, of either sign.
     pub(super) fn carried(&self, dt_s: f32) -> (UnitQuaternion<f32>, f32) {
         let half = 0.5 * dt_s;
-        let across = [0, 1].map(|axis| (self.across[axis] + half * self.across_up[axis]) * dt_s);
+        let ([y, z], [y_up, z_up]) = (self.across, self.across_up);
+        let across = [(y + half * y_up) * dt_s, (z + half * z_up) * dt_s];
         let spun = (self.spin + half * self.spin_up) * dt_s;
         let turned = from_rotation_vector(self.turning_b(across)) * from_rotation_vector(Vector3::new(spun, 0.0, 0.0));
         let earth = from_rotation_vector(self.place.earth_rate_n * -dt_s);

@@ -299,7 +299,10 @@ impl<B: Board> Acquisition<'_, '_, B> {
                 let until = after(Duration::from_micros(limit_us));
                 // A byte that one disturbance has spoilt is sent again, as in a read.
                 for _ in 0..2 {
-                    let asked = self.shared.clock.by(until, self.plates.ask_field(sensor.plate)).await;
+                    let Some(asking) = self.plates.ask_field(sensor.plate) else {
+                        break;
+                    };
+                    let asked = self.shared.clock.by(until, asking).await;
                     is_asked = matches!(asked, Ok(Ok(())));
                     if asked.is_err() {
                         self.recover().await;

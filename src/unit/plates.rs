@@ -106,11 +106,8 @@ impl<'a, I2C: I2c> Plates<'a, I2C> {
     }
 
     /// Asks a plate's magnetometer for a measurement.
-    pub async fn ask_field(&mut self, plate: usize) -> Result<(), PlateError<I2C>> {
-        match self.plates.get_mut(plate) {
-            Some(plate) => plate.magnetometer.measure().await,
-            None => Ok(()),
-        }
+    pub fn ask_field(&mut self, plate: usize) -> Option<impl Future<Output = Result<(), PlateError<I2C>>>> {
+        self.plates.get_mut(plate).map(|plate| plate.magnetometer.measure())
     }
 
     /// Takes a part's newest sample.

@@ -70,13 +70,9 @@ impl<I2C: I2c> Hmc5883l<I2C> {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-    use std::vec;
-
     use embedded_hal_mock::eh1::delay::NoopDelay;
-    use embedded_hal_mock::eh1::i2c::Transaction as T;
 
-    use super::super::tests::{configuration, set, with};
+    use super::super::tests::{configuration, set, with, writes};
     use super::*;
 
     #[test]
@@ -89,7 +85,7 @@ mod tests {
                 ..Config::default()
             };
             let expected = [
-                vec![T::write(0x1E, vec![0x00, a, b, 0x00])],
+                writes([a, b, 0x00]),
                 set(0x01, [0; 6]),
                 set(0x01, data),
                 configuration([0x18, b, 0x01], [0x18, b, 0x03]),

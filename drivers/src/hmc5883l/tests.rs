@@ -36,9 +36,16 @@ fn identity(bytes: &[u8; 3]) -> Vec<T> {
     vec![T::write_read(0x1E, vec![0x0A], bytes.to_vec())]
 }
 
+pub(super) fn writes([a, b, mode]: [u8; 3]) -> Vec<T> {
+    vec![
+        T::transaction_start(0x1E),
+        T::write(0x1E, vec![0x00, a, b, mode]),
+        T::transaction_end(0x1E),
+    ]
+}
+
 pub(super) fn configuration(wrote: [u8; 3], kept: [u8; 3]) -> Vec<T> {
-    let write = T::write(0x1E, [&[0x00][..], &wrote].concat());
-    [identity(b"H43"), vec![write], reads(0x00, &kept, [0; 6])].concat()
+    [identity(b"H43"), writes(wrote), reads(0x00, &kept, [0; 6])].concat()
 }
 
 #[test]
