@@ -45,3 +45,27 @@ fn a_part_that_holds_the_clock_in_its_self_test_holds_neither_packets_nor_the_bu
     );
     assert_eq!(flown.packets.last().map(|(_, reading)| reading.errors.0), Some(0));
 }
+
+/// What its registers hold when they stop is what they hold ever after, the mode of a part that has measured among it. It fails its test
+/// and is then read as before, so that its one value is seen: it has not lost its settings.
+#[test]
+fn a_magnetometer_whose_registers_stand_still_is_read_after_its_self_test() {
+    let frozen_slot = 5;
+    let flown = Flight::ideal(world("still"))
+        .fault(900 * MS, Fault::Frozen(frozen_slot, true))
+        .say(2 * S + 20 * MS, b"G_AT")
+        .fly(14 * S);
+    assert!(flown.replied("magnetometer 2 failed"), "{:?}", flown.replies());
+    assert!(flown.replied("G_AT done"), "{:?}", flown.replies());
+    let last: Vec<_> = flown
+        .packets
+        .iter()
+        .rev()
+        .take(10)
+        .map(|(_, reading)| *reading)
+        .collect();
+    for reading in &last {
+        assert_eq!(reading.errors.0, 0);
+        assert_eq!(reading.mag_p[1], last[0].mag_p[1]);
+    }
+}
