@@ -293,7 +293,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
             }
             let slot = Duration::from_micros(READ_US.saturating_mul(number as u64));
             let at = start.saturating_add(slot).saturating_sub(ASKED);
-            let mut is_asked = false;
+            let (mut is_asked, mut left) = (false, Standing::Configured);
             if now() <= at.saturating_add(LATE) {
                 votes.waiting(Voter::Acquire, self.shared.clock.until(at)).await;
                 let until = after(Duration::from_micros(limit_us));
@@ -305,6 +305,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
                     let asked = self.shared.clock.by(until, asking).await;
                     is_asked = matches!(asked, Ok(Ok(())));
                     if asked.is_err() {
+                        left = Standing::Doubted;
                         self.recover().await;
                     }
                     if is_asked || asked.is_err() {
@@ -313,7 +314,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
                 }
             }
             if !is_asked && standing == Standing::Reading {
-                self.stand(number, Standing::Configured);
+                self.stand(number, left);
             }
         }
     }
