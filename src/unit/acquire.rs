@@ -58,6 +58,8 @@ const HEALTHY: Instant = Instant::from_secs(60);
 enum Standing {
     /// It failed, or was never configured.
     Lost,
+    /// It was asked to measure and ran out of time: this cycle does not read it, which would hold its plate once more.
+    Unasked,
     /// It ran out of time once: its next fresh sample is good.
     Doubted,
     /// Configured; its next fresh sample is its first good one.
@@ -193,6 +195,8 @@ impl<B: Board> Acquisition<'_, '_, B> {
                 self.health = self.health.with(Health::DEADLINE);
             } else if lost {
                 self.configure(slot, limit_us).await;
+            } else if self.standing(number) == Standing::Unasked {
+                self.stand(number, Standing::Doubted);
             } else if self.read(slot, limit_us, &mut reading).await {
                 *slot_us = elapsed_us as u32;
                 reading.errors.remove(number);
@@ -293,7 +297,7 @@ impl<B: Board> Acquisition<'_, '_, B> {
             }
             let slot = Duration::from_micros(READ_US.saturating_mul(number as u64));
             let at = start.saturating_add(slot).saturating_sub(ASKED);
-            let (mut is_asked, mut left) = (false, Standing::Configured);
+            let mut is_asked = false;
             if now() <= at.saturating_add(LATE) {
                 votes.waiting(Voter::Acquire, self.shared.clock.until(at)).await;
                 let until = after(Duration::from_micros(limit_us));
@@ -302,19 +306,20 @@ impl<B: Board> Acquisition<'_, '_, B> {
                     let Some(asking) = self.plates.ask_field(sensor.plate) else {
                         break;
                     };
-                    let asked = self.shared.clock.by(until, asking).await;
-                    is_asked = matches!(asked, Ok(Ok(())));
-                    if asked.is_err() {
-                        left = Standing::Doubted;
-                        self.recover().await;
+                    match self.shared.clock.by(until, asking).await {
+                        Ok(Ok(())) => is_asked = true,
+                        Ok(Err(_)) => continue,
+                        Err(TimedOut) if standing == Standing::Doubted => self.abandon((number, sensor)).await,
+                        Err(TimedOut) => {
+                            self.stand(number, Standing::Unasked);
+                            self.recover().await;
+                        }
                     }
-                    if is_asked || asked.is_err() {
-                        break;
-                    }
+                    break;
                 }
             }
-            if !is_asked && standing == Standing::Reading {
-                self.stand(number, left);
+            if !is_asked && self.standing(number) == Standing::Reading {
+                self.stand(number, Standing::Configured);
             }
         }
     }
