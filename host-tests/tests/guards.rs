@@ -87,8 +87,9 @@ fn s2_parts_that_run_out_of_time_at_once_leave_the_packet_its_deadline() {
         });
         let flown = flight.fly(6 * S);
         let cycle_us = flown.derived.iter().map(|frame| frame.cycle_us).max().unwrap_or(0);
-        // A part that holds on takes its plate with it, so from the fourth on all plates are gone.
-        assert!(cycle_us > 50_000 && cycle_us <= 190_000, "{k}: {cycle_us} us");
+        // A part that holds on takes its plate with it, so from the fourth on all plates are gone. Of a plate two parts are cut off in
+        // the cycle, for 16 ms each; its magnetometer is where it is asked to measure, before the cycle.
+        assert!(cycle_us > 32_000 && cycle_us <= 190_000, "{k}: {cycle_us} us");
         let counters: Vec<u16> = flown.packets.iter().map(|(_, reading)| reading.counter).collect();
         assert!(counters.is_sorted() && counters.len() >= 26, "{k}: {counters:?}");
         assert!(

@@ -88,6 +88,12 @@ pub struct Entry {
     pub freedom: usize,
     /// Covariance of sensitivity, bias and scale in this order, by rows.
     pub covariance: Vec<Vec<f64>>,
+    /// \[s\] by how much later it reads, where `ground gap` found that: the unit has it in its estimator and not in its set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
+    /// \[m\] its place in b, where `ground gap` found another than was described: for the description.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lever_m: Option<[f64; 3]>,
 }
 
 /// Why a set cannot be used.
@@ -200,6 +206,8 @@ impl Entry {
                 scatter_counts: fit.scatter,
                 freedom: fit.freedom,
                 covariance: rows(&fit.covariance),
+                delay_s: None,
+                lever_m: None,
             }
         };
         calibration.channels.iter().map(entry).collect()
@@ -237,6 +245,8 @@ impl Entry {
                 scatter_counts: found.scatter,
                 freedom: found.freedom,
                 covariance: rows(&covariance),
+                delay_s: None,
+                lever_m: None,
             }
         };
         (0..3).map(entry).collect()

@@ -63,6 +63,8 @@ fn axis_entry(name: String, sensor: &str, lsb: f64, fit: &AxisFit) -> Entry {
         scatter_counts: fit.scatter / lsb,
         freedom: fit.freedom,
         covariance: rows(&(&fit.covariance / lsb.powi(2))),
+        delay_s: None,
+        lever_m: None,
     }
 }
 
@@ -85,5 +87,7 @@ fn gyro_entry(name: String, fit: &GyroFit) -> Entry {
         scatter_counts: fit.scatter / GYRO_LSB,
         freedom: fit.freedom,
         covariance: rows(&covariance),
+        delay_s: None,
+        lever_m: None,
     }
 }

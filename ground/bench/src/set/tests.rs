@@ -19,6 +19,8 @@ fn entry(name: &str) -> Entry {
         covariance: (0..6)
             .map(|k| (0..6).map(|j| if k == j { 0.01 } else { 0.0 }).collect())
             .collect(),
+        delay_s: None,
+        lever_m: None,
     }
 }
 
@@ -54,7 +56,7 @@ fn what_means_nothing_is_refused() {
         ("-12.5", "nan", "no number"),
         ("freedom = 18", "freedom = -1", "invalid"),
         ("bias_counts = ", "bias_count = ", "is bias_counts meant?"),
-        ("number = ", "numbr = ", "is number meant?"),
+        ("number = ", "numbers = ", "is number meant?"),
         ("sha256 = ", "sha265 = ", "is sha256 meant?"),
     ] {
         let broken = text.replacen(from, to, 1);

@@ -8,7 +8,7 @@
 //! always on, what changes the scatter, and what is the reference's fault is not the unit's to correct and is left out: each
 //! effect's page says so ([`CorrectedAs`]).
 //!
-//! The set's format has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
+//! The unit's image of a set has no delay and no place. They stand in it as `delay_s` and `lever_m`, which `calibration apply`
 //! passes over: the first belongs into the estimator's `Delays`, the second into the unit's `place_b`.
 
 use bench::set::{Entry, Set, SetError};
@@ -75,22 +75,7 @@ impl Correction {
         set.channels = sensed()
             .map(|(channel, response)| entry(channel, response, twin.environment().temperature_c, range_c))
             .collect();
-        let mut text = String::new();
-        for line in set.text()?.lines() {
-            text.push_str(line);
-            text.push('\n');
-            let named = sensed().find(|(channel, _)| line == format!("name = \"{}\"", channel.name));
-            if let Some((channel, response)) = named {
-                if response.delay_s != 0.0 {
-                    text.push_str(&format!("delay_s = {:.6}\n", response.delay_s));
-                }
-                if response.lever_m != channel.lever_m {
-                    let [x, y, z] = response.lever_m.into();
-                    text.push_str(&format!("lever_m = [{x:.5}, {y:.5}, {z:.5}]\n"));
-                }
-            }
-        }
-        Ok(text)
+        set.text()
     }
 }
 
@@ -193,6 +178,8 @@ fn entry(channel: &Channel, response: &Response, standard_c: f64, range_c: (f64,
         covariance: (0..size)
             .map(|row| (0..size).map(|column| variance(row, column)).collect())
             .collect(),
+        delay_s: (response.delay_s != 0.0).then_some(response.delay_s),
+        lever_m: (response.lever_m != channel.lever_m).then(|| response.lever_m.into()),
     }
 }
 
