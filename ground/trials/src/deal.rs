@@ -331,7 +331,7 @@ mod tests {
 
     #[test]
     fn everything_novel_disturbs_what_it_says_it_touches() {
-        disturb(&novel::ALL);
+        disturb(novel::ALL);
     }
 
     fn disturb(disturbances: &[Disturbance]) {

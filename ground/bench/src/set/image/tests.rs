@@ -29,6 +29,8 @@ fn gyro(k: u8) -> Entry {
         covariance: (0..7)
             .map(|row| (0..7).map(|column| if row == column { 0.01 } else { 0.0 }).collect())
             .collect(),
+        delay_s: None,
+        lever_m: None,
     }
 }
 
