@@ -17,7 +17,7 @@
 //! the same cycles from the start computes the same bits as the unit did.
 //!
 //! Refuses nothing. A cycle that repeats or goes back in time gives vectors and TRIAD, and the filter leaves it out; see
-//! [`kalman`](crate::kalman) for gaps.
+//! [`kalman`] for gaps.
 
 mod boost;
 mod force;
