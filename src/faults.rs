@@ -49,7 +49,8 @@ use vector_rate::{Direction, RateError, VectorRate};
 
 /// \[s\] standard deviation of an accelerometer's conversion within its 20 ms at 50 Hz: it has its own clock.
 const ACC_TIMING_S: f32 = 0.0058;
-/// \[s\] of a magnetometer's within 13.3 ms.
+/// \[s\] of a magnetometer's within 13.3 ms, as logs have it whose magnetometers measured by their own clocks; one that was asked is
+/// far within.
 const MAG_TIMING_S: f32 = 0.0039;
 /// \[s\] of a gyro's within 3.9 ms.
 const GYRO_TIMING_S: f32 = 0.0012;

@@ -279,6 +279,7 @@ impl<I2C: I2c> Hmc5883l<I2C> {
 
     async fn write(&mut self, [a, b, mode]: [u8; 3]) -> Result<(), Error<I2C::Error>> {
         (self.withhold, self.asked) = (true, (mode == SINGLE).then_some(true));
+        // In the form of the other transfers, so that the image has one future less.
         self.bus
             .transaction(ADDRESS, &mut [Operation::Write(&[CONFIGURATION_A.address, a, b, mode])])
             .await

@@ -56,7 +56,7 @@ const FLIGHT_ANGLE_NOISE: f32 = 0.0003;
 const FLIGHT_BIAS_WALK: f32 = 1.5e-6;
 
 /// How late the parts are: the time constant of the unit's low-pass and half a conversion (ADIS16265, 12.7 Hz, 3.9 ms;
-/// LIS331HH, 25 Hz, 20 ms; HMC5883L, 13.3 ms).
+/// LIS331HH, 25 Hz, 20 ms; HMC5883L, half of 13.3 ms by its own clock, and as long after the measurement that it was asked for).
 const DELAYS: Delays = Delays {
     gyro_s: 0.0125 + 0.002,
     acc_s: 0.0064 + 0.010,

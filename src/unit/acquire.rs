@@ -6,7 +6,8 @@
 //! frees itself. Who held it is not known: the sensor that was being read is first read once more in the next cycle as it is.
 //!
 //! Magnetometers measure when they are asked, each [`ASKED`] before it is read: so it is known when each saw the field, which at
-//! three turns a second turns by a degree in a millisecond.
+//! three turns a second turns by a degree in a millisecond. One whose question runs out of time is not read in that cycle, since it
+//! would stretch the clock once more; a second such question in a row loses it.
 //!
 //! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
 //! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,

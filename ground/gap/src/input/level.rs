@@ -23,7 +23,8 @@ const HALVINGS: usize = 10;
 /// What a calibration may change of a channel.
 const COLUMNS: usize = 8;
 
-/// Part of the largest singular value below which a column is none.
+/// Part of the largest singular value below which a column is none: columns in their own units span some six powers of ten, and
+/// rounding leaves 1e-16 of the largest.
 const SINGULAR: f64 = 1e-9;
 
 /// The factors of the channels of a kind, each with its channel; `octave` is the size of the error above, of a channel at a row, and

@@ -11,23 +11,25 @@
 
 use std::rc::Rc;
 
-use crate::input::{level::levels, windows::Fit};
 use twin::{
     motion::Recorded,
     predict::{Accuracy, Kind, Twin},
 };
 
+use crate::input::{level::levels, windows::Fit};
+
 /// \[Hz\] corners to which the record is smoothed, of attitude and position.
 const CORNERS_HZ: [f64; 2] = [20.0, 10.0];
 
-/// Most of the error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated on the
-/// spot, it is 1.3 to 1.7, for small errors and large ones, and 0.6 to 0.9 for specific forces.
+/// Most of the error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated
+/// on the spot, it is 1.3 to 1.7, for small errors and large ones, and 0.6 to 0.9 for specific forces.
 const BELOW: f64 = 1.6;
 
 /// \[s\] to either side over which an error is as large.
 const ALIKE_S: f64 = 0.15;
 
-/// \[s\] at most from one instant to the next at which that is looked at: the octave holds nothing much faster.
+/// \[s\] at most from one instant to the next at which the octave is looked at: a dozen in twice [`ALIKE_S`]. Its mean square needs
+/// no more, for what is not followed between them has the same variance at them.
 pub const SPREAD_S: f64 = 0.025;
 
 /// [s^2] how its record answers to motion, as its second derivative: it is filtered, or what it sees bends against the unit,

@@ -15,8 +15,9 @@
 //! acceleration   s + (C_bn g) x th
 //! ```
 //!
-//! A turn of the whole flight in n changes no rate and no force, and costs nothing but in the last row: that alone ties the
-//! attitude to gravity. The acceleration is none, within what the size of the specific force leaves room for, and where the unit rests within much less.
+//! A turn of the whole flight in n changes no rate and no force, and costs nothing but in the last row: that alone ties the attitude to
+//! gravity. The acceleration is none, within what the size of the specific force leaves room for, and where the unit rests within much
+//! less.
 //!
 //! The temperature of a row is free, as it is in [`crate::parity::packet`].
 
