@@ -4,13 +4,16 @@
 //! its noise, and on it a linear Gaussian fit ([`joint`]) of what the [`calibration`] and the reference leave open: normal
 //! equations with the calibration marginalised ([`normal`]), their [`evidence`], and the finished [`model`]. A [`misfit`] that
 //! looks like noise is told from noise by how long it stays alike. An effect that comes and goes is on in an [`interval`].
-//! What errs slowly, alike in several channels, is taken out by one Kalman pass over a residual and every column ([`whitening`]).
+//! What errs slowly, alike in several channels, is taken out by one Kalman pass over a residual and every column ([`whitening`]); what an
+//! effect is worth [`beyond`] that and the [`point`] whose position is told says whether the reference may have done it.
 //!
 //! With thousands of samples any error of 0.1 % is significant. That is why the calibration is marginalised everywhere: none of
 //! what it leaves open is an effect.
 
+pub mod beyond;
 pub mod calibration;
 pub mod evidence;
+pub mod gradient;
 pub mod interval;
 pub mod joint;
 pub mod misfit;

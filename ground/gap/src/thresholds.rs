@@ -107,7 +107,7 @@ thresholds! {
         larger: "weak second effects are not named",
         smaller: "remainders of a strong effect get names",
         Assumed("what a law that is a little off leaves over");
-    /// Causes that are believed at once; more together are a patchwork for one effect the library does not have.
+    /// Causes in the channels of one of them that are believed at once; more together are a patchwork for one effect the library does not have.
     MOST_CAUSES: usize = 3, in "effects",
         larger: "patchworks are believed",
         smaller: "true sets of four are withdrawn",
@@ -132,10 +132,10 @@ thresholds! {
         larger: "what comes and goes is taken for steady",
         smaller: "what is steady is cut to a stretch",
         Assumed("as decisive as the margin of a name");
-    /// Part of what is explained that each half of a stretch, each third of the time of a periodic effect, and an effect that is to be seen coming and going beside others must bring.
+    /// Part of what is explained that each half of a stretch, each third of the time of a periodic effect, and an effect that is to be seen coming and going beside others must bring, and that a calibration must leave of an effect which it does not imitate.
     LEAST_PART: f64 = 0.1, in "part",
         larger: "short strong parts and uneven effects are taken for steady ones",
-        smaller: "one blow makes a stretch, and what another law leaves over gets one",
+        smaller: "one blow makes a stretch, and what another law leaves over gets one; iron far beyond a zero's sigma has no name",
         Assumed("an even effect has half or a third, and what another effect's law leaves is not the same at all times either");
     /// Sum of squares over six octaves beyond which a walk is none.
     WALK_OFF: f64 = 22.5, in "sum of squares",

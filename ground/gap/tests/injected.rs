@@ -323,6 +323,20 @@ fn a_scale_error_is_found_beside_a_walk() {
     assert!(both.none_of_these < 0.5, "{}", both.none_of_these);
 }
 
+/// Twelve sigmas of a zero are worth seventy nats, for the calibration takes up the others, and are all of the gap but for a faint tone.
+#[test]
+fn a_zero_far_beyond_its_sigma_is_named_beside_a_little_that_is_not_explained() {
+    let tone = |t_s: f64| 0.6 * NOISE * (std::f64::consts::TAU * t_s / 17.0).sin();
+    let named = |zero: f64| {
+        let diagnosis = diagnosed_in(&erring(|t_s| zero + tone(t_s), ""), &[]).1;
+        let names = diagnosis.causes.iter().map(|cause| cause.effect);
+        (names.collect::<Vec<_>>(), diagnosis.leftover.p)
+    };
+    let (names, left) = named(0.012);
+    assert_eq!(names, ["gyro-bias"], "{left}");
+    assert!(left < 0.05, "the tone is not seen: {left}");
+}
+
 #[test]
 fn a_tone_is_not_called_a_walk_of_the_zero() {
     let walked = diagnosed_in(&erring(wandering(), ""), &[]).1;

@@ -77,17 +77,11 @@ impl<'a> Problem<'a> {
             let fast = |row: usize| channel.sigma().hypot(instrument.fast_sigma(index, row));
             steady.push(channel.sigma().hypot(slow));
             sigmas.push((0..starts_s.len()).map(|row| fast(row).hypot(slow)).collect());
-            let beside = twin.unit().channels.iter().filter(|own| own.sensor == channel.sensor);
-            let sharing: f64 = beside.map(|own| own.axis_b.dot(&channel.axis_b).powi(2)).sum();
-            let shared = |row: usize| {
-                channel
-                    .sigma()
-                    .hypot(sharing.sqrt() * instrument.fast_sigma(index, row))
-            };
+            let white = white_sigma(twin, instrument, index);
             let rows = series
                 .rows
                 .iter()
-                .map(|row| shared(*row as usize).hypot(slow * alike.sqrt()));
+                .map(|row| white(*row as usize).hypot(slow * alike.sqrt()));
             let weights = DVector::from_iterator(series.rows.len(), rows);
             frames.push(Frame {
                 quiet_energy: 0.0,
@@ -151,6 +145,11 @@ impl<'a> Problem<'a> {
         }
         self.reference = self.true_twin().field_columns(&self.instrument.accuracy);
         self.settle();
+    }
+
+    /// [physical unit] noise of a sample and the fast errors of the reference, without what is alike over many.
+    pub fn white_sigma(&self, channel: usize, row: usize) -> f64 {
+        white_sigma(self.twin, self.instrument, channel)(row)
     }
 
     /// The unit's own noise over what it scatters with the fast errors of the reference in, of a channel at a row.
@@ -353,4 +352,13 @@ impl<'a> Problem<'a> {
             .map(|column| self.in_noise(column, None))
             .collect()
     }
+}
+
+/// Of a channel, by the row; what channels share counts once.
+fn white_sigma<'a>(twin: &'a Twin, instrument: &'a Reference, index: usize) -> impl Fn(usize) -> f64 + 'a {
+    let channels = &twin.unit().channels;
+    let channel = &channels[index];
+    let beside = channels.iter().filter(|own| own.sensor == channel.sensor);
+    let sharing: f64 = beside.map(|own| own.axis_b.dot(&channel.axis_b).powi(2)).sum();
+    move |row| (channel.sigma()).hypot(sharing.sqrt() * instrument.fast_sigma(index, row))
 }

@@ -5,12 +5,16 @@
 
 use crate::{
     library::hypotheses::Library,
-    null::{model::Model, problem::Problem},
+    null::{
+        model::Model,
+        problem::{Component, Problem},
+    },
     probability::cause::Cause,
     search::{
         gauss_newton::{model_of, refine},
         readings::{Attribution, Chosen},
     },
+    thresholds::LEAST_PART,
     unknown::shapley,
 };
 
@@ -39,4 +43,27 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         .iter_mut()
         .zip(energies)
         .for_each(|(cause, energy)| cause.share = energy.max(0.0));
+}
+
+/// Per effect of a model that a calibration can imitate, the energy that it takes off what the description as it is leaves, in squares of
+/// noise; nothing for another.
+///
+/// Evidence counts what the calibration cannot take up at its sigmas, and that is all that tells iron from a zero. But whatever else the iron
+/// might stand in for would be in the readings as a whole: what it leaves is held against the whole. Ten sigmas of a zero are
+/// worth fifty nats and explain a thousand times as much.
+pub fn imitated(problem: &Problem, model: &Model) -> Vec<f64> {
+    let nominal = |components: &[Component]| -> f64 {
+        let residuals = problem.residuals(components);
+        residuals.iter().map(|residual| residual.norm_squared()).sum()
+    };
+    let calibrated = |model: &Model| -> f64 { model.energies().into_iter().sum() };
+    let with = [nominal(&model.components), calibrated(model)];
+    let of = |index: usize| {
+        let mut others = model.components.clone();
+        others.remove(index);
+        let fall = nominal(&others) - with[0];
+        let beyond = calibrated(&Model::around(problem, others)) - with[1];
+        if beyond < LEAST_PART * fall { fall } else { 0.0 }
+    };
+    (0..model.components.len()).map(of).collect()
 }

@@ -3,7 +3,7 @@
 //! In: causes with the probability that their evidence gives them among their rivals, and what they leave. Out: the same
 //! causes, believed less where something the library does not have could be like them. Six things speak for that: what
 //! is left over in a cause's own channels, few nats, a size far below the strongest cause's, blocks that do not confirm it when they are
-//! left out, another strength on the held-out windows than on the fitted ones, and that the point of a reference may be off by as much.
+//! left out, another strength on the held-out windows than on the fitted ones, and that the reference or the field may be off by as much.
 //!
 //! What is left over speaks against a name by its significance, not by whether it matters: a stand-in that explains a part `r^2` of the
 //! energy of what is really there leaves `1 - r^2` of it, however small that is. So the probability that there is something else is
@@ -17,9 +17,9 @@ use crate::{
         fit_error::FitError,
         strength::{Claimed, Promise},
     },
-    input::hold::Held,
+    input::{case::SlowErrors, hold::Held},
     library::hypotheses::Library,
-    null::{model::Model, point, problem::Problem},
+    null::{beyond::Beyond, model::Model, problem::Problem},
     probability::cause::Cause,
     search::explanation::Explanation,
     thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
@@ -65,10 +65,10 @@ impl<'a> Belief<'a> {
     }
 
     /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise.
-    pub fn weigh(&self, causes: &mut [Cause], explained: impl Fn(&Cause) -> f64) {
+    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64]) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
-        for cause in causes {
-            let trust = self.trust(Some(cause.effect), &cause.channels, explained(cause));
+        for (cause, explained) in causes.iter_mut().zip(explained) {
+            let trust = self.trust(Some(cause.effect), &cause.channels, *explained);
             let is_no_chance = above_doubt(cause.gain);
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
@@ -80,15 +80,18 @@ impl<'a> Belief<'a> {
     }
 }
 
-/// Believes causes less, which are the model's effects in their order, that may be an error of the point whose position the reference
-/// tells.
-pub fn beyond_reference(problem: &Problem, model: &Model, causes: &mut [Cause]) {
-    if causes.len() != model.components.len() {
+/// Believes causes less, which are the model's effects in their order, that may be an error of the reference or the field.
+pub fn beyond_reference(problem: &Problem, errors: &SlowErrors, model: &Model, causes: &mut [Cause]) {
+    if causes.is_empty() || causes.len() != model.components.len() {
         // They were withdrawn.
         return;
     }
+    let Some(beyond) = Beyond::of(problem, errors) else {
+        return;
+    };
     for (index, cause) in causes.iter_mut().enumerate() {
-        cause.probability *= above_doubt(point::beyond(problem, &model.components, index));
+        let nats = beyond.nats(&model.components, index);
+        cause.probability *= above_doubt(nats);
     }
 }
 

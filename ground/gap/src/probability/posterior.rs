@@ -50,7 +50,9 @@ impl Believed {
     ) -> Self {
         let mut causes = causes_of(problem, library, &explanation.found);
         contribution::settle(problem, library, &explanation.found, &mut causes);
-        beyond_reference(problem, &explanation.model, &mut causes);
+        let mut imitated = contribution::imitated(problem, &explanation.model);
+        imitated.truncate(causes.len());
+        beyond_reference(problem, &subject.slow, &explanation.model, &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
         let loud = loud(problem, explanation, floor);
@@ -62,11 +64,16 @@ impl Believed {
         }));
         // Of an effect on the scatter that takes in whatever is there its own gain is no sign of its law.
         let whole = explanation.energy(quiet);
-        let is_scatter = |cause: &Cause| scatter.is_some_and(|scatter| scatter.effect.page().name == cause.effect);
-        belief.weigh(
-            &mut causes,
-            |cause| if is_scatter(cause) { whole } else { 2.0 * cause.gain },
-        );
+        // What the effects on readings explain is no sign of another's either.
+        let of_readings: f64 = causes.iter().take(imitated.len()).map(|cause| 2.0 * cause.gain).sum();
+        let of_scatter = scatter.map(|scatter| match scatter.effect.page().texture {
+            Texture::Louder | Texture::Walk => whole,
+            _ => whole - of_readings,
+        });
+        let explained = imitated.into_iter().zip(&causes);
+        let explained = explained.map(|(whole, cause)| whole.max(2.0 * cause.gain));
+        let explained: Vec<f64> = explained.chain(of_scatter).collect();
+        belief.weigh(&mut causes, &explained);
         one_name(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.

@@ -7,6 +7,8 @@
 //! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged. Beside
 //! a gyro's walk everything else is searched with the walk open, until both stay what they are.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::DVector;
 use twin::{effect::Texture, part::signal::Noise};
 
@@ -15,7 +17,7 @@ use crate::{
     null::{
         misfit,
         model::Model,
-        problem::{Frame, Problem},
+        problem::{Component, Frame, Problem},
     },
     search::{
         bias_walk::Walk,
@@ -43,8 +45,8 @@ pub struct Explanation {
     pub beneath: Vec<Vec<f64>>,
     /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
     pub louder: Vec<f64>,
-    /// Different effects on readings that the search chose, refused ones included.
-    sought: usize,
+    /// Most different effects that the search chose, refused ones included, in the channels of one of them.
+    together: usize,
     /// Whether those that were refused explain more than those that were kept.
     is_refused: bool,
 }
@@ -99,7 +101,7 @@ impl Explanation {
                 found = attribute(problem, library, progress);
             }
         }
-        let sought = distinct(library, &found.chosen);
+        let patched = company(problem, library, &found.chosen, scatter.as_ref());
         let (kept, refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
             .into_iter()
             .partition(|chosen| probability_of_any(library, chosen) >= SAID);
@@ -133,7 +135,7 @@ impl Explanation {
             model,
             beneath,
             louder,
-            sought,
+            together: patched,
             is_refused,
         }
     }
@@ -143,9 +145,10 @@ impl Explanation {
         self.found.chosen.is_empty() && self.scatter.is_none()
     }
 
-    /// Whether it is more likely a patchwork for an effect that the library does not have.
+    /// Whether it is more likely a patchwork for an effect that the library does not have: what patches that is where it is. A bias of the
+    /// gyros, iron at the magnetometers and a lever arm stand in for nothing together.
     pub fn is_patchwork(&self) -> bool {
-        self.is_refused || self.sought + usize::from(self.scatter.is_some()) > MOST_CAUSES
+        self.is_refused || self.together > MOST_CAUSES
     }
 
     /// What its effect on the scatter makes of noise, given as residuals in units of noise. Louder white noise is in those
@@ -209,16 +212,30 @@ fn gains(chosen: &[Chosen]) -> f64 {
     chosen.iter().map(|chosen| chosen.gain).sum()
 }
 
-/// How many effects are chosen that count: packets lost at three instants are one, and what brings a fiftieth of all is what the
-/// laws of the others leave.
-fn distinct(library: &Library, chosen: &[Chosen]) -> usize {
+/// How many different effects are in the channels of one of them, at most, the one on the scatter included. Those count whose packets, lost at
+/// three instants, are one, and that bring more than a fiftieth of all, which is what the laws of the others leave.
+fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Option<&Scatter>) -> usize {
     let least = COUNTED_PART * gains(chosen);
-    let names: std::collections::BTreeSet<&str> = chosen
-        .iter()
-        .filter(|chosen| chosen.gain >= least)
-        .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
-        .collect();
-    names.len()
+    let component = |one: &Chosen| library.hypotheses[one.hypothesis].component(&one.theta);
+    let model: Vec<Component> = chosen.iter().map(component).collect();
+    let mut places: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+    for (at, one) in chosen.iter().enumerate().filter(|(_, one)| one.gain >= least) {
+        let added = problem.contribution(&model, at);
+        let total: f64 = added.iter().map(|(_, values)| values.norm_squared()).sum();
+        let own = added
+            .iter()
+            .filter(|(_, values)| values.norm_squared() >= COUNTED_PART * total);
+        let place = places.entry(library.hypotheses[one.hypothesis].effect()).or_default();
+        place.extend(own.map(|(channel, _)| *channel));
+    }
+    if let Some(scatter) = scatter {
+        places
+            .entry(scatter.effect.page().name)
+            .or_default()
+            .extend(&scatter.channels);
+    }
+    let meets = |own: &BTreeSet<usize>| places.values().filter(|other| !other.is_disjoint(own)).count();
+    places.values().map(meets).max().unwrap_or(0)
 }
 
 /// Frames whose noise is so many times what it was, one factor a channel.

@@ -9,7 +9,7 @@
 mod normal;
 mod open;
 
-use nalgebra::{Cholesky, Vector3};
+use nalgebra::Cholesky;
 use twin::predict::{Feel, Kind};
 
 use self::{
@@ -21,7 +21,7 @@ use super::{
     discrepancy::{Posterior, courses},
     remainder::Setting,
 };
-use crate::null::{model::Model, problem::Problem};
+use crate::null::{beyond::felt_b, model::Model, problem::Problem};
 
 /// Courses in time: the last has a period of a sixteenth of the log.
 const COURSES: usize = 32;
@@ -214,15 +214,6 @@ fn design(problem: &Problem, seen: &Seen, channel: usize, place: Where, sample: 
         Where::Rotation => own.axis_b.cross(&felt_b(own.sensor, feel)).into(),
         Where::Factor(_) => [seen.reading[sample], 0.0, 0.0],
         Where::Delay(_) => [-seen.by_instant[sample], 0.0, 0.0],
-    }
-}
-
-fn felt_b(kind: Kind, feel: &Feel) -> Vector3<f64> {
-    match kind {
-        Kind::Accelerometer => feel.force_b,
-        Kind::Gyro => feel.rate_b,
-        Kind::Magnetometer => feel.field_b_ut,
-        Kind::Thermometer => Vector3::zeros(),
     }
 }
 

@@ -6,10 +6,11 @@
 use nalgebra::{DMatrix, DVector};
 use twin::predict::Kind;
 
-use super::{Open, Seen, Slow, courses, design, felt_b};
+use super::{Open, Seen, Slow, courses, design};
 use crate::{
     input::case::SlowErrors,
     null::{
+        beyond::{of_states, processes, sees},
         problem::Problem,
         whitening::{Process, Sample, Whitening, places},
     },
@@ -117,14 +118,6 @@ impl Pass<'_> {
     /// What errs slowly, and how many of these the channels share: a channel alone has nothing but its zero.
     fn processes(&self, set: &[usize]) -> (Vec<Process>, usize) {
         let errors = self.errors;
-        let attitude = Process::Matern {
-            sigma: errors.attitude_sigma_rad,
-            alike_s: errors.attitude_correlation_s,
-        };
-        let field = Process::Alike {
-            sigma: errors.field_wander_sigma_ut,
-            alike_s: errors.field_correlation_s,
-        };
         let walk = |channel: &usize| {
             let own = &self.problem.twin.unit().channels[*channel];
             let least = match own.sensor {
@@ -138,8 +131,7 @@ impl Pass<'_> {
             }
         };
         let shared = if set.len() > 1 { SHARED } else { 0 };
-        let all = [attitude, attitude, attitude, field, field, field];
-        let processes = all.into_iter().take(shared).chain(set.iter().map(walk));
+        let processes = processes(errors).into_iter().take(shared).chain(set.iter().map(walk));
         (processes.collect(), shared)
     }
 
@@ -152,18 +144,10 @@ impl Pass<'_> {
             })
             .collect();
         let sample = |mean: &Mean| {
+            let mut seen = [0.0; 9];
+            (seen.iter_mut().zip(&rows[mean.place])).for_each(|(seen, part)| *seen = part[mean.own]);
             let mut sees = vec![(at[shared + mean.place], 1.0)];
-            for (of, part) in rows[mean.place].iter().enumerate() {
-                // Angle, rate and field: an angle's rate is its second state.
-                let state = match of {
-                    0..3 => at[of],
-                    3..6 => at[of - 3] + 1,
-                    _ => at[of - 3],
-                };
-                if part[mean.own] != 0.0 {
-                    sees.push((state, part[mean.own]));
-                }
-            }
+            sees.extend(of_states(&seen, &at));
             Sample {
                 t_s: mean.bin as f64 * self.step_s,
                 sees,
@@ -244,18 +228,6 @@ pub(super) fn sets(problem: &Problem, errors: &SlowErrors) -> Vec<Vec<usize>> {
 /// Of a channel what it sees of an attitude error about the axes of n, of its rate, and of a field error along them, averaged.
 fn seen_states(problem: &Problem, seen: &Seen, channel: usize) -> Vec<Vec<f64>> {
     let own = &problem.twin.unit().channels[channel];
-    let state = |of: usize, sample: usize| {
-        let feel = &seen.feels[sample];
-        let axis_n = feel.q_nb * own.axis_b;
-        match (of, own.sensor) {
-            // n.C(v + v x phi) for a vector v that stands in n.
-            (0..3, Kind::Accelerometer | Kind::Magnetometer) => {
-                (feel.q_nb * own.axis_b.cross(&felt_b(own.sensor, feel)))[of]
-            }
-            (3..6, Kind::Gyro) => axis_n[of - 3],
-            (6..9, Kind::Magnetometer) => axis_n[of - 6],
-            _ => 0.0,
-        }
-    };
-    (0..9).map(|of| seen.binned.means(|sample| state(of, sample))).collect()
+    let state = |of: usize| (seen.binned).means(|sample| sees(own, &seen.feels[sample])[of]);
+    (0..9).map(state).collect()
 }
