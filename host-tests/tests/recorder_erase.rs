@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use embassy_futures::block_on;
 use emems::flight_log::{
-    LOG_START, LogError,
+    LOG_START, LogError, Resumed,
     record::{self, Content},
 };
 use host_tests::recorder::{Flown, Tally, campaign, log, three_boots};
@@ -27,7 +27,8 @@ const OLD_ONES: u64 = 6;
 /// Seeds of each cut and way to tear.
 const SEEDS: u64 = 20;
 
-/// G_MA, with all of its free time, cut at operation `after` from now; whether it was acknowledged.
+/// G_MA, with all of its free time, cut at operation `after` from now; whether it was acknowledged. The unit is in WAIT then, and
+/// has told the log so: where a save of the superblock is in doubt the newest record tells the mode, here that of a flight.
 fn erase(flown: &mut Flown, after: u64, tear: Tear) -> bool {
     flown.chip.power_on();
     flown.chip.befalls.cut = Some((flown.chip.operations + after, tear));
@@ -35,7 +36,10 @@ fn erase(flown: &mut Flown, after: u64, tear: Tear) -> bool {
     let ordered = block_on(async {
         let mounted = log.mount().await;
         let ordered: Result<(), LogError> = match mounted {
-            Ok(_) => log.start_erase().await,
+            Ok(_) => match log.keep_mode(Resumed::default()).await {
+                Ok(()) => log.start_erase().await,
+                unsaved => unsaved,
+            },
             Err(error) => Err(error),
         };
         while ordered.is_ok() && log.free_time().await.is_ok_and(|more| more) {}

@@ -4,10 +4,12 @@
 use embassy_futures::block_on;
 use emems::{
     flight_log::{
-        LOG_START, LogError,
+        LOG_START, LogError, Resumed, page,
+        record::Entry,
         superblock::{self, Superblock},
     },
-    nand::PageAddress,
+    mode::{Cause, Change, Mode},
+    nand::{PAGES_PER_BLOCK, PageAddress},
 };
 use host_tests::recorder::{entry, log, nothing_lost, three_boots};
 use twin::part::nand::Cells;
@@ -39,6 +41,70 @@ fn f17_a_lost_superblock_is_replaced_by_its_copy_or_by_a_scan() {
     }
     lost.boot(3, None);
     assert_eq!(nothing_lost(lost).acknowledged, 96);
+}
+
+/// The pages of the newest save of the superblock.
+fn newest_save(chip: &mut Cells) -> Vec<PageAddress> {
+    let pages = (0..LOG_START).flat_map(|block| (0..PAGES_PER_BLOCK).map(move |page| PageAddress { block, page }));
+    let saves = pages.filter_map(|at| {
+        let mut bytes = chip.read(at);
+        page::correct(&mut bytes)[0].ok()?;
+        Some((superblock::decode(page::record(&bytes, 0)).ok()?.number, at))
+    });
+    let saves: Vec<_> = saves.collect();
+    let newest = saves.iter().map(|(number, _)| *number).max();
+    let of_it = saves.iter().filter(|(number, _)| Some(*number) == newest);
+    of_it.map(|(_, at)| *at).collect()
+}
+
+/// F17: of the superblock only an older save is left, with the mode as it was before: the newest record tells it, be it
+/// a packet or the change itself.
+#[test]
+fn f17_the_mode_of_an_older_save_gives_way_to_that_of_the_newest_record() {
+    for (flight, change, packet) in [
+        (true, true, true),
+        (true, true, false),
+        (true, false, true),
+        (false, true, false),
+    ] {
+        let mut chip = Cells::new(BLOCKS, &[], 3);
+        let mut recorded = log(&mut chip);
+        let mode = |flight| Resumed {
+            flight,
+            recording: flight,
+            derived: false,
+        };
+        let in_mode = |flight, id| Entry { flight, ..entry(id) };
+        block_on(async {
+            recorded.mount().await.expect("a new chip");
+            recorded.keep_mode(mode(!flight)).await.expect("a save");
+            recorded.append(&in_mode(!flight, 1)).await.expect("a record");
+            recorded.keep_mode(mode(flight)).await.expect("a save");
+            if change {
+                let mode = if flight { Mode::Flight } else { Mode::Wait };
+                let (recording, cause) = (flight, Cause::Command);
+                let change = Change {
+                    at_us: 2,
+                    mode,
+                    recording,
+                    cause,
+                };
+                recorded.note(&change).await.expect("a record");
+            }
+            if packet {
+                recorded.append(&in_mode(flight, 3)).await.expect("a record");
+            }
+        });
+        drop(recorded);
+        let lost = newest_save(&mut chip);
+        assert_eq!(lost.len(), 2, "both copies of a save");
+        for at in lost {
+            chip.destroy(at);
+        }
+        chip.power_on();
+        let resumed = block_on(log(&mut chip).mount());
+        assert_eq!(resumed, Ok(mode(flight)), "{change} {packet}");
+    }
 }
 
 /// F17: a log of a newer format is refused by its number and left alone.

@@ -51,6 +51,9 @@ enum Found {
     Nothing,
 }
 
+/// What a record says of the mode: its key, FLIGHT, recording.
+type Told = (record::Key, bool, bool);
+
 impl<N: Nand> FlightLog<N> {
     /// Finds out what the chip holds. Nothing is changed on it.
     pub async fn mount(&mut self) -> Result<Resumed, LogError> {
@@ -82,6 +85,7 @@ impl<N: Nand> FlightLog<N> {
     async fn find_all(&mut self) -> Result<(), LogError> {
         self.chip.identify().await?;
         let found = self.find_superblock()?;
+        let saved_in = self.superblock.boot;
         if found != Found::Sure {
             // A newer save may say otherwise.
             self.superblock.block_before = 0;
@@ -105,7 +109,12 @@ impl<N: Nand> FlightLog<N> {
         };
         self.next_block = head.saturating_add(1);
         self.newest_block = Some(self.find_newest_block(head)?);
-        self.find_newest(head)
+        let told = self.find_newest(head)?;
+        // A save that is left may be an older one; what was recorded since tells the mode better.
+        if let Some((_, flight, recording)) = told.filter(|(key, ..)| found != Found::Sure && key.boot >= saved_in) {
+            (self.superblock.flight, self.superblock.recording) = (flight, recording);
+        }
+        Ok(())
     }
 
     /// The block where the newest boot left its last records, or, if it left none, the one before: not always the last
@@ -290,14 +299,15 @@ impl<N: Nand> FlightLog<N> {
 
     /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
     /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
-    /// may be torn too. What they say of the mode counts if there is no superblock.
-    fn find_newest(&mut self, head: u16) -> Result<(), LogError> {
+    /// may be torn too. Out: what the newest record says of the mode.
+    fn find_newest(&mut self, head: u16) -> Result<Option<Told>, LogError> {
         let mut newest = [record::Key::default(); 2];
+        let mut told = None;
         // Two blocks may take turns, and which of them is newer need not be known.
         let turns = [self.superblock.first_block, self.superblock.block_before];
         for block in turns {
             if self.is_of_the_log(block) {
-                self.find_newest_in(block, &mut newest)?;
+                self.find_newest_in(block, &mut newest, &mut told)?;
             }
         }
         let mut looked_at = 0_usize;
@@ -306,22 +316,24 @@ impl<N: Nand> FlightLog<N> {
                 continue;
             }
             looked_at = looked_at.wrapping_add(1);
-            if self.find_newest_in(block, &mut newest)? && looked_at >= turns.len() {
+            if self.find_newest_in(block, &mut newest, &mut told)? && looked_at >= turns.len() {
                 break;
             }
         }
         if self.carried > 0 {
-            let (flight, time_us) = record::mode_and_time(&self.last);
+            let (_, time_us) = record::mode_and_time(&self.last);
             self.status.last = Some((newest[0], time_us));
-            if self.superblock.number == 0 {
-                (self.superblock.flight, self.superblock.recording) = (flight, flight);
-            }
         }
-        Ok(())
+        Ok(told)
     }
 
     /// Whether this block gave two by itself.
-    fn find_newest_in(&mut self, block: u16, newest: &mut [record::Key; 2]) -> Result<bool, LogError> {
+    fn find_newest_in(
+        &mut self,
+        block: u16,
+        newest: &mut [record::Key; 2],
+        told: &mut Option<Told>,
+    ) -> Result<bool, LogError> {
         let (mut first_here, mut two_here) = (None, false);
         for page in (0..PAGES_PER_BLOCK).rev() {
             let at = PageAddress { block, page };
@@ -333,6 +345,11 @@ impl<N: Nand> FlightLog<N> {
                 let Some(key) = key else { continue };
                 self.superblock.boot = self.superblock.boot.max(key.boot);
                 let bytes = page::record(&self.back, half);
+                if let Some((flight, recording)) = record::mode(bytes)
+                    && told.is_none_or(|(before, ..)| before < key)
+                {
+                    *told = Some((key, flight, recording));
+                }
                 if !record::is_packet(bytes) {
                     continue;
                 }

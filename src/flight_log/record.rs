@@ -339,6 +339,16 @@ pub fn mode_and_time(bytes: &RecordBytes) -> (bool, u64) {
     (flags(bytes) & FLIGHT != 0, u64::from_le_bytes(take(bytes, at::TIME)))
 }
 
+/// The mode that a packet or a change of mode tells: FLIGHT, recording.
+pub fn mode(bytes: &RecordBytes) -> Option<(bool, bool)> {
+    let (flight, _) = mode_and_time(bytes);
+    match bytes[at::TYPE] {
+        PACKET => Some((flight, flight)),
+        CHANGE => Some((flight, bytes[at::RECORDING] != 0)),
+        _ => None,
+    }
+}
+
 /// What the record holds.
 pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
     let key = key(bytes)?;
