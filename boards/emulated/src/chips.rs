@@ -135,6 +135,9 @@ impl parallel::Peer for Nand {
 pub struct Line {
     heard: Vec<(Nanos, u8)>,
     to_say: VecDeque<(Nanos, u8)>,
+    /// The wire is held low: frames of zeros without a stop bit, one after the other.
+    held_low: bool,
+    sent: u64,
 }
 
 impl Line {
@@ -152,6 +155,20 @@ impl Line {
     pub fn next_due(&self) -> Option<Nanos> {
         self.to_say.front().map(|&(at, _)| at)
     }
+
+    /// Holds the wire low from `at` on, or lets it go. What is said meanwhile is lost.
+    pub fn hold_low(&mut self, at: Nanos, held_low: bool) {
+        self.held_low = held_low;
+        self.to_say.clear();
+        if held_low {
+            self.say(at, &[0]);
+        }
+    }
+
+    /// Frames put on the line so far.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
 }
 
 impl Store for Line {}
@@ -165,6 +182,12 @@ impl uart::Peer for Line {
         let &(due, byte) = self.to_say.front()?;
         if due > now.0 {
             return None;
+        }
+        self.sent += 1;
+        if self.held_low {
+            // The frame after it begins where this one ends.
+            self.to_say.truncate(1);
+            return Some(0);
         }
         self.to_say.pop_front();
         Some(u16::from(byte))

@@ -180,6 +180,7 @@ pub fn fly_keeping(
         next_meeting: 0,
         instructions: 0,
         struck: Struck::new(),
+        sent_before: 0,
         static_bytes: Vec::new(),
     };
     let images = [image.placed.clone()];

@@ -9,6 +9,7 @@
 use std::num::{NonZeroU32, NonZeroU64};
 
 use rigless::{
+    chip::uart::Rate,
     device::{ErasedDevice, Level, ResetCause},
     machine::{Board, Target, armv7m},
     mcu::{self, Mcu, Operate},
@@ -147,10 +148,25 @@ impl Wired {
         errors.framing.per_million = per_million;
     }
 
+    /// Every byte towards the unit arrives with noise on it, or no longer.
+    pub fn disturb_umbilical(&mut self, disturbed: bool) {
+        let errors = self.part.part.usart[UMBILICAL].errors_mut();
+        errors.noise.name = "umbilical noise";
+        errors.noise.per_million = if disturbed { Rate::EVERY_WORD } else { 0 };
+    }
+
     /// Takes the high-speed crystal off the board.
     pub fn remove_crystal(&mut self) {
         self.part.part.rcc.attach_crystals(0, 0);
         self.crystal = false;
+    }
+
+    /// The crystal stops; whether the clock security system raises the NMI for it (RM0090 section 7.2.7). The model's clock
+    /// does not follow: until the reset that the NMI ends in, instructions go on at 168 MHz instead of 16.
+    pub fn lose_crystal(&mut self) -> bool {
+        self.remove_crystal();
+        let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
+        cr::CSSON.is_set(registers.get(Register::Cr))
     }
 
     /// DMA1 stands still in mid-transfer until the next reset.
@@ -209,6 +225,7 @@ impl Mcu for Wired {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.part.reset(at, cause);
         self.dma_hung = false;
+        self.sensor_port.plant.lock().controller_reset();
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);
         i2c.inherit(&mut self.sensor_port.i2c);
         self.sensor_port = SensorPort::new(i2c, self.sensor_port.plant.clone());

@@ -122,6 +122,14 @@ impl Device for SensorPort {
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.feel(registers, context);
+        if register == Register::Cr1 {
+            if cr1::SWRST.is_set(value) {
+                self.plant.lock().controller_reset();
+            } else if cr1::START.is_set(value) && self.plant.lock().start_is_refused() {
+                // It stays asked for, and nothing comes of it.
+                return registers.set(Register::Cr1, value);
+            }
+        }
         self.i2c.write(register, value, registers, context);
     }
 

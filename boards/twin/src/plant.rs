@@ -181,12 +181,13 @@ impl Plant {
     /// How often each fault did something since power-on, by its name.
     pub fn struck(&self) -> Struck {
         let mut struck = Struck::new();
-        let [held, stuck, gone] = self.i2c.struck;
+        let [held, stuck, gone, misplaced] = self.i2c.struck;
         let [supply, lift_off, micro_g] = self.struck;
         let own = [
             ("sda-held", held),
             ("bus-stuck", stuck),
             ("mux-silent", gone),
+            ("stop-misplaced", misplaced),
             ("supply", supply),
             ("lift-off", lift_off),
             ("micro-g", micro_g),
@@ -219,6 +220,16 @@ impl Plant {
         self.i2c.clock_pulse();
     }
 
+    /// Whether the controller sends no START, to be asked before one.
+    pub fn start_is_refused(&mut self) -> bool {
+        self.i2c.start_is_refused()
+    }
+
+    /// The controller is reset.
+    pub fn controller_reset(&mut self) {
+        self.i2c.controller_reset();
+    }
+
     /// Until when a part holds SCL low; `now` or earlier if none does.
     pub fn scl_held_until(&self) -> Nanos {
         self.i2c.switch.scl_held_until()
@@ -233,6 +244,8 @@ impl Plant {
             Fault::MuxSilent(silent) => self.i2c.silence(silent),
             Fault::SdaHeld(pulses) => self.i2c.hold_sda(pulses),
             Fault::BusStuck(stuck) => self.i2c.stick(stuck),
+            Fault::StopMisplaced => self.i2c.misplace_stop(),
+            Fault::Bridged(plate, bridged) => self.i2c.switch.bridge(plate, bridged),
             Fault::Garbage(slot, babbling) => self.befall(
                 slot,
                 |gyro| gyro.babble(babbling),
@@ -272,8 +285,11 @@ impl Plant {
             | Fault::TelemetryStuck(_)
             | Fault::UmbilicalStuck(_)
             | Fault::LinesSlow(_)
+            | Fault::UmbilicalNoise(_)
+            | Fault::UmbilicalBreak(_)
             | Fault::KeptFlip(_)
             | Fault::RamFlip(_)
+            | Fault::ImageFlip(_)
             | Fault::CrystalLost
             | Fault::Panic
             | Fault::Reset => {}

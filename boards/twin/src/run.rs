@@ -41,6 +41,12 @@ pub enum Fault {
     SdaHeld(u8),
     /// The bus is held for good (`true`) or released.
     BusStuck(bool),
+    /// The controller has sent a STOP out of place, and sends no START again until it is reset (STM32F407 errata ES0182, "Start
+    /// cannot be generated after a misplaced Stop").
+    StopMisplaced,
+    /// The channels of this plate and the next are bridged (`true`): whichever is selected, the parts of both answer, each
+    /// address twice.
+    Bridged(usize, bool),
     /// The I2C part in this reading-order slot holds SCL low for so long \[ns\] whenever it is called; 0: no longer.
     Stretching(usize, Nanos),
     /// The sensor in this reading-order slot answers random words (`true`) or is itself again.
@@ -81,10 +87,18 @@ pub enum Fault {
     UmbilicalStuck(bool),
     /// A byte on both lines takes so many times as long. Host board only.
     LinesSlow(u32),
+    /// The umbilical towards the unit is disturbed (`true`): every byte on it arrives with an error, be it of framing, noise
+    /// or overrun.
+    UmbilicalNoise(bool),
+    /// The umbilical towards the unit is held low (`true`): one frame after the other without a stop bit, as fast as the line
+    /// carries them, whatever is said meanwhile.
+    UmbilicalBreak(bool),
     /// This bit of the memory that survives a reset flips, counted round it, and a reset follows.
     KeptFlip(u32),
     /// This bit of the RAM flips, counted round it. Emulated board only.
     RamFlip(u32),
+    /// This bit of the firmware's image in flash flips, counted round it. Host board only.
+    ImageFlip(u32),
     /// The crystal stops. Emulated board only.
     CrystalLost,
     /// The reset pin.

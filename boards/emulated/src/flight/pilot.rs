@@ -3,6 +3,7 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 
 use rigless::{
+    chip::uart::Rate,
     device::Level,
     emulator::{Driver, Host, InterruptLine, Stop},
     session::Session,
@@ -37,6 +38,10 @@ fn flip(host: &mut dyn Host, from: u64, bytes: u64, bit: u32) {
     }
 }
 
+/// The interrupt control and state register, and its bit that raises the NMI (ARMv7-M ARM, B3.2.4).
+const ICSR: u64 = 0xE000_ED04;
+const NMI_PENDING: u64 = 1 << 31;
+
 /// The interrupt of EXTI line 16, RM0090 table 62.
 const VOLTAGE_DETECTOR: InterruptLine = InterruptLine::new(1).expect("a line of the core");
 
@@ -55,6 +60,8 @@ pub(super) struct Pilot {
     pub(super) instructions: u64,
     /// Strokes of the processor's own faults, by name.
     pub(super) struck: Struck,
+    /// Frames on the umbilical when its disturbance began.
+    pub(super) sent_before: u64,
     pub(super) static_bytes: Vec<Vec<u8>>,
 }
 
@@ -91,7 +98,21 @@ impl Pilot {
                 }
                 Fault::CrystalLost => {
                     *self.struck.entry("crystal-lost").or_default() += 1;
-                    session.board_mut().mcu.remove_crystal();
+                    if session.board_mut().mcu.lose_crystal() {
+                        let _ = host.write(ICSR, Width::W32, NMI_PENDING);
+                    }
+                }
+                Fault::UmbilicalNoise(noise) => {
+                    session.board_mut().mcu.disturb_umbilical(noise);
+                    self.count_damaged(session, "umbilical-noise", noise);
+                }
+                Fault::UmbilicalBreak(held) => {
+                    let mcu = &mut session.board_mut().mcu;
+                    mcu.garble_umbilical(if held { Rate::EVERY_WORD } else { 0 });
+                    if let Some(line) = mcu.umbilical() {
+                        line.hold_low(stop.at.0, held);
+                    }
+                    self.count_damaged(session, "umbilical-break", held);
                 }
                 Fault::KeptFlip(bit) => {
                     *self.struck.entry("kept-flip").or_default() += 1;
@@ -104,6 +125,16 @@ impl Pilot {
                 }
                 fault => self.plant.lock().apply(fault, stop.at.0),
             }
+        }
+    }
+
+    /// Counts the frames between the beginning of a disturbance and its end.
+    fn count_damaged(&mut self, session: &mut Session<Stand>, name: &'static str, begins: bool) {
+        let sent = session.board_mut().mcu.umbilical().map_or(0, |line| line.sent());
+        if begins {
+            self.sent_before = sent;
+        } else {
+            *self.struck.entry(name).or_default() += sent - self.sent_before;
         }
     }
 

@@ -21,6 +21,8 @@ pub enum Target {
     End,
     /// What a line does: high, low or bouncing.
     Line,
+    /// A plate, 1 to 3: its channel and the next.
+    Plate,
 }
 
 impl Target {
@@ -50,6 +52,7 @@ impl Target {
             Target::Sensor | Target::I2c => &SENSOR_NAMES,
             Target::End => &END_NAMES,
             Target::Line => &["high", "low", "bouncing"],
+            Target::Plate => &["1", "2", "3"],
         }
     }
 }
@@ -136,7 +139,7 @@ fn level(number: usize, size: Option<f64>) -> Level {
 }
 
 /// Every fault there is a name for.
-pub const WORDS: [Word; 28] = [
+pub const WORDS: [Word; 33] = [
     word(
         "silent",
         Target::Sensor,
@@ -217,6 +220,24 @@ pub const WORDS: [Word; 28] = [
         "SDA is held for good",
         |_, _, _| Fault::BusStuck(true),
         Some(|_| Fault::BusStuck(false)),
+    ),
+    word(
+        "stop-misplaced",
+        Target::Unit,
+        "",
+        "hi",
+        "the sensor bus' controller sends no START until it is reset",
+        |_, _, _| Fault::StopMisplaced,
+        None,
+    ),
+    word(
+        "bridged",
+        Target::Plate,
+        "",
+        "hi",
+        "the parts of this plate and the next answer at once, each address twice",
+        |n, _, _| Fault::Bridged(n, true),
+        Some(|n| Fault::Bridged(n, false)),
     ),
     word(
         "nand-dead",
@@ -336,6 +357,15 @@ pub const WORDS: [Word; 28] = [
         None,
     ),
     word(
+        "image-flip",
+        Target::Unit,
+        "bit; drawn if not said",
+        "h",
+        "a bit of the firmware's image in flash flips",
+        |_, size, draw| Fault::ImageFlip(size.map_or(draw as u32, |size| size as u32)),
+        None,
+    ),
+    word(
         "lift-off",
         Target::Line,
         "ms of half a bounce",
@@ -370,6 +400,24 @@ pub const WORDS: [Word; 28] = [
         "the umbilical takes no byte from the unit",
         |_, _, _| Fault::UmbilicalStuck(true),
         Some(|_| Fault::UmbilicalStuck(false)),
+    ),
+    word(
+        "umbilical-noise",
+        Target::Unit,
+        "",
+        "hi",
+        "every byte towards the unit arrives with an error",
+        |_, _, _| Fault::UmbilicalNoise(true),
+        Some(|_| Fault::UmbilicalNoise(false)),
+    ),
+    word(
+        "umbilical-break",
+        Target::Unit,
+        "",
+        "hi",
+        "the umbilical towards the unit is held low: bytes without a stop bit at its rate",
+        |_, _, _| Fault::UmbilicalBreak(true),
+        Some(|_| Fault::UmbilicalBreak(false)),
     ),
     word(
         "lines-slow",

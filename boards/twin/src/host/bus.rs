@@ -51,6 +51,7 @@ pub struct SensorBus {
 impl SensorBus {
     /// The bus of these parts.
     pub fn new(plant: Rc<RefCell<Plant>>, plight: Rc<Plight>) -> Self {
+        plant.borrow_mut().controller_reset();
         SensorBus {
             plant,
             plight,
@@ -133,7 +134,8 @@ impl embedded_hal_async::i2c::I2c for SensorBus {
             let _waited_for_in_place = NeverStops;
             pending::<()>().await;
         }
-        if self.abandoned || self.plant.borrow_mut().sda_in_the_way() {
+        let is_in_the_way = |plant: &mut Plant| plant.sda_in_the_way() || plant.start_is_refused();
+        if self.abandoned || is_in_the_way(&mut self.plant.borrow_mut()) {
             self.abandoned = true;
             pending::<()>().await;
         }
@@ -154,6 +156,7 @@ impl RecoverBus for SensorBus {
                 (0..9).for_each(|_| plant.clock_pulse());
             }
             plant.i2c.reset_pin();
+            plant.controller_reset();
         }
         wait_until(clock::since_power_on() + RECOVERY).await;
         self.abandoned = false;

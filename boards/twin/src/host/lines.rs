@@ -10,7 +10,7 @@ use std::{
 };
 
 use embassy_time::{Duration, Timer};
-use embedded_io_async::{ErrorType, Read, Write};
+use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
 use emems::{
     board::{Discretes, Retained, Watchdog},
     retained::RETAINED_BYTES,
@@ -40,6 +40,26 @@ impl Transmitter {
     }
 }
 
+/// A write under way. If it is given up, what has left by then is heard, and no more: the DMA stops between two bytes.
+struct OnTheLine<'a> {
+    sent: &'a Sent,
+    bytes: &'a [u8],
+    /// \[ns\] when the first byte begins.
+    first: Nanos,
+    byte_ns: Nanos,
+}
+
+impl Drop for OnTheLine<'_> {
+    fn drop(&mut self) {
+        let now = clock::since_power_on();
+        let left = now.saturating_sub(self.first) / self.byte_ns;
+        let left = &self.bytes[..self.bytes.len().min(left as usize)];
+        if !left.is_empty() {
+            self.sent.borrow_mut().push((now, left.to_vec()));
+        }
+    }
+}
+
 impl ErrorType for Transmitter {
     type Error = Infallible;
 }
@@ -50,8 +70,16 @@ impl Write for Transmitter {
         if self.plight.is_stuck(self.end) {
             pending::<()>().await;
         }
-        let taken = UART_START + bytes.len() as Nanos * UART_BYTE * self.plight.slowness();
+        let byte_ns = UART_BYTE * self.plight.slowness();
+        let mut on_the_line = OnTheLine {
+            sent: &self.sent,
+            bytes,
+            first: clock::since_power_on() + UART_START,
+            byte_ns,
+        };
+        let taken = UART_START + bytes.len() as Nanos * byte_ns;
         Timer::after(Duration::from_micros(taken / 1000)).await;
+        on_the_line.bytes = &[];
         self.sent.borrow_mut().push((clock::since_power_on(), bytes.to_vec()));
         Ok(bytes.len())
     }
@@ -67,19 +95,47 @@ pub type Spoken = Rc<RefCell<VecDeque<u8>>>;
 /// A receiver.
 pub struct Receiver(pub Spoken, pub Rc<Plight>);
 
+/// A byte came with an error.
+#[derive(Clone, Copy, Debug)]
+pub struct Damaged;
+
+impl std::fmt::Display for Damaged {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a byte on the umbilical came with an error")
+    }
+}
+
+impl std::error::Error for Damaged {}
+
+impl embedded_io_async::Error for Damaged {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::InvalidData
+    }
+}
+
 impl ErrorType for Receiver {
-    type Error = Infallible;
+    type Error = Damaged;
 }
 
 impl Read for Receiver {
-    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
+    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Damaged> {
+        if self.1.is_held_low() {
+            Timer::after(Duration::from_micros(UART_BYTE / 1000)).await;
+            self.1.strike("umbilical-break");
+            self.0.borrow_mut().clear();
+            return Err(Damaged);
+        }
         // No waker is kept: the run polls everything again whenever the ground has spoken.
         poll_fn(|_| {
             let mut spoken = self.0.borrow_mut();
-            if spoken.is_empty() {
+            if spoken.is_empty() && !self.1.is_held_low() {
                 return Poll::Pending;
             }
             self.1.serve(End::UmbilicalIn);
+            if spoken.is_empty() || self.1.is_noisy() {
+                spoken.pop_front();
+                return Poll::Ready(Err(Damaged));
+            }
             let count = bytes.len().min(spoken.len());
             bytes
                 .iter_mut()

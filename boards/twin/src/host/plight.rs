@@ -8,6 +8,23 @@ use crate::{
     run::{End, Fault},
 };
 
+/// Bytes of the firmware's image, which is no more than something to read.
+const IMAGE_BYTES: usize = 4096;
+
+thread_local! {
+    static IMAGE: RefCell<[u8; IMAGE_BYTES]> = const { RefCell::new([0; IMAGE_BYTES]) };
+}
+
+/// Reads a piece of the image.
+pub fn read_image(at: usize, piece: &mut [u8]) -> usize {
+    IMAGE.with_borrow(|image| {
+        let there = image.get(at..).unwrap_or_default();
+        let count = there.len().min(piece.len());
+        piece[..count].copy_from_slice(&there[..count]);
+        count
+    })
+}
+
 /// The state the ends are in.
 #[derive(Default)]
 pub struct Plight {
@@ -16,6 +33,8 @@ pub struct Plight {
     telemetry_stuck: Cell<bool>,
     umbilical_stuck: Cell<bool>,
     slow: Cell<u32>,
+    umbilical_noise: Cell<bool>,
+    umbilical_break: Cell<bool>,
     struck: RefCell<Struck>,
 }
 
@@ -28,6 +47,13 @@ impl Plight {
             Fault::TelemetryStuck(stuck) => self.telemetry_stuck.set(stuck),
             Fault::UmbilicalStuck(stuck) => self.umbilical_stuck.set(stuck),
             Fault::LinesSlow(times) => self.slow.set(times),
+            Fault::UmbilicalNoise(noise) => self.umbilical_noise.set(noise),
+            Fault::UmbilicalBreak(held) => self.umbilical_break.set(held),
+            Fault::ImageFlip(bit) => {
+                let bit = bit as usize % (8 * IMAGE_BYTES);
+                IMAGE.with_borrow_mut(|image| image[bit / 8] ^= 1 << (bit % 8));
+                self.strike("image-flip");
+            }
             Fault::Busy(duration) => {
                 clock::spend(duration);
                 self.strike("busy");
@@ -39,6 +65,11 @@ impl Plight {
             _ => return false,
         }
         true
+    }
+
+    /// Flashes the image anew.
+    pub fn flash(&self) {
+        IMAGE.with_borrow_mut(|image| image.fill(0xA5));
     }
 
     /// A reset frees the processor.
@@ -81,6 +112,19 @@ impl Plight {
             self.strike("lines-slow");
         }
         self.slow.get().max(1).into()
+    }
+
+    /// Whether a byte that arrives on the umbilical is damaged.
+    pub fn is_noisy(&self) -> bool {
+        if self.umbilical_noise.get() {
+            self.strike("umbilical-noise");
+        }
+        self.umbilical_noise.get()
+    }
+
+    /// Whether the umbilical towards the unit is held low.
+    pub fn is_held_low(&self) -> bool {
+        self.umbilical_break.get()
     }
 
     /// Counts a strike.

@@ -58,6 +58,7 @@ pub fn fly_around(
     bench: &mut dyn Bench,
 ) -> HostReport {
     let ends = Ends::default();
+    ends.plight.flash();
     let mut report = HostReport::default();
     let mut faults: Vec<Scheduled> = faults.to_vec();
     faults.sort_by_key(|scheduled| std::cmp::Reverse(scheduled.at));

@@ -114,6 +114,9 @@ pub struct Tca9548a {
     control: u8,
     addressed: bool,
     silent: bool,
+    /// Channels whose lines are connected to each other, one bit each; and bytes that two parts drove at once.
+    bridged: u8,
+    twice: u64,
 }
 
 impl Tca9548a {
@@ -133,11 +136,22 @@ impl Tca9548a {
             control: 0,
             addressed: false,
             silent: false,
+            bridged: 0,
+            twice: 0,
+        }
+    }
+
+    /// Channels that are connected, one bit each.
+    fn reached(&self) -> u8 {
+        match (self.silent, self.connected & self.bridged) {
+            (true, _) => 0,
+            (_, 0) => self.connected,
+            _ => self.connected | self.bridged,
         }
     }
 
     fn selected(&mut self) -> impl Iterator<Item = &mut Socket> {
-        let connected = if self.silent { 0 } else { self.connected };
+        let connected = self.reached();
         self.channels
             .iter_mut()
             .enumerate()
@@ -173,7 +187,13 @@ impl Tca9548a {
     /// A byte for the controller.
     pub fn read(&mut self, now: Nanos) -> u8 {
         let own = if self.addressed { self.control } else { RELEASED };
-        self.addressed().fold(own, |line, socket| line & socket.read(now))
+        let mut drive = 0;
+        let line = self.addressed().fold(own, |line, socket| {
+            drive += 1;
+            line & socket.read(now)
+        });
+        self.twice += u64::from(self.bridged != 0 && drive > 1);
+        line
     }
 
     /// STOP.
@@ -198,7 +218,7 @@ impl Tca9548a {
 
     /// Until when a part on a connected channel holds SCL low. A disconnected one does so unseen.
     pub fn scl_held_until(&self) -> Nanos {
-        let connected = if self.silent { 0 } else { self.connected };
+        let connected = self.reached();
         (self.channels.iter().enumerate())
             .filter(|(channel, _)| connected >> channel & 1 == 1)
             .flat_map(|(_, sockets)| sockets)
@@ -245,10 +265,16 @@ impl Tca9548a {
         self.sockets(channel, address).for_each(|socket| socket.nack = byte);
     }
 
+    /// The lines of this channel and the next are connected to each other, or no longer.
+    pub fn bridge(&mut self, channel: usize, bridged: bool) {
+        self.bridged = if bridged { 0b11 << (channel & 7) } else { 0 };
+    }
+
     /// How often faults of its parts did something, by name.
     pub fn struck(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let sockets = self.channels.iter().flatten();
-        sockets.flat_map(|socket| ILLS.into_iter().zip(socket.struck))
+        let of_parts = sockets.flat_map(|socket| ILLS.into_iter().zip(socket.struck));
+        of_parts.chain([("bridged", self.twice)])
     }
 
     fn sockets(&mut self, channel: usize, address: u8) -> impl Iterator<Item = &mut Socket> {

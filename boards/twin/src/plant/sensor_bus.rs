@@ -23,8 +23,10 @@ pub struct SensorBus {
     pub(super) switch: Tca9548a,
     hold: Hold,
     silenced: bool,
-    /// STARTs on a held bus (by a part, for good), and calls of a multiplexer that is gone.
-    pub(super) struck: [u64; 3],
+    stop_misplaced: bool,
+    /// STARTs on a held bus (by a part, for good), calls of a multiplexer that is gone, and STARTs that a controller could not
+    /// send.
+    pub(super) struck: [u64; 4],
 }
 
 impl SensorBus {
@@ -33,7 +35,8 @@ impl SensorBus {
             switch,
             hold: Hold::Nobody,
             silenced: false,
-            struck: [0; 3],
+            stop_misplaced: false,
+            struck: [0; 4],
         }
     }
 
@@ -81,6 +84,22 @@ impl SensorBus {
             Hold::Stuck => self.struck[1] += 1,
         }
         self.is_held()
+    }
+
+    /// The controller sends no START from here on.
+    pub(super) fn misplace_stop(&mut self) {
+        self.stop_misplaced = true;
+    }
+
+    /// Whether the controller cannot send the START that it is about to.
+    pub(super) fn start_is_refused(&mut self) -> bool {
+        self.struck[3] += u64::from(self.stop_misplaced);
+        self.stop_misplaced
+    }
+
+    /// The controller is reset.
+    pub(super) fn controller_reset(&mut self) {
+        self.stop_misplaced = false;
     }
 
     /// The multiplexer is gone, or back.
