@@ -2,7 +2,7 @@
 //!
 //! In: an ELF file. Out: text, data and bss in bytes, as `size` counts them: text is all that is only read, data what is
 //! copied from flash to RAM at start, bss what is cleared; and the places that may panic, by why (panics.rs) and by where
-//! (origin.rs). Refuses a file that is no ELF, and one over a ceiling.
+//! (origin.rs); and the checksum that the unit tells of it. Refuses a file that is no ELF, and one over a ceiling.
 //!
 //! A future that is polled after its end panics too. No byte from outside can do that: `await`, `join` and `select` poll none
 //! that has ended, and neither do the unit's own `Within` and `Waiting`. So these places count among all, and not among those
@@ -88,6 +88,7 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
     let path = &arguments.image;
     let bytes = std::fs::read(path).map_err(|error| SizeError::Read(path.clone(), error))?;
     let Sizes { text, data, bss } = sizes(&bytes).map_err(|error| SizeError::Parse(path.clone(), error))?;
+    let checksum = emulated::image::checksum(&bytes);
     let places = places(&bytes, path)?;
     let by_data: Vec<_> = places.iter().filter(|place| place.is_reachable_from_data()).collect();
     let by_why = counted(places.iter().map(|place| place.why.as_str()));
@@ -101,6 +102,7 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
         };
         let sizes = serde_json::json!({
             "text": text, "data": data, "bss": bss, "flash": flash, "ram": ram,
+            "checksum": checksum,
             "may_panic": places.len(), "by_why": object(by_why), "by_file": object(by_file),
             "reachable_from_data": by_data.len(), "reachable_by_why": object(by_data_why),
             "places": places.iter().map(|place| format!("{}: {}", place.origin, place.why)).collect::<Vec<_>>(),
@@ -108,6 +110,9 @@ pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
         println!("{sizes}");
     } else {
         println!("text {text}, data {data}, bss {bss}: flash {flash}, RAM {ram}");
+        if let Some(checksum) = checksum {
+            println!("checksum {checksum:08X}, as G_ST tells it of the flash");
+        }
         println!("places that may panic {}: {}", places.len(), listed(&by_why));
         println!("  by file: {}", listed(&by_file));
         println!("  reachable from data {}: {}", by_data.len(), listed(&by_data_why));

@@ -9,9 +9,14 @@ use std::{
 };
 
 use defmt_decoder::Table;
-use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use object::{
+    Endianness, Object, ObjectSection, ObjectSymbol, SymbolKind,
+    elf::PT_LOAD,
+    read::elf::{ElfFile32, ProgramHeader},
+};
 use rigless::symbols::Symbols;
 
+use crate::thumb;
 pub use crate::toolchain::{build, build_package};
 
 /// ELF32, little endian, `e_machine` EM_ARM (ELF specification, header; ELF for the Arm architecture 5.2).
@@ -176,21 +181,74 @@ impl Image {
         Image::new(&self.path, bytes)
     }
 
+    /// This image with the function whose mangled name contains `part` jumping to where some arithmetic panics for its overflow.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::NoSymbol`]: of the function, or of an overflow that is seen.
+    pub fn with_panic(&self, part: &str) -> Result<Self, ImageError> {
+        let bytes = self.placed.bytes();
+        let missing = |name: &str| ImageError::NoSymbol(self.path.clone(), name.into());
+        let from = function(bytes, part).ok_or_else(|| missing(part))?;
+        let to = thumb::call_with_literal(bytes, OVERFLOW).ok_or_else(|| missing(OVERFLOW))?;
+        self.with_code(part, thumb::branch(from, to))
+    }
+
+    /// The checksum of what the flash holds of it.
+    pub fn checksum(&self) -> Option<u32> {
+        checksum(self.placed.bytes())
+    }
+
     /// The table of log strings; `None` for an image that logs nothing, or in a format this reader does not know.
     pub fn log_table(&self) -> Option<Table> {
         Table::parse(self.placed.bytes()).ok().flatten()
     }
 }
 
-/// Where in an ELF file the first word of a function stands, by a piece of its mangled name.
-fn offset_of(elf: &[u8], part: &str) -> Option<usize> {
+/// What overflow of an addition calls: it takes its place in the source, and never returns.
+const OVERFLOW: &str = "panic_const_add_overflow";
+
+/// The address of a function, by a piece of its mangled name.
+fn function(elf: &[u8], part: &str) -> Option<u64> {
     let file = object::File::parse(elf).ok()?;
     let is_it = |name: &str| name.contains(part) && !name.contains("drop_in_place");
     let symbol = file
         .symbols()
         .find(|symbol| symbol.kind() == SymbolKind::Text && symbol.name().is_ok_and(is_it))?;
     // Bit 0 of a function's value says Thumb.
-    let address = symbol.address() & !1;
+    Some(symbol.address() & !1)
+}
+
+/// CRC-32 (ISO-HDLC) of what the flash holds of an ELF file, which is what the unit reads there and `G_ST` tells; `None` for
+/// another file.
+pub fn checksum(elf: &[u8]) -> Option<u32> {
+    Some(crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&flash(elf)?))
+}
+
+/// The bytes that are laid into flash, by the addresses they are loaded at: from the first to the last, erased between.
+fn flash(elf: &[u8]) -> Option<Vec<u8>> {
+    let file = ElfFile32::<Endianness>::parse(elf).ok()?;
+    let little = Endianness::Little;
+    let mut bytes = Vec::new();
+    let segments = file.elf_program_headers().iter();
+    let laid = segments.filter(|segment| segment.p_type(little) == PT_LOAD && segment.p_filesz(little) > 0);
+    for segment in laid {
+        let content = segment.data(little, elf).ok()?;
+        let at = usize::try_from(segment.p_paddr(little).checked_sub(FLASH)?).ok()?;
+        bytes.resize(bytes.len().max(at + content.len()), ERASED);
+        bytes[at..at + content.len()].copy_from_slice(content);
+    }
+    Some(bytes)
+}
+
+/// Where the flash begins (RM0090 section 2.3), and what an erased byte of it is.
+const FLASH: u32 = 0x0800_0000;
+const ERASED: u8 = 0xFF;
+
+/// Where in an ELF file the first word of a function stands, by a piece of its mangled name.
+fn offset_of(elf: &[u8], part: &str) -> Option<usize> {
+    let address = function(elf, part)?;
+    let file = object::File::parse(elf).ok()?;
     file.sections().find_map(|section| {
         let (first, _) = section.file_range()?;
         let within = address.checked_sub(section.address())?;

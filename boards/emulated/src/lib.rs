@@ -15,6 +15,7 @@ pub mod flight;
 pub mod image;
 mod rtt;
 mod stand;
+mod thumb;
 mod toolchain;
 mod wires;
 
