@@ -22,7 +22,8 @@ use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, stack_use, start, telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, read_image, stack_use, start,
+    telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -58,5 +59,6 @@ pub fn init() -> Parts<Discovery> {
         oscillator,
         brown_out,
         stack_use,
+        read_image,
     }
 }

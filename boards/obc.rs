@@ -23,7 +23,8 @@ use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, stack_use, start, telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, read_image, stack_use, start,
+    telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -76,5 +77,6 @@ pub fn init() -> Parts<Obc> {
         oscillator,
         brown_out,
         stack_use,
+        read_image,
     }
 }

@@ -56,7 +56,12 @@ pub struct Parts<B: Board> {
     pub brown_out: BrownOut,
     /// How much of the stack has been used; may take as long as a packet's encoding.
     pub stack_use: fn() -> StackUse,
+    /// Reads the firmware's own image.
+    pub read_image: ReadImage,
 }
+
+/// Reads a piece of the firmware's image from a place on; how many bytes there are, none beyond its end.
+pub type ReadImage = fn(at: usize, piece: &mut [u8]) -> usize;
 
 /// The two discrete inputs of the vehicle, `true` = asserted, polarity already undone.
 pub trait Discretes {

@@ -108,7 +108,11 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 pub const COMMANDS: [Entry; 21] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
-    entry(b"G_MT", Command::SendPackets, "WAIT: packets to the umbilical"),
+    entry(
+        b"G_MT",
+        Command::SendPackets,
+        "WAIT: packets to the umbilical (send twice)",
+    ),
     entry(b"G_MA", Command::Erase, "WAIT: erase the recorder (then G_CA)"),
     entry(b"G_CA", Command::ConfirmErase, "WAIT: confirm G_MA, within 10 s"),
     entry(b"G_Ml", Command::Dump, "WAIT: read the recorder"),
@@ -134,8 +138,8 @@ pub const COMMANDS: [Entry; 21] = [
     ),
     entry(b"G_CK", Command::ConfirmSet, "WAIT: confirm G_CL or G_CX, within 10 s"),
     entry(b"G_CR", Command::ReadSet, "WAIT: read the calibration in use"),
-    entry(b"G_Mt", Command::Stop, "WAIT: stop the running task"),
-    entry(b"G_MG", Command::Record, "FLIGHT: record packets"),
+    entry(b"G_Mt", Command::Stop, "WAIT: stop the running task (send twice)"),
+    entry(b"G_MG", Command::Record, "FLIGHT: record packets (send twice)"),
     entry(b"G_ST", Command::Status, "status"),
     entry(b"G_VE", Command::Version, "version"),
     entry(b"G_XN", Command::LeaveSafeMode, "leave safe mode"),
@@ -230,7 +234,8 @@ impl Parser {
         let _ = self.letters.push(byte);
     }
 
-    fn forget(&mut self) {
+    /// Forgets the word that has begun: what comes next does not go on it.
+    pub fn forget(&mut self) {
         self.passed_over = self.passed_over.saturating_add(self.letters.len() as u32);
         self.letters.clear();
     }

@@ -177,6 +177,21 @@ impl Estimator {
         self.settlements = None;
     }
 
+    /// Puts right its set, or the other copy of it, where a flipped bit makes them differ; whether it did. Right is the one that
+    /// the checksum fits.
+    #[inline(never)]
+    pub fn mend_set(&mut self, copy: &mut Set, checksum: u32) -> bool {
+        if self.set == *copy {
+            return false;
+        }
+        if self.set.checksum() == checksum {
+            *copy = self.set;
+        } else {
+            self.set = *copy;
+        }
+        true
+    }
+
     /// Of a unit with these settings and the compiled-in parameters.
     ///
     /// Not inlined, as the others here: what they build on the way would lie on the stack under all that the unit does.

@@ -273,7 +273,7 @@ impl Monitor {
         let without = self.gyro.without_each(&measured.gyro, gyros);
         let without = without.map(|rates_b| rates_b.map(|rate_b| rate_b - self.bias_b));
         let contradicted = self.vector_rate.step(without, dt_s, directions);
-        if let Some(plate) = contradicted.filter(|_| self.gyro.suspect) {
+        if let Some(plate) = contradicted {
             self.gyro.blame(plate, Verdict::Disagreeing);
         }
     }

@@ -2,9 +2,10 @@
 //!
 //! In: commands, lift-off, time. Out: a [`Verdict`] for the console and an [`Action`] for whoever does the work.
 //!
-//! One flipped bit turns G_ME (to WAIT) into G_MA (erase) or G_MG (record), and G_MT (send packets) into G_MV (to
-//! FLIGHT). So nothing that matters hangs on one word: G_MV and G_ME take effect when sent twice in a row, G_MA when
-//! followed by the different G_CA, each within [`CONFIRM_WITHIN_US`]; any other word in between withdraws them.
+//! One flipped bit turns G_ME (to WAIT) into G_MA (erase) or G_MG (record), G_MT (send packets) into G_MV (to FLIGHT) or
+//! G_Mt (stop). So no word that one bit makes of another acts alone: G_MV, G_ME, G_MG, G_MT and G_Mt take effect when sent
+//! twice in a row, G_MA when followed by the different G_CA, each within [`CONFIRM_WITHIN_US`]; any other word in between
+//! withdraws them.
 //!
 //! The same holds for the calibration set: G_CL (use and keep the one sent) and G_CX (forget the one kept) are armed, and
 //! take effect with the different G_CK.
@@ -50,6 +51,10 @@ pub enum Cause {
     LiftOff,
     /// The log, after a power cut.
     Log,
+    /// G_MA: nothing changes, but an erase was armed.
+    EraseArmed,
+    /// G_CA: nothing changes, but the log was erased.
+    Erased,
 }
 
 impl Cause {
@@ -59,6 +64,8 @@ impl Cause {
             Cause::Command => "command",
             Cause::LiftOff => "lift-off",
             Cause::Log => "log, as before the power cut",
+            Cause::EraseArmed => "an erase of the log armed",
+            Cause::Erased => "the log erased",
         }
     }
 }
@@ -163,6 +170,32 @@ struct Pending {
     until_us: u64,
 }
 
+/// Two copies of what of a state must not change by itself, the second one complemented, against flipped bits of the RAM
+/// (fault U9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sworn([u8; 2]);
+
+impl Sworn {
+    /// Of a state as it is to be.
+    pub fn of(state: &State) -> Self {
+        let vital = state.vital();
+        Sworn([vital, !vital])
+    }
+
+    /// Makes state and copies what two of the three are; whether there was anything to put right.
+    pub fn mend(&mut self, state: &mut State) -> bool {
+        let [one, other] = self.0;
+        let found = *self;
+        if one == !other {
+            let found = state.vital();
+            state.restore(one);
+            return found != one;
+        }
+        *self = Sworn::of(state);
+        *self != found
+    }
+}
+
 impl State {
     /// The state after a start: what a reset struck goes on; after power-on the log is waited for.
     pub fn resumed(resume: Option<Resume>) -> Self {
@@ -177,6 +210,19 @@ impl State {
             awaits_log: resume.awaits_log,
             ..State::default()
         }
+    }
+
+    /// What of it must not change by itself, in one byte.
+    fn vital(&self) -> u8 {
+        let flags = [self.mode == Mode::Flight, self.recording, self.derived, self.awaits_log];
+        flags.into_iter().fold(0, |vital, flag| vital << 1 | u8::from(flag))
+    }
+
+    /// Makes that so again.
+    fn restore(&mut self, vital: u8) {
+        let flag = |bit: u8| vital >> bit & 1 == 1;
+        self.mode = if flag(3) { Mode::Flight } else { Mode::Wait };
+        (self.recording, self.derived, self.awaits_log) = (flag(2), flag(1), flag(0));
     }
 
     /// Takes what the log says of the time before power-on, if it is the first to say something of the mode.
@@ -209,6 +255,9 @@ impl State {
                 Verdict::Done(Action::None)
             }
             Command::Record => self.only_in(Mode::Flight, |state| {
+                if !confirmed {
+                    return state.confirm(command, command, now_us);
+                }
                 state.recording = true;
                 Verdict::Done(Action::None)
             }),
@@ -225,6 +274,9 @@ impl State {
                 state.task = Task::Idle;
                 Verdict::Done(Action::Erase)
             }),
+            Command::SendPackets | Command::Stop if !confirmed => {
+                self.only_in(Mode::Wait, |state| state.confirm(command, command, now_us))
+            }
             Command::SendPackets => self.start(Task::SendPackets),
             Command::Dump => self.start(Task::Dump { next: 0, end: u32::MAX }),
             Command::DumpRange { first, count } => self.start(Task::Dump {

@@ -15,6 +15,7 @@ mod calibration;
 mod clock;
 mod estimate;
 mod gyros;
+mod image;
 mod inputs;
 mod plates;
 mod record;
@@ -139,9 +140,10 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
         estimate::run(&shared, &votes, &mut estimator, &memory),
         record::run::<B>(&shared, &votes, parts.nand, &memory),
     );
-    let care = join::join(
+    let care = join::join3(
         self_test::run::<B>(&shared, &switch, &gyros),
         vote::run::<B>(&shared.clock, &votes, parts.watchdog, &shared.fed_us),
+        image::run(&shared, parts.read_image),
     );
     shared.clock.drive(pin!(join::join3(link, data, care))).await;
     // Every part runs for ever; should one end, the vote is missing and the watchdog restarts the unit.

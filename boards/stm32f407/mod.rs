@@ -17,6 +17,7 @@
 mod bus;
 mod clock;
 mod crash;
+mod flash;
 mod gyros;
 mod lines;
 #[allow(dead_code, reason = "a board without a NAND only says that it has none")]
@@ -33,6 +34,7 @@ use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
 use emems::board::{Board, BrownOut, Oscillator, ResetCause, Watchdog};
 
 pub use self::bus::SensorBus;
+pub use self::flash::read_image;
 pub use self::gyros::gyros;
 pub use self::lines::{VehicleInputs, telemetry, umbilical};
 pub use self::nand::NandPort;

@@ -97,6 +97,8 @@ pub fn false_alarms(unit: Unit, cycles: u64, set: Set) -> (u32, u32) {
 pub struct Outcome {
     /// \[s\] from the first faulty cycle to the alarm.
     pub delay_s: Option<f64>,
+    /// \[s\] until somebody was accused.
+    pub named_s: Option<f64>,
     /// Axes accused at the end.
     pub accused: Channels,
     /// Somebody said "not isolable".
@@ -134,10 +136,11 @@ pub fn fall_ill(unit: Unit, learns_s: f64, watched_s: f64, ills: &[Ill]) -> Outc
         let vectors = flown.step();
         let sound = healthy.step();
         outcome.undecided |= vectors.health.0 & UNDECIDED != 0;
-        let alarmed = flown.accused() != before || vectors.health.0 & UNDECIDED != 0;
-        if alarmed && outcome.delay_s.is_none() {
-            outcome.delay_s = Some(now_s - start_s);
-        }
+        let accused = flown.accused() != before;
+        let alarmed = accused || vectors.health.0 & UNDECIDED != 0;
+        let since_s = now_s - start_s;
+        outcome.delay_s = outcome.delay_s.or(alarmed.then_some(since_s));
+        outcome.named_s = outcome.named_s.or(accused.then_some(since_s));
         let jump = (vectors.force_b.vector_b.angle(&sound.force_b.vector_b))
             .max(vectors.field_b_ut.vector_b.angle(&sound.field_b_ut.vector_b));
         outcome.jump = outcome.jump.max(f64::from(jump));

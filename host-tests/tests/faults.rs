@@ -105,6 +105,44 @@ fn s15_a_step_of_one_axis_is_isolated_in_a_second_or_in_five() {
     }
 }
 
+/// Density of the standard normal distribution, and an integral by the rule of the mid-points.
+fn density(x: f64) -> f64 {
+    (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt()
+}
+
+fn integral(from: f64, to: f64, of: impl Fn(f64) -> f64) -> f64 {
+    let steps = ((to - from) / 2e-3).ceil();
+    let step = (to - from) / steps;
+    (0..steps as u64)
+        .map(|n| of(from + (n as f64 + 0.5) * step) * step)
+        .sum()
+}
+
+/// S15: why a step of 1.7 sigma is isolated in five seconds with 0.94 and not with 0.99. Of all tests that look at five seconds, the
+/// mean over them finds a step that begins with them most often at a given rate of false alarms (Guepie, Fillatre and Nikiforov,
+/// "Detecting a suddenly arriving dynamic profile of finite duration", IEEE Trans. Inf. Theory 63, 2017). Its limit for 0.99 is
+/// passed by chance more than once in ten hours of 24 axes, by known white noise and with no other test beside it.
+#[test]
+fn s15_a_chance_of_99_percent_at_1_7_sigma_takes_more_false_alarms_than_are_allowed() {
+    let samples = 5.0 / PERIOD_S;
+    // Three unknowns and twelve axes alike: an axis shows 9/12 of its variance in what it disagrees by.
+    let seen = 1.7 * samples.sqrt() * (9.0_f64 / 12.0).sqrt();
+    // One percent of a standard normal variable is below -2.326.
+    let limit = seen - 2.326;
+    assert!((integral(-8.0, limit - seen, density) - 0.01).abs() < 1e-4);
+    // Of a mean that slides by one sample: the chance to be below the limit and then above it.
+    let kept = 1.0 - 1.0 / samples;
+    let left = (1.0 - kept * kept).sqrt();
+    let below = |x: f64| integral(-8.0, x, density);
+    let passes = integral(limit, limit + 3.0, |next| {
+        density(next) * below((limit - kept * next) / left)
+    });
+    let ten_hours = 36_000.0 / PERIOD_S;
+    let alarms = 2.0 * 24.0 * ten_hours * passes;
+    println!("a limit of {limit:.3} sigma: {alarms:.2} false alarms in ten hours");
+    assert!(alarms > 1.0 && alarms < 1.5, "{alarms}");
+}
+
 #[test]
 fn s15_ramps_and_scale_steps_of_one_axis_are_isolated() {
     let mut tally = Tally::default();
@@ -141,10 +179,10 @@ fn s16_a_step_of_one_gyro_is_detected_in_a_second_or_in_five() {
 
 #[test]
 fn s16_a_gyro_is_isolated_by_the_vectors_at_rest_and_in_motion() {
-    // 0.3 deg/s is half of what the parity detects with certainty: it is isolated once detected. In a tumble, sampling
-    // instants and single samples at 5 Hz blur the vectors.
+    // 0.3 deg/s is half of what the parity detects with certainty in five seconds: it is isolated once detected. In a tumble,
+    // sampling instants and single samples at 5 Hz blur the vectors.
     for (name, deg_s, watched_s, part) in [
-        ("still", 0.3, 25.0, 0.5),
+        ("still", 0.3, 25.0, 0.8),
         ("still", 0.8, 15.0, 0.97),
         ("tumble", 2.0, 25.0, 0.98),
     ] {
@@ -158,6 +196,28 @@ fn s16_a_gyro_is_isolated_by_the_vectors_at_rest_and_in_motion() {
         println!("gyro of {deg_s} deg/s isolated, {name}: {tally:?}");
         assert!(tally.is(part, tally.named) && tally.wrong <= 1, "{name} {tally:?}");
     }
+}
+
+/// S16: the parity detects, the vectors isolate. What they take from the alarm on is 10 s at most, for a fault of 0.3 deg/s, 1.5 times the
+/// noise of a gyro.
+#[test]
+fn s16_a_gyro_is_isolated_within_ten_seconds_of_its_detection() {
+    let (mut detected, mut in_time, mut wrong) = (0, 0, 0);
+    for seed in 0..100 {
+        let gyro = 24 + (seed % 4) as u8;
+        let unit = Unit::new(world("still"), 9000 + seed, 1.0);
+        let outcome = fall_ill(unit, LEARNS_S, 40.0, &[Ill::Bias(Channel(gyro), f64::to_radians(0.3))]);
+        if let Some(alarm_s) = outcome.delay_s.filter(|alarm_s| *alarm_s < 30.0) {
+            detected += 1;
+            in_time += u32::from(outcome.named_s.is_some_and(|named_s| named_s - alarm_s <= 10.0));
+            wrong += u32::from(outcome.accused.0 & !(1 << gyro) != 0);
+        }
+    }
+    println!("{detected} of 100 detected, {in_time} of them isolated within 10 s, {wrong} wrong");
+    assert!(
+        detected >= 97 && in_time * 100 >= detected * 95 && wrong <= 1,
+        "{detected} {in_time} {wrong}"
+    );
 }
 
 #[test]

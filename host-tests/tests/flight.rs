@@ -67,7 +67,7 @@ fn a_hang_ends_in_a_reset_that_resumes_flight(fault: Fault) {
     let hangs = 5 * S + 77 * MS;
     let flown = Flight::ideal(world("still"))
         .say(S, b"G_MVG_MV")
-        .say(2 * S, b"G_MG")
+        .say(2 * S, b"G_MGG_MG")
         .fault(hangs, fault)
         .say(hangs + 2 * S, b"G_ST")
         .fly(hangs + 4 * S);

@@ -221,3 +221,113 @@ fn a_clock_that_leaps_does_not_make_the_gyros_run_after_it() {
         "{counts:?}"
     );
 }
+
+/// S8: `Gyros::fast` asks anew who answers before it takes a word. The identity before each sample tells a line of random words.
+#[test]
+fn s8_a_gyro_that_answers_at_random_adds_no_word_to_its_increments() {
+    for plate in 0..4 {
+        let begins = 20 * S + 100 * MS;
+        let flight = Flight::ideal(world("tumble")).say(1, b"G_DL");
+        let flown = flight.fault(begins, Fault::Garbage(8 + plate, true)).fly(23 * S);
+        assert!(flown.report.struck["garbage"] > 20);
+        let gyros: Vec<_> = (flown.derived.iter())
+            .filter(|frame| frame.start_us > 19_700_000)
+            .map(|frame| frame.increments.gyro[plate])
+            .collect();
+        // Cycles begin 150 ms into the second and every 200 ms: of the third it answered for 150 ms.
+        assert!(gyros[..2].iter().all(|gyro| gyro.count >= 19), "{gyros:?}");
+        assert!(
+            gyros[2].count >= 10 && gyros[2..].iter().all(|gyro| gyro.count <= 16),
+            "{gyros:?}"
+        );
+        // 60 deg/s are 820 counts; random words reach 8191.
+        let most = gyros
+            .iter()
+            .filter(|gyro| gyro.count > 0)
+            .map(|gyro| gyro.least.abs().max(gyro.most.abs()));
+        assert!(most.max() < Some(1200), "{gyros:?}");
+    }
+}
+
+/// C4: the parser forgets what came before a damaged byte. Otherwise G_ME sent twice, its fourth byte lost, would be heard as
+/// G_MG, and begin to record.
+#[test]
+fn c4_a_damaged_byte_ends_the_word_that_it_is_in() {
+    let noisy = |on| Fault::UmbilicalNoise(on);
+    let flown = still()
+        .say(S, b"G_MVG_MV")
+        .say(2 * S, b"G_M")
+        .fault(2 * S + 100 * MS, noisy(true))
+        .say(2 * S + 200 * MS, b"E")
+        .fault(2 * S + 300 * MS, noisy(false))
+        .say(2 * S + 400 * MS, b"G_ME")
+        .say(3 * S, b"G_ST")
+        .fly(4 * S);
+    assert_eq!(flown.report.struck["umbilical-noise"], 1);
+    assert!(flown.replied("G_ME: send G_ME within 10 s"), "{:?}", flown.replies());
+    assert!(
+        flown.replied("G_ST FLIGHT task none recording 0"),
+        "{:?}",
+        flown.replies()
+    );
+}
+
+/// U10: another pass over the image that gives another checksum.
+#[test]
+fn u10_a_bit_of_the_image_that_flips_is_said_and_in_the_status() {
+    let image = |flown: &Flown, from: usize| -> Vec<String> {
+        let lines = flown.replies();
+        let told = lines
+            .iter()
+            .filter_map(|line| Some(line.rsplit_once(" image ")?.1.to_string()));
+        told.skip(from).collect()
+    };
+    let flown = still()
+        .say(4 * S, b"G_ST")
+        .fault(5 * S, Fault::ImageFlip(77))
+        .say(8 * S, b"G_ST")
+        .fly(9 * S);
+    let said = image(&flown, 0);
+    assert!(said.len() == 2 && said[0] != said[1], "{said:?}");
+    let line = format!("firmware image CHANGED: checksum {}, was {}", said[1], said[0]);
+    assert_eq!(
+        flown.replies().iter().filter(|reply| **reply == line).count(),
+        1,
+        "{:?}",
+        flown.replies()
+    );
+    assert!(!still().fly(9 * S).replied("CHANGED"));
+}
+
+/// C10: a frame has the time it takes at 9600 baud. A packet takes 163 ms there, and is whole.
+#[test]
+fn c10_on_a_slow_line_frames_are_whole_or_not_there() {
+    for (derived, least) in [(false, 38), (true, 3)] {
+        let flight = Flight::ideal(world("still")).fault(2 * S, Fault::LinesSlow(12));
+        let flight = if derived { flight.say(S, b"G_DL") } else { flight };
+        let flown = flight.fly(10 * S);
+        assert!(flown.report.struck["lines-slow"] > 5);
+        assert!(flown.strange.is_empty(), "{} bytes of a frame", flown.strange[0].len());
+        let slow: Vec<_> = flown.packets.iter().filter(|(at, _)| *at > 2_300 * MS).collect();
+        assert!(slow.len() >= least, "{} packets", slow.len());
+        // No backlog: what comes is new.
+        let late = |(at, reading): &(u64, emems::sample::Reading)| at.abs_diff(u64::from(reading.counter) * 200 * MS);
+        let latest = slow.iter().map(|packet| late(packet)).max().unwrap_or(0);
+        assert!(derived || latest < 600 * MS, "{latest} ns");
+    }
+}
+
+/// C10: a line that takes no byte at all costs its frames, and the watchdog hears of the part all the same.
+#[test]
+fn c10_a_line_that_is_stuck_with_derived_frames_on_does_not_let_the_watchdog_bite() {
+    let flown = still()
+        .fault(3 * S, Fault::TelemetryStuck(true))
+        .fault(3 * S, Fault::UmbilicalStuck(true))
+        .say(2 * S, b"G_MTG_MT")
+        .fault(9 * S, Fault::TelemetryStuck(false))
+        .fault(9 * S, Fault::UmbilicalStuck(false))
+        .fly(12 * S);
+    assert!(flown.report.struck["telemetry-stuck"] > 3 && flown.report.struck["umbilical-stuck"] > 3);
+    assert_eq!(flown.report.resets, []);
+    assert_eq!(flown.second(11).len(), 5);
+}

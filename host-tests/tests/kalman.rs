@@ -295,3 +295,43 @@ fn a_million_steps_in_f32_stay_with_f64() {
     assert!(least_ratio > 0.0, "{least_ratio}");
     assert!(most < MOST_DEG, "{most}");
 }
+
+/// N12: ten hours. What a step costs depends on the path it takes, and on nothing else: the FPU of a Cortex-M4 takes the same cycles for
+/// whatever operands (Arm 100166, table 7-1), and the state holds no denormal number, for which other processors take hundreds. The path is
+/// told by what each window compares: in the tenth hour as much as in the first.
+#[test]
+fn ten_hours_leave_the_same_work_in_each_window_and_no_denormal_number() {
+    const HOUR: usize = 36_000;
+    let is_denormal = |number: &f32| *number != 0.0 && number.abs() < f32::MIN_POSITIVE;
+    for motion in [Motion::Still, Motion::Tumble] {
+        let mut params = params();
+        (params.bias_walk, params.gyro_matrix_walk, params.angle_noise) = (1e-6, 1e-6, 1e-4);
+        let mut flight = Flight::new(motion, 3);
+        let variance = (START_SD * START_SD) as f32;
+        let mut filter = Filter::resumed(params, flight.q_nb.cast(), Matrix3::from_diagonal_element(variance));
+        let (mut compared, mut steps_that_compare, mut norm_off) = ([0_u64; 10], [0_u64; 10], 0.0_f32);
+        for step in 0..10 * HOUR {
+            let outcome = filter.step(&flight.next());
+            assert_eq!((outcome.refusal, outcome.aligned), (None, false), "{motion:?} {step}");
+            compared[step / HOUR] += outcome.innovations.len() as u64;
+            steps_that_compare[step / HOUR] += u64::from(!outcome.innovations.is_empty());
+            norm_off = norm_off.max((filter.q_nb.norm() - 1.0).abs());
+            if step % 977 == 0 {
+                let p = filter.covariance().matrix();
+                let state = filter
+                    .q_nb
+                    .as_vector()
+                    .iter()
+                    .chain(&filter.bias_b)
+                    .chain(&filter.gyro_matrix);
+                assert!(!p.iter().chain(state).any(is_denormal), "{motion:?} {step}");
+            }
+        }
+        println!(
+            "{motion:?}: scalars an hour {compared:?}, in {steps_that_compare:?} steps, |q| off by {norm_off:.1e}"
+        );
+        let within = |counts: &[u64; 10]| counts.iter().all(|count| count.abs_diff(counts[0]) * 10 <= counts[0]);
+        assert!(compared[0] > 3 * HOUR as u64 / 10 && within(&compared) && within(&steps_that_compare));
+        assert!(norm_off < 1e-6, "{motion:?}: {norm_off}");
+    }
+}

@@ -115,7 +115,7 @@ fn named(flown: Flown) -> Vec<String> {
 fn the_log_names_the_set_it_was_recorded_with() {
     let name = format!("5:{:08X}", other().checksum());
     let words = set_words(&other());
-    let recorded = |flight: Flight, at: u64| flight.say(at * S, b"G_MVG_MV").say((at + 1) * S, b"G_MG");
+    let recorded = |flight: Flight, at: u64| flight.say(at * S, b"G_MVG_MV").say((at + 1) * S, b"G_MGG_MG");
     let before = recorded(flight().say(2 * S, &words).say(6 * S, b"G_CLG_CK"), 7).fly(12 * S);
     assert_eq!(named(before), std::slice::from_ref(&name));
     let between = recorded(flight(), 2)

@@ -42,7 +42,7 @@ fn noisy() -> Flight {
 
 /// In FLIGHT and recording from 2 s on, without lift-off.
 fn recording() -> Flight {
-    still().say(S, b"G_MVG_MV").say(2 * S, b"G_MG")
+    still().say(S, b"G_MVG_MV").say(2 * S, b"G_MGG_MG")
 }
 
 /// Every record on the chip, by key.
@@ -132,6 +132,23 @@ fn a_mode_that_was_commanded_stands_when_the_log_is_mounted_again() {
     assert!(dip.replied("G_ST WAIT task none recording 0"), "{:?}", dip.replies());
 }
 
+/// C7: an erase that was armed and not confirmed stands in the log; one that was, at the beginning of the new one.
+#[test]
+fn c7_arming_an_erase_and_erasing_are_in_the_log() {
+    let told = |flown: &Flown| -> Vec<Cause> { changes(flown).into_iter().map(|(_, cause)| cause).collect() };
+    let landed = || recording().say(4 * S, b"G_MEG_ME").say(6 * S, b"G_MA");
+    let armed = landed().say(17 * S, b"G_CA").fly(19 * S);
+    assert!(armed.replied("G_CA no: nothing to confirm"), "{:?}", armed.replies());
+    assert_eq!(told(&armed), [Cause::Command, Cause::Command, Cause::EraseArmed]);
+    // The old log is gone, its blocks erased one after the other; the new one says so for good.
+    let erased = landed()
+        .say(8 * S, b"G_CA")
+        .fault(30 * S, Fault::PowerCut(0))
+        .fly(32 * S);
+    assert!(erased.replied("G_MA done"), "{:?}", erased.replies());
+    assert_eq!(told(&erased), [Cause::Erased]);
+}
+
 #[test]
 fn flight_is_not_forgotten_by_a_reset_before_the_log_was_heard() {
     let cut = 4 * S;
@@ -200,7 +217,7 @@ fn derived_frames_and_the_set_that_was_loaded_survive_a_reset_and_a_power_cut() 
             .say(5 * S, b"G_CL")
             .say(6 * S, b"G_CK")
             .say(8 * S, b"G_MVG_MV")
-            .say(9 * S, b"G_MG")
+            .say(9 * S, b"G_MGG_MG")
     };
     for fault in [Fault::Reset, Fault::PowerCut(0), Fault::Panic] {
         let strikes = 12 * S + 77 * MS;
@@ -236,7 +253,7 @@ fn a_set_is_forgotten_by_g_cx_with_g_ck_only_and_for_good() {
             .say(8 * S, forget)
             .fault(10 * S, Fault::PowerCut(0))
             .say(12 * S, b"G_MVG_MV")
-            .say(13 * S, b"G_MG")
+            .say(13 * S, b"G_MGG_MG")
             .fly(15 * S)
     };
     let forgotten = flight(b"G_CXG_CK");
@@ -348,7 +365,7 @@ fn weightless(rate_deg_s: f64, seed: u64) -> Flight {
     }
     .say(MS, b"G_DL")
     .say(S, b"G_MVG_MV")
-    .say(2 * S, b"G_MG")
+    .say(2 * S, b"G_MGG_MG")
 }
 
 /// The error of a frame's attitude as a rotation vector in n \[rad\], and its covariance.
@@ -451,7 +468,7 @@ fn a_power_cut_without_weight_goes_on_from_the_newest_record() {
     // On the bench the first second tells better than what the log says, however the unit was turned meanwhile.
     let bench = noisy()
         .say(S, b"G_MVG_MV")
-        .say(2 * S, b"G_MG")
+        .say(2 * S, b"G_MGG_MG")
         .say(MS, b"G_DL")
         .fault(8 * S, Fault::PowerCut(0))
         .fly(12 * S);

@@ -9,7 +9,7 @@ use twin::{plant::Plant, run::Fault};
 fn reset_at(seconds: &[u64], ask_at: u64, ends: u64) -> Flown {
     let mut flight = Flight::ideal(world("still"))
         .say(S, b"G_MVG_MV")
-        .say(S + S / 2, b"G_MG");
+        .say(S + S / 2, b"G_MGG_MG");
     for at in seconds {
         flight = flight.fault(at * S, Fault::Reset);
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use emems::{
     command::{COMMANDS, Command, Heard, Parser, WORD_BYTES, Word},
     flight_log::dump::{self, DUMP_START},
-    mode::{Action, CONFIRM_WITHIN_US, Mode, State, Verdict},
+    mode::{Action, CONFIRM_WITHIN_US, Mode, State, Task, Verdict},
     packet::PACKET_BYTES,
 };
 use host_tests::{Flight, S, world};
@@ -71,11 +71,11 @@ fn state(words: &[u8]) -> State {
 }
 
 /// Every word with every one-bit error, in WAIT, in WAIT while packets are sent, and in FLIGHT while they are recorded. The
-/// word that arrives is another one in a few cases; what comes of it is a task or a report that the console shows.
+/// word that arrives is another one in a few cases; what comes of it is a question or a report that the console shows.
 #[test]
-fn one_wrong_bit_in_a_word_costs_a_task_or_a_report_at_most() {
+fn one_wrong_bit_in_a_word_costs_a_report_at_most() {
     let mut exchanged = BTreeSet::new();
-    for before in [state(b""), state(b"G_MTG_DL"), state(b"G_MVG_MVG_MG")] {
+    for before in [state(b""), state(b"G_MTG_MTG_DL"), state(b"G_MVG_MVG_MGG_MG")] {
         for entry in &COMMANDS {
             let sent = deed(entry.word);
             for bit in 0..8 * sent.len() {
@@ -85,8 +85,8 @@ fn one_wrong_bit_in_a_word_costs_a_task_or_a_report_at_most() {
                 let (state, verdicts) = after(before, &came);
                 assert!(verdicts.len() <= 1, "{text}: {verdicts:?}");
                 assert_eq!(
-                    (state.mode, state.recording),
-                    (before.mode, recorded(before, &came)),
+                    (state.mode, state.recording, state.task),
+                    (before.mode, before.recording, task_after(before, &sent, &came)),
                     "{text}"
                 );
                 for verdict in verdicts {
@@ -118,9 +118,15 @@ fn one_wrong_bit_in_a_word_costs_a_task_or_a_report_at_most() {
     }
 }
 
-/// Whether packets are recorded after a word: G_MG, which one bit makes of G_ME and G_MA, starts it in FLIGHT.
-fn recorded(before: State, came: &[u8]) -> bool {
-    before.recording || before.mode == Mode::Flight && came.starts_with(b"G_MG")
+/// The task after a word: no other than before, unless it was a dump that was asked for, whose digits may have come wrong.
+fn task_after(before: State, sent: &[u8], came: &[u8]) -> Task {
+    match (
+        sent.starts_with(b"G_LR") && came.starts_with(b"G_LR"),
+        after(before, came).0.task,
+    ) {
+        (true, task @ Task::Dump { .. }) => task,
+        _ => before.task,
+    }
 }
 
 /// Random bytes: half of them of any value, half letters of the words. The parser keeps no more than the longest word,
@@ -180,7 +186,7 @@ fn a_parser_keeps_sixteen_letters_whatever_comes() {
 #[test]
 fn what_is_asked_for_beyond_the_log_or_a_set_is_not_there() {
     let flown = Flight::ideal(world("still"))
-        .say(S, b"G_MVG_MVG_MG")
+        .say(S, b"G_MVG_MVG_MGG_MG")
         .say(3 * S, b"G_MEG_ME")
         .say(4 * S, b"G_LRFFFFFFFFFFFF")
         .say(5 * S, b"G_LR000000FFFFFF")

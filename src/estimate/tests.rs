@@ -203,3 +203,28 @@ proptest! {
         }
     }
 }
+
+/// U9: a bit of either copy of the calibration set.
+#[test]
+fn a_flipped_bit_of_the_calibration_is_put_right_by_the_copy_whose_checksum_fits() {
+    let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+    let mut estimator = Estimator::new(set, &Settings::NOMINAL.site);
+    let sum = set.checksum();
+    let flipped = |axis: usize, bit: u32| {
+        let mut flipped = set;
+        let scale = &mut flipped.acc[axis % 12].scale;
+        *scale = f32::from_bits(scale.to_bits() ^ 1 << (bit % 32));
+        flipped
+    };
+    for bit in 0..64 {
+        let mut copy = set;
+        assert!(!estimator.mend_set(&mut copy, sum));
+        if bit < 32 {
+            copy = flipped(bit as usize, bit);
+        } else {
+            estimator.set = flipped(bit as usize, bit);
+        }
+        assert!(estimator.mend_set(&mut copy, sum), "{bit}");
+        assert!(estimator.set == set && copy == set, "{bit}");
+    }
+}

@@ -24,7 +24,7 @@
 //! tail of the source file's name.
 //!
 //! A change of mode (type 3): `14-15` flags (1 FLIGHT from then on), `16-23` \[us\] when, `24` recording from then on, `25` cause
-//! (1 command, 2 lift-off, 3 log), the rest zero.
+//! (1 command, 2 lift-off, 3 log; without a change 4 an erase was armed, 5 the log was erased), the rest zero.
 //!
 //! The key is never used twice, so a record that turns up again is the same record. Refuses what the checksum does not
 //! fit, a newer version by its number, and a type it does not know.
@@ -298,6 +298,8 @@ pub fn encode_change(key: Key, change: &Change) -> RecordBytes {
         Cause::Command => 1,
         Cause::LiftOff => 2,
         Cause::Log => 3,
+        Cause::EraseArmed => 4,
+        Cause::Erased => 5,
     };
     put(&mut bytes, at::RECORDING, &[change.recording.into()]);
     put(&mut bytes, at::CAUSE, &[cause]);
@@ -389,6 +391,8 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
             cause: match bytes[at::CAUSE] {
                 2 => Cause::LiftOff,
                 3 => Cause::Log,
+                4 => Cause::EraseArmed,
+                5 => Cause::Erased,
                 _ => Cause::Command,
             },
         }),

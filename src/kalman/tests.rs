@@ -44,25 +44,7 @@ impl World {
         for index in 0..steps {
             self.at_us += STEP_US;
             self.q_nb = renormalised(self.q_nb * from_rotation_vector(rate_b * STEP_S));
-            let sampled = |value_b: Vector3<f32>| {
-                Some(Sampled {
-                    value_b,
-                    variance: 0.0,
-                    scatter: 0.0,
-                    at_us: self.at_us,
-                })
-            };
-            let mut step = Step {
-                at_us: self.at_us,
-                covered_s: STEP_S,
-                angle_b: rate_b * STEP_S,
-                angle_variance: 0.0,
-                rate_b,
-                saturated: false,
-                acc: sampled(self.q_nb.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY))),
-                mag: sampled(self.q_nb.inverse_transform_vector(&Self::field_n())),
-                lift_off: false,
-            };
+            let mut step = self.step(rate_b);
             change(index as f32 * STEP_S, &mut step);
             let (before, was_aligned) = (self.off(), self.filter.aligned);
             let outcome = self.filter.step(&step);
@@ -75,6 +57,39 @@ impl World {
             }
         }
         last
+    }
+
+    /// The same, of a filter whose state may be anything.
+    fn go_on(&mut self, duration_s: f32, rate_b: Vector3<f32>) {
+        for _ in 0..(duration_s / STEP_S) as u32 {
+            self.at_us += STEP_US;
+            self.q_nb = renormalised(self.q_nb * from_rotation_vector(rate_b * STEP_S));
+            let step = self.step(rate_b);
+            self.filter.step(&step);
+        }
+    }
+
+    /// What an ideal unit has of this instant.
+    fn step(&self, rate_b: Vector3<f32>) -> Step {
+        let sampled = |value_b: Vector3<f32>| {
+            Some(Sampled {
+                value_b,
+                variance: 0.0,
+                scatter: 0.0,
+                at_us: self.at_us,
+            })
+        };
+        Step {
+            at_us: self.at_us,
+            covered_s: STEP_S,
+            angle_b: rate_b * STEP_S,
+            angle_variance: 0.0,
+            rate_b,
+            saturated: false,
+            acc: sampled(self.q_nb.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY))),
+            mag: sampled(self.q_nb.inverse_transform_vector(&Self::field_n())),
+            lift_off: false,
+        }
     }
 
     /// \[rad\] error of the attitude.

@@ -128,6 +128,7 @@ pub async fn run<B: Board>(
             .await;
         counter = counter.wrapping_add(1);
         shared.publish_cycle(cycle);
+        shared.mend();
         let state = shared.state.get();
         let resume = Resume {
             mode: state.mode,

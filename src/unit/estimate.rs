@@ -72,6 +72,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
         if shared.set_loaded.take() {
             estimator.renew(&shared.calibration.get(), &shared.settings.site);
         }
+        mend_set(shared, estimator);
         if let Some(found) = shared.attitude_found.take() {
             estimator.resume_near(&found, POWER_CUT);
         }
@@ -87,6 +88,16 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             estimate,
         ));
         keep(estimator, memory, &mut kept);
+    }
+}
+
+/// Puts right what a flipped bit of the RAM has made of the calibration set in use. Not inlined: a set is large.
+#[inline(never)]
+fn mend_set(shared: &Shared, estimator: &mut Estimator) {
+    let mut set = shared.calibration.get();
+    if estimator.mend_set(&mut set, shared.set_sum.get()) {
+        shared.calibration.set(set);
+        shared.say(format_args!("a flipped bit of the calibration was put right"));
     }
 }
 

@@ -107,21 +107,21 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     /// \[counts\] rates of all four, and when they were asked for.
     async fn fast(&self) -> (Instant, [i16; 4]) {
         let mut parts = self.parts.lock().await;
-        let answering = self.answering.get();
         self.clock.until(self.last_frame.get().saturating_add(STALL)).await;
         let asked = now();
-        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(answering)) {
+        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(self.answering.get())) {
             if answers {
                 let request = part.exchange(adis16265::GYRO_OUT).await;
                 let _ = self.settle(plate, request);
             }
         }
         // Four frames are longer than the pause; fewer may not be.
-        if answering.contains(&false) {
+        if self.answering.get().contains(&false) {
             self.clock.until(asked.saturating_add(STALL)).await;
         }
         let mut counts = [NOT_READ; 4];
-        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(answering)) {
+        // Who answers is asked anew: the request just before checks who answered the last one.
+        for (plate, (part, answers)) in (0..PLATES).zip(parts.iter_mut().zip(self.answering.get())) {
             if !answers {
                 continue;
             }

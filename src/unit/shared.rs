@@ -24,7 +24,7 @@ use crate::{
         record::{self, Name, RecordBytes},
     },
     increments::{Force, Increments, Integrator},
-    mode::{Cause, Change, State, Task},
+    mode::{Cause, Change, State, Sworn, Task},
     packet::PACKET_BYTES,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
@@ -52,7 +52,7 @@ const FRAMES: usize = 2;
 
 /// Of both lines, 8N1.
 const LINE_BAUD: u64 = 115_200;
-const BITS_PER_BYTE: u64 = 10;
+pub const BITS_PER_BYTE: u64 = 10;
 
 /// Changes of mode that wait for a line or for the log: two commands a second apart, and lift-off.
 const CHANGES: usize = 4;
@@ -164,6 +164,12 @@ pub struct Shared {
     pub attitude_found: Cell<Option<record::Estimate>>,
     /// \[us\] when the watchdog was last fed.
     pub fed_us: Cell<u64>,
+    /// Checksum of the firmware's image, once it was read to its end.
+    pub image: Cell<Option<u32>>,
+    /// Copies of the state.
+    sworn: Cell<Sworn>,
+    /// Checksum of the calibration set in use.
+    pub set_sum: Cell<u32>,
     /// Changes of mode that are not in the log yet.
     changes: Cell<Deque<Change, CHANGES>>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
@@ -181,10 +187,15 @@ pub struct Shared {
 impl Shared {
     /// The state at start.
     pub fn new(settings: Settings, start: Start) -> Self {
+        let state = State::resumed(start.resume);
+        let set = Set::compiled_in(Ranges::of(&settings));
         Shared {
             clock: Clock::new(),
             settings,
-            state: Cell::new(State::resumed(start.resume)),
+            state: Cell::new(state),
+            sworn: Cell::new(Sworn::of(&state)),
+            image: Cell::default(),
+            set_sum: Cell::new(set.checksum()),
             safe: Cell::new(start.starts.ask_for_safe_mode()),
             start,
             integrator: RefCell::new(Integrator::new(settings.rate.deg_s_per_count().to_radians())),
@@ -199,7 +210,7 @@ impl Shared {
             errors: Cell::default(),
             lines_lost: Cell::default(),
             umbilical_noise: Cell::default(),
-            calibration: Cell::new(Set::compiled_in(Ranges::of(&settings))),
+            calibration: Cell::new(set),
             set_name: Cell::new(settings.calibration.chars().take(16).collect()),
             set_loaded: Cell::default(),
             set_known: Cell::default(),
@@ -253,28 +264,30 @@ impl Shared {
         self.derived.immediate_publisher().publish_immediate(derived);
     }
 
+    /// Puts right what a flipped bit of the RAM has made of the state: of it and its two copies two agree.
+    pub fn mend(&self) {
+        let (mut sworn, mut state) = (self.sworn.get(), self.state.get());
+        if sworn.mend(&mut state) {
+            self.state.set(state);
+            self.sworn.set(sworn);
+            self.say(format_args!("a flipped bit of the mode was put right"));
+        }
+    }
+
     /// Changes the state. A change of mode is announced on both lines and waits for the log.
     pub fn change<T>(&self, cause: Cause, act: impl FnOnce(&mut State) -> T) -> T {
+        self.mend();
         let before = self.state.get();
         let mut after = before;
         let outcome = act(&mut after);
         self.state.set(after);
+        self.sworn.set(Sworn::of(&after));
         if after.mode != before.mode {
             let text = line(format_args!("mode {}: {}", after.mode.name(), cause.name()));
             for announced in &self.announced {
                 let _ = announced.try_send(text.clone());
             }
-            self.with_changes(|changes| {
-                if changes.is_full() {
-                    changes.pop_front();
-                }
-                let _ = changes.push_back(Change {
-                    at_us: now().as_micros(),
-                    mode: after.mode,
-                    recording: after.recording,
-                    cause,
-                });
-            });
+            self.note(cause);
         }
         outcome
     }
@@ -284,6 +297,22 @@ impl Shared {
         let mut state = self.state.get();
         state.task = task;
         self.state.set(state);
+    }
+
+    /// Leaves for the log what has happened to mode or log.
+    pub fn note(&self, cause: Cause) {
+        let state = self.state.get();
+        self.with_changes(|changes| {
+            if changes.is_full() {
+                changes.pop_front();
+            }
+            let _ = changes.push_back(Change {
+                at_us: now().as_micros(),
+                mode: state.mode,
+                recording: state.recording,
+                cause,
+            });
+        });
     }
 
     /// Works on the changes of mode that are not in the log yet, oldest first.
@@ -304,6 +333,7 @@ impl Shared {
     /// Uses another set from the next cycle on.
     pub fn use_set(&self, set: &Set, name: Name) {
         self.calibration.set(*set);
+        self.set_sum.set(set.checksum());
         self.set_name.set(name);
         self.set_known.set(true);
         self.set_loaded.set(true);

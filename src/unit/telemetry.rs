@@ -7,18 +7,27 @@ use embedded_io_async::Write;
 
 use super::{
     clock::{Clock, never},
-    shared::{Line, Shared},
+    shared::{BITS_PER_BYTE, Line, Shared},
     vote::{Voter, Votes},
 };
 use crate::{board::Board, derived};
 
-/// \[ms\] a packet takes 13.5 ms at 115200 baud; a line that takes longer than this is stuck and loses the packet.
-const WRITE_MS: u64 = 100;
+/// \[baud\] the slowest line there may be: a packet takes 162.5 of the 200 ms to the next one there, and 13.5 at 115200.
+const SLOWEST_BAUD: u64 = 9600;
+
+/// \[ms\] what a write may take besides: the estimation holds the processor no longer.
+const SPARE_MS: u64 = 20;
 
 /// Sends for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Telemetry) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, line: B::Telemetry) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         never().await
+    };
+    let mut out = Out {
+        line,
+        clock: &shared.clock,
+        votes,
+        voter: Voter::Telemetry,
     };
     loop {
         let next = select3(
@@ -26,27 +35,36 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Telemetr
             frames.next_message_pure(),
             shared.announced[0].receive(),
         );
-        match votes.waiting(Voter::Telemetry, next).await {
-            Either3::First(cycle) => write(&shared.clock, &mut line, &cycle.packet).await,
-            Either3::Second(frame) if shared.is_wanted(&frame) => {
-                write(&shared.clock, &mut line, &derived::encode(&frame)).await;
-            }
+        match votes.waiting(out.voter, next).await {
+            Either3::First(cycle) => out.write(&cycle.packet).await,
+            Either3::Second(frame) if shared.is_wanted(&frame) => out.write(&derived::encode(&frame)).await,
             Either3::Second(_) => {}
-            Either3::Third(text) => say(&shared.clock, &mut line, &text).await,
+            Either3::Third(text) => out.say(&text).await,
         }
     }
 }
 
-/// A line for whoever reads text.
-pub(super) async fn say(clock: &Clock, line: &mut impl Write, text: &Line) {
-    write(clock, line, b">").await;
-    write(clock, line, text.as_bytes()).await;
-    write(clock, line, b"\r\n").await;
+/// A line out, and the part that writes to it: it votes while it writes, for a slow line takes as long as its packets do.
+pub(super) struct Out<'a, W> {
+    pub line: W,
+    pub clock: &'a Clock,
+    pub votes: &'a Votes,
+    pub voter: Voter,
 }
 
-/// One whole frame or, when the line is stuck, its loss.
-pub(super) async fn write(clock: &Clock, line: &mut impl Write, bytes: &[u8]) {
-    let _ = clock
-        .within(Duration::from_millis(WRITE_MS), line.write_all(bytes))
-        .await;
+impl<W: Write> Out<'_, W> {
+    /// A line for whoever reads text.
+    pub async fn say(&mut self, text: &Line) {
+        self.write(b">").await;
+        self.write(text.as_bytes()).await;
+        self.write(b"\r\n").await;
+    }
+
+    /// One whole frame, or its loss on a line that takes longer than the slowest there may be: it is stuck.
+    pub async fn write(&mut self, bytes: &[u8]) {
+        let line_ms = (bytes.len() as u64).saturating_mul(BITS_PER_BYTE * 1000) / SLOWEST_BAUD;
+        let limit = Duration::from_millis(line_ms.saturating_add(SPARE_MS));
+        let written = self.clock.within(limit, self.line.write_all(bytes));
+        let _ = self.votes.waiting(self.voter, written).await;
+    }
 }

@@ -9,7 +9,7 @@ use super::{
     calibration,
     clock::{never, now},
     shared::Shared,
-    telemetry::{say, write},
+    telemetry::Out,
     vote::{Voter, Votes},
 };
 use crate::{
@@ -23,9 +23,15 @@ use crate::{
 };
 
 /// Sends for ever.
-pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalTx) {
+pub async fn send<B: Board>(shared: &Shared, votes: &Votes, line: B::UmbilicalTx) {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         never().await
+    };
+    let mut out = Out {
+        line,
+        clock: &shared.clock,
+        votes,
+        voter: Voter::UmbilicalSend,
     };
     if let Some(crash) = &shared.start.crash {
         shared.say(format_args!(
@@ -54,25 +60,25 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbilic
             frames.next_message_pure(),
         );
         let next = select(shared.announced[1].receive(), next);
-        let next = match votes.waiting(Voter::UmbilicalSend, next).await {
+        let next = match votes.waiting(out.voter, next).await {
             Either::First(text) => {
-                say(&shared.clock, &mut line, &text).await;
+                out.say(&text).await;
                 continue;
             }
             Either::Second(next) => next,
         };
         let sending = shared.state.get().task == Task::SendPackets;
         match next {
-            Either4::First(reply) => say(&shared.clock, &mut line, &reply).await,
+            Either4::First(reply) => out.say(&reply).await,
             Either4::Second((page, record)) => {
                 if let Some(packet) = record::packet(&record) {
-                    write(&shared.clock, &mut line, packet).await;
+                    out.write(packet).await;
                 }
-                write(&shared.clock, &mut line, &dump::encode(page, &record)).await;
+                out.write(&dump::encode(page, &record)).await;
             }
-            Either4::Third(cycle) if sending => write(&shared.clock, &mut line, &cycle.packet).await,
+            Either4::Third(cycle) if sending => out.write(&cycle.packet).await,
             Either4::Fourth(frame) if sending && shared.is_wanted(&frame) => {
-                write(&shared.clock, &mut line, &derived::encode(&frame)).await
+                out.write(&derived::encode(&frame)).await;
             }
             _ => {}
         }
@@ -88,6 +94,8 @@ pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::Umbil
         let heard = match votes.waiting(Voter::UmbilicalListen, line.read(&mut bytes)).await {
             Ok(count) => bytes.get(..count).unwrap_or_default(),
             Err(_) => {
+                // What follows a damaged byte does not go on the word before it.
+                parser.forget();
                 lost = lost.saturating_add(1);
                 &[]
             }
@@ -135,6 +143,9 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
     {
         return shared.say(format_args!("G_CL no: {why}"));
     }
+    if verdict == Verdict::Confirm(Command::ConfirmErase) {
+        shared.note(Cause::EraseArmed);
+    }
     match verdict {
         Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
         Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
@@ -146,6 +157,7 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         }
         Verdict::Done(Action::Erase) => {
             shared.erase_ordered.set(true);
+            shared.note(Cause::Erased);
             shared.say(format_args!("{word} ok: erasing {} pages", shared.recorder.get().used));
         }
         Verdict::Done(Action::SelfTest) => {
@@ -237,12 +249,13 @@ fn status(shared: &Shared) {
     }
     let stack = (shared.start.stack_use)();
     shared.say(format_args!(
-        "G_ST clock {} stack {} of {} bytes brown-out {} mV of {}",
+        "G_ST clock {} stack {} of {} bytes brown-out {} mV of {} image {:08X}",
         shared.start.oscillator.name(),
         stack.used,
         stack.size,
         shared.start.brown_out.set_mv,
-        shared.start.brown_out.asked_mv
+        shared.start.brown_out.asked_mv,
+        shared.image.get().unwrap_or_default()
     ));
 }
 

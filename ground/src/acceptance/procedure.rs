@@ -111,7 +111,7 @@ const STEPS: &[Step] = &[
     Step::Word("G_ST", "G_ST clock", 8.0),
     Step::Word("G_VE", "G_VE", 8.0),
     Step::Word("G_DL", "G_DL", 8.0),
-    Step::Word("G_MT", "G_MT", 8.0),
+    Step::Word("G_MTG_MT", "G_MT ok", 8.0),
     Step::Settle(0),
     Step::Word("G_AT", "G_AT done", SELF_TEST_S),
     Step::Wait(SETTLES_S),
@@ -380,7 +380,7 @@ impl Procedure {
             }
             Step::Flight => {
                 if self.evidence.lift_off_seen == Some(false) {
-                    asks.push(Ask::Say("G_MVG_MVG_MG\r\n".into()));
+                    asks.push(Ask::Say("G_MVG_MVG_MGG_MG\r\n".into()));
                 }
                 true
             }

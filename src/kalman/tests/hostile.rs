@@ -167,3 +167,72 @@ fn the_covariance_stays_positive_for_a_day_at_rest() {
     assert!((world.filter.q_nb.norm() - 1.0).abs() < 1e-6);
     world.off_by_less_than(0.05);
 }
+
+/// N3: an attitude of which nothing is known (10 rad2) and measurements that claim to be exact (1e-8): floors hold, and what
+/// comes out is right.
+#[test]
+fn a_huge_covariance_and_tiny_noise_leave_it_finite_definite_and_right() {
+    let exact = Params {
+        velocity_sd: 1e-4,
+        velocity_rest_sd: 1e-4,
+        velocity_lasts_s: 0.0,
+        acc_error: 1e-4,
+        heading_sd: 1e-4,
+        dip_sd: 1e-4,
+        field_lasts_s: 0.0,
+        ..params()
+    };
+    for wrong_rad in [0.0, 0.3, 3.0] {
+        let mut world = World::new(tilted(), exact);
+        let wrong = from_rotation_vector(Vector3::new(0.6, -0.5, 0.6) * wrong_rad);
+        world.filter = Filter::resumed(exact, wrong * world.q_nb, Matrix3::from_diagonal_element(10.0));
+        assert!(world.filter.covariance().worst() >= 10.0);
+        for _ in 0..60 {
+            world.fly(1.0, Vector3::new(0.05, 0.1, 0.0), |_, step| {
+                step.acc.as_mut().unwrap().variance = 1e-8;
+                step.mag.as_mut().unwrap().variance = 1e-8;
+            });
+            // As a matrix of correlations, so that radians and metres a second compare: rounding is 1e-7 of one.
+            let p = world.filter.covariance().matrix();
+            let scaled = p.map_with_location(|row, column, value| value / (p[(row, row)] * p[(column, column)]).sqrt());
+            let least = scaled.symmetric_eigenvalues().min();
+            assert!(least > -1e-5, "{wrong_rad}: {least}");
+        }
+        world.off_by_less_than(0.5);
+    }
+}
+
+/// U9: a flipped bit of what is estimated. It goes on within the gates, or begins anew, and is right again either way.
+#[test]
+fn a_flipped_bit_of_the_state_is_recovered_from() {
+    let rate_b = Vector3::new(0.1, 0.0, 0.05);
+    let mut anew = 0;
+    for place in 0..12 {
+        for bit in 0..32 {
+            let mut world = World::new(tilted(), params());
+            world.fly(5.0, rate_b, nothing);
+            let filter = &mut world.filter;
+            let mut q_nb = *filter.q_nb.quaternion();
+            let number = match place {
+                0..4 => &mut q_nb.coords[place],
+                4..7 => &mut filter.bias_b[place - 4],
+                7..10 => &mut filter.gyro_matrix[place - 7],
+                _ => &mut filter.velocity_n[place - 10],
+            };
+            *number = f32::from_bits(number.to_bits() ^ 1 << bit);
+            filter.q_nb = UnitQuaternion::new_unchecked(q_nb);
+            let found = world.filter.clone();
+            for second in 0..90 {
+                if !world.filter.aligned {
+                    anew += 1;
+                }
+                let _ = second;
+                world.go_on(1.0, rate_b);
+            }
+            let q = world.filter.q_nb;
+            assert!((q.norm() - 1.0).abs() < 1e-3, "{place} {bit}: {q}, {:?}", found.q_nb);
+            world.off_by_less_than(5.0);
+        }
+    }
+    assert!(anew > 0, "some flips are beyond what can be put right");
+}

@@ -8,7 +8,7 @@ use super::{
     bus::{Gyro, SensorBus},
     lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
     nand::NandPins,
-    plight::Plight,
+    plight::{self, Plight},
 };
 use crate::{plant::Plant, run::End};
 
@@ -63,5 +63,6 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
             asked_mv: 2700,
         },
         stack_use: StackUse::default,
+        read_image: plight::read_image,
     }
 }

@@ -16,7 +16,7 @@ pub const WAKE: Nanos = 8_000;
 /// \[ns\] the firmware's work around one I2C transaction, besides the wake at its end.
 pub const I2C_OVERHEAD: Nanos = 2_100;
 /// \[ns\] what a transaction that reads takes more of it.
-pub const I2C_READ: Nanos = 6_500;
+pub const I2C_READ: Nanos = 6_900;
 /// \[ns\] its work at each change of direction inside one.
 pub const I2C_TURN: Nanos = 12_900;
 /// \[ns\] a 16-bit word on the gyro bus at 84 MHz / 64.
