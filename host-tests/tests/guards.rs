@@ -240,12 +240,12 @@ fn s8_a_gyro_that_answers_at_random_adds_no_word_to_its_increments() {
             gyros[2].count >= 10 && gyros[2..].iter().all(|gyro| gyro.count <= 16),
             "{gyros:?}"
         );
-        // 60 deg/s are 820 counts; random words reach 8191.
+        // The tumble stays below 180 deg/s, 2457 counts; random words reach 8191.
         let most = gyros
             .iter()
             .filter(|gyro| gyro.count > 0)
             .map(|gyro| gyro.least.abs().max(gyro.most.abs()));
-        assert!(most.max() < Some(1200), "{gyros:?}");
+        assert!(most.max() < Some(2457), "{gyros:?}");
     }
 }
 
@@ -275,19 +275,13 @@ fn c4_a_damaged_byte_ends_the_word_that_it_is_in() {
 /// U10: another pass over the image that gives another checksum.
 #[test]
 fn u10_a_bit_of_the_image_that_flips_is_said_and_in_the_status() {
-    let image = |flown: &Flown, from: usize| -> Vec<String> {
-        let lines = flown.replies();
-        let told = lines
-            .iter()
-            .filter_map(|line| Some(line.rsplit_once(" image ")?.1.to_string()));
-        told.skip(from).collect()
-    };
+    let told = |line: String| Some(line.strip_prefix("G_ST")?.rsplit_once(" image ")?.1.to_string());
     let flown = still()
         .say(4 * S, b"G_ST")
         .fault(5 * S, Fault::ImageFlip(77))
         .say(8 * S, b"G_ST")
         .fly(9 * S);
-    let said = image(&flown, 0);
+    let said: Vec<String> = flown.replies().into_iter().filter_map(told).collect();
     assert!(said.len() == 2 && said[0] != said[1], "{said:?}");
     let line = format!("firmware image CHANGED: checksum {}, was {}", said[1], said[0]);
     assert_eq!(

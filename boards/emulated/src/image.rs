@@ -190,8 +190,14 @@ impl Image {
         let bytes = self.placed.bytes();
         let missing = |name: &str| ImageError::NoSymbol(self.path.clone(), name.into());
         let from = function(bytes, part).ok_or_else(|| missing(part))?;
-        let to = thumb::call_with_literal(bytes, OVERFLOW).ok_or_else(|| missing(OVERFLOW))?;
+        let to = thumb::call_with_place(bytes, OVERFLOW).ok_or_else(|| missing(OVERFLOW))?;
         self.with_code(part, thumb::branch(from, to))
+    }
+
+    /// Where an exception leads, by its number (ARMv7-M ARM, B1.5.3).
+    pub fn vector(&self, exception: usize) -> Option<u32> {
+        let vectors = flash(self.placed.bytes())?;
+        Some(u32::from_le_bytes(*vectors.get(4 * exception..)?.first_chunk()?))
     }
 
     /// The checksum of what the flash holds of it.

@@ -155,18 +155,11 @@ impl Wired {
         errors.noise.per_million = if disturbed { Rate::EVERY_WORD } else { 0 };
     }
 
-    /// Takes the high-speed crystal off the board.
+    /// Takes the high-speed crystal off the board. Whether a running firmware has it is seen at its next start: the model's clock does
+    /// not follow, and the NMI of the clock security system (RM0090 section 7.2.7) cannot be raised in it.
     pub fn remove_crystal(&mut self) {
         self.part.part.rcc.attach_crystals(0, 0);
         self.crystal = false;
-    }
-
-    /// The crystal stops; whether the clock security system raises the NMI for it (RM0090 section 7.2.7). The model's clock
-    /// does not follow: until the reset that the NMI ends in, instructions go on at 168 MHz instead of 16.
-    pub fn lose_crystal(&mut self) -> bool {
-        self.remove_crystal();
-        let registers = self.part.bus_mut().slot_mut(self.slots.rcc).registers_mut();
-        cr::CSSON.is_set(registers.get(Register::Cr))
     }
 
     /// DMA1 stands still in mid-transfer until the next reset.

@@ -1,15 +1,20 @@
 //! As much of the Thumb instructions as it takes to make an image go wrong on purpose.
 //!
-//! In: an ELF file. Out: where it calls a function, and the branch that leads there (ARMv7-M ARM, A7.7.12 and A7.7.18).
+//! In: an ELF file. Out: where it calls a function with an address, and the branch that leads there (ARMv7-M ARM, A7.7.12 and A7.7.18).
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
-/// `LDR r0, [pc, #imm]`, upper byte: the first argument is an address among the literals.
-const LOADS_R0: u16 = 0x48;
+/// `MOVW` and `MOVT` of r0, which make the first argument (A7.7.76 and A7.7.79): first halves without the immediate.
+const MOVES: [u16; 2] = [0xF240, 0xF2C0];
 
-/// The address of an instruction that loads a literal into r0, after which the function whose mangled name contains `callee` is
-/// called.
-pub fn call_with_literal(elf: &[u8], callee: &str) -> Option<u64> {
+/// Whether these halves move an immediate into r0 so.
+fn moves(kind: u16, [first, second]: [u16; 2]) -> bool {
+    first & 0xFBF0 == kind && second & 0x8F00 == 0
+}
+
+/// The address of the two instructions that put an address into r0, after which the function whose mangled name contains `callee`
+/// is called.
+pub fn call_with_place(elf: &[u8], callee: &str) -> Option<u64> {
     let file = object::File::parse(elf).ok()?;
     let named = file
         .symbols()
@@ -22,10 +27,11 @@ pub fn call_with_literal(elf: &[u8], callee: &str) -> Option<u64> {
             .chunks_exact(2)
             .map(|half| u16::from_le_bytes([half[0], half[1]]))
             .collect();
-        for (at, window) in halves.windows(3).enumerate() {
+        for (at, window) in halves.windows(6).enumerate() {
             let address = section.address() + 2 * at as u64;
-            let calls = call(address + 2, [window[1], window[2]]).is_some_and(|to| callees.contains(&to));
-            if window[0] >> 8 == LOADS_R0 && calls {
+            let is_made = moves(MOVES[0], [window[0], window[1]]) && moves(MOVES[1], [window[2], window[3]]);
+            let calls = call(address + 8, [window[4], window[5]]).is_some_and(|to| callees.contains(&to));
+            if is_made && calls {
                 return Some(address);
             }
         }

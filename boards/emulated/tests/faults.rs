@@ -183,3 +183,25 @@ fn a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most() {
     let last = *errors.last().expect("packets");
     assert!(last & 1 << 5 != 0 && last & !plate == 0, "{errors:x?}");
 }
+
+#[test]
+fn a_controller_that_sends_no_start_is_reset() {
+    let begun_us = cycle_us();
+    for into_cycle_us in [1_100, 3_700] {
+        let mut tape = Tape {
+            script: vec![(MS, b"G_DL".to_vec())],
+            ..Tape::default()
+        };
+        let misplaced = at_us(begun_us + into_cycle_us, Fault::StopMisplaced);
+        let report = flown(&Options::default(), &[misplaced], 1_900, &mut tape);
+        assert_eq!(report.struck.get("stop-misplaced"), Some(&1), "{:?}", report.struck);
+        assert_eq!(report.resets, []);
+        let mut frames = tape.derived().into_iter();
+        assert!(
+            frames.any(|frame| frame.health.contains(Health::BUS_RECOVERED)),
+            "{into_cycle_us} us"
+        );
+        let errors = errors(&tape);
+        assert_eq!(errors.last(), Some(&0), "{into_cycle_us} us: {errors:x?}");
+    }
+}

@@ -4,7 +4,7 @@
 mod bench;
 
 use bench::{MS, Tape, flown, image, world};
-use emems::{derived::Health, sample::Reading, unit::Settings};
+use emems::{board::ResetCause, derived::Health, sample::Reading, unit::Settings};
 use emulated::{Covers, Error, Options, fly_with};
 use twin::{
     host,
@@ -233,7 +233,7 @@ fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
     ];
     let mut tape = Tape {
         script: vec![
-            (500 * MS, b"G_DLG_MTG_HE".to_vec()),
+            (500 * MS, b"G_DLG_MTG_MTG_HE".to_vec()),
             (2_100 * MS, b"G_AT".to_vec()),
             (7_500 * MS, b"G_ST".to_vec()),
         ],
@@ -254,4 +254,109 @@ fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
             .iter()
             .all(|frame| !frame.health.contains(Health::INTERNAL_OSCILLATOR))
     );
+}
+
+/// Exceptions (ARMv7-M ARM, B1.5.2), and `svc #0` twice.
+const NMI: usize = 2;
+const SVCALL: usize = 11;
+const SUPERVISOR_CALL: u32 = 0xDF00_DF00;
+
+/// U6: the clock security system's NMI ends in a reset, and the internal oscillator takes over. The emulator cannot raise the NMI. The
+/// exception of a supervisor call leads to the same handler, so a function of the estimation makes one; it is run some 1.2 s after a start.
+#[test]
+fn a_crystal_that_stops_in_flight_costs_a_reset_and_flight_goes_on() {
+    assert_eq!(image().vector(NMI), image().vector(SVCALL), "one handler");
+    let calling = image()
+        .with_code("kalman6Filter11keep_finite", SUPERVISOR_CALL)
+        .expect("the function is there");
+    let mut tape = Tape {
+        script: vec![(600 * MS, b"G_DLG_MVG_MV".to_vec()), (2_100 * MS, b"G_ST".to_vec())],
+        ..Tape::default()
+    };
+    let fault = Scheduled {
+        at: 900 * MS,
+        fault: Fault::CrystalLost,
+    };
+    let plant = Plant::ideal(world("still"));
+    let report = fly_with(&Options::default(), &calling, plant, &[fault], 2_300 * MS, &mut tape).expect("it flies");
+    assert_eq!(report.struck.get("crystal-lost"), Some(&1));
+    let Some((at, ResetCause::Software)) = report.resets.first().copied() else {
+        panic!("{:?}", report.resets)
+    };
+    assert!(at > 900 * MS);
+    for told in ["UnhandledException at", "G_ST FLIGHT", "G_ST clock internal"] {
+        assert!(tape.said().contains(told), "{told} in {}", tape.said());
+    }
+    let after = tape
+        .packets()
+        .into_iter()
+        .find(|(sent, _)| *sent > at)
+        .expect("packets");
+    assert!(after.0 - at < 500 * MS, "{} ns", after.0 - at);
+    let health = tape.derived().last().expect("derived frames").health;
+    assert!(health.contains(Health::INTERNAL_OSCILLATOR), "{health:?}");
+}
+
+/// U10: what `ground size` prints of the file is what the unit finds in its flash, and another image has another one.
+#[test]
+fn the_status_has_the_checksum_of_the_image_and_another_one_for_another() {
+    // 240 KiB at 4 KiB every 200 ms.
+    let mut tape = Tape {
+        script: vec![(13_500 * MS, b"G_ST".to_vec())],
+        ..Tape::default()
+    };
+    flown(&Options::default(), &[], 13_700, &mut tape);
+    let checksum = image().checksum().expect("an ELF file");
+    assert!(
+        tape.said().contains(&format!(" image {checksum:08X}")),
+        "{checksum:08X} in {}",
+        tape.said()
+    );
+    let other = image()
+        .with_code("kalman6Filter11keep_finite", 0)
+        .expect("the function is there");
+    assert_ne!(other.checksum(), Some(checksum));
+}
+
+/// C4: every byte with noise, then a wire that is held low: errors as fast as the line carries them. The first word after each
+/// is heard.
+#[test]
+fn noise_and_a_break_on_the_umbilical_cost_the_words_in_them_and_nothing_else() {
+    let noise = |at, on| Scheduled {
+        at,
+        fault: Fault::UmbilicalNoise(on),
+    };
+    let held = |at, on| Scheduled {
+        at,
+        fault: Fault::UmbilicalBreak(on),
+    };
+    let faults = [
+        noise(500 * MS, true),
+        noise(900 * MS, false),
+        held(1_200 * MS, true),
+        held(2_200 * MS, false),
+    ];
+    let mut tape = Tape {
+        script: vec![
+            (600 * MS, b"G_VEG_HE".to_vec()),
+            (901 * MS, b"G_MTG_MT".to_vec()),
+            (1_500 * MS, b"G_VEG_HE".to_vec()),
+            (2_201 * MS, b"G_MtG_Mt".to_vec()),
+            (2_300 * MS, b"G_ST".to_vec()),
+        ],
+        ..Tape::default()
+    };
+    let report = flown(&Options::default(), &faults, 2_600, &mut tape);
+    assert_eq!(report.resets, []);
+    assert_eq!(report.struck.get("umbilical-noise"), Some(&8), "{:?}", report.struck);
+    // A frame takes 86.9 us.
+    assert!(report.struck["umbilical-break"] > 11_000, "{:?}", report.struck);
+    let said = tape.said();
+    assert!(said.contains("G_MT ok") && said.contains("G_Mt ok"), "{said}");
+    assert!(!said.contains("G_VE"), "{said}");
+    let packets = tape.packets();
+    for pair in packets.windows(2) {
+        let period = pair[1].0 - pair[0].0;
+        assert!(period.abs_diff(PERIOD) <= 2 * MS, "{period} ns");
+    }
 }

@@ -51,7 +51,7 @@ fn logged(chip: &K9f1208) -> BTreeMap<Key, Entry> {
 /// A flight that records from 0.6 s on.
 fn flown(faults: &[Scheduled], ends: Nanos) -> (Tape, K9f1208) {
     let mut tape = Tape {
-        script: vec![(600 * MS, b"G_MVG_MVG_MG".to_vec())],
+        script: vec![(600 * MS, b"G_MVG_MVG_MGG_MG".to_vec())],
         ..Tape::default()
     };
     let plant = Plant::ideal(world("still"));
@@ -106,6 +106,29 @@ fn a_failing_supply_begins_no_operation() {
     let late = |at: &&Nanos| **at > returns + 2_200 * MS;
     let missing = missing(&tape, &logged(&after));
     assert_eq!(missing.iter().filter(late).count(), 0, "{missing:?} {}", tape.said());
+}
+
+/// F20: the supply is gone for 20 ms at some instants of a cycle. The record that it stopped is taken after it.
+#[test]
+fn a_dip_of_20_ms_costs_no_record() {
+    let mut stopped = 0;
+    for after_ms in [0, 20, 60, 105, 150] {
+        let fails = (2_000 + after_ms) * MS;
+        let at = |at, failing| Scheduled {
+            at,
+            fault: Fault::SupplyFailing(failing),
+        };
+        let faults = [at(fails, true), at(fails + 20 * MS, false)];
+        let (tape, chip) = flown(&faults, fails + 1_500 * MS);
+        stopped += u64::from(tape.said().contains("recorder: the supply is failing"));
+        let missing = missing(&tape, &logged(&chip));
+        // The last packet may not have its record yet.
+        assert!(
+            missing.iter().all(|at| *at > fails + 1_400 * MS),
+            "{after_ms} ms: {missing:?}"
+        );
+    }
+    assert!(stopped > 0, "no dip met a record");
 }
 
 /// Fault F20: the voltage detector's interrupt draws WP# at once, whatever is under way.

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use emems::{
     command::{COMMANDS, Heard, Parser},
+    derived::Health,
     mode::{Action, State, Verdict as Deed},
 };
 use host_tests::{
@@ -11,7 +12,10 @@ use host_tests::{
     recorder::{Flown, Tally, campaign, draws},
     world,
 };
-use twin::part::nand::{Cells, TEARS, Tear, Wear};
+use twin::{
+    part::nand::{Cells, TEARS, Tear, Wear},
+    run::Fault,
+};
 
 use crate::judge;
 
@@ -137,11 +141,45 @@ pub fn random_bytes(seed: u64, long: bool) -> Told {
     }
 }
 
+/// S5: a bus that is stuck when the unit starts, then a part that holds SDA or a controller that sends no START in every cycle, at
+/// any instant of it.
+pub fn bus_events(seed: u64, long: bool) -> Told {
+    let events = runs(long, 2_000, 100_000);
+    let mut draw = draws(seed, 0);
+    let mut flight = Flight::ideal(world("still"))
+        .fault(0, Fault::BusStuck(true))
+        .fault(2 * S, Fault::BusStuck(false))
+        .say(1, b"G_DL");
+    for event in 0..events {
+        // Cycles begin 150 ms into the second and every 200 ms, and take 7 ms.
+        let at = (3_150 + 200 * event) * MS + draw(7_000_000);
+        let fault = match draw(2) {
+            0 => Fault::SdaHeld(1 + draw(9) as u8),
+            _ => Fault::StopMisplaced,
+        };
+        flight = flight.fault(at, fault);
+    }
+    let flown = flight.fly((4_000 + 200 * events) * MS);
+    let freed = flown
+        .derived
+        .iter()
+        .filter(|frame| frame.health.contains(Health::BUS_RECOVERED));
+    let freed = freed.count() as u64;
+    let did = judge::gyros_go_on_and_all_come_back(&flown).and_then(|said| {
+        let said = format!("{said}; of {events} events {freed} made the unit free the bus");
+        let met = freed * 10 >= events * 9 && flown.report.struck.get("stop-misplaced") >= Some(&(events / 3));
+        if met { Ok(said) } else { Err(said) }
+    });
+    Told { struck: freed, did }
+}
+
 /// C5: words at the line's rate without a pause, while packets are recorded.
 pub fn flood(seed: u64, long: bool) -> Told {
     let seconds = runs(long, 60, 3_600);
     let mut draw = draws(seed, 0);
-    let mut flight = Flight::ideal(world("still")).say(S, b"G_MVG_MV").say(2 * S, b"G_MG");
+    let mut flight = Flight::ideal(world("still"))
+        .say(S, b"G_MVG_MV")
+        .say(2 * S, b"G_MGG_MG");
     let mut sent = 0;
     // 11.5 bytes a millisecond are asked for every 20 ms: 230 bytes, 57 words. None that ends FLIGHT.
     let harmless = COMMANDS

@@ -6,6 +6,7 @@ use twin::fault::{Struck, WORDS};
 
 use crate::{
     catalogue::{CATALOGUE, Drill, Fly, Row},
+    endurance,
     flight::{Board, OnImage, fly, planned},
     guards::{self, GuardError},
     table::{Line, write},
@@ -30,7 +31,7 @@ pub struct Arguments {
     /// What is drawn follows from this number
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Ten seeds of each flight and the campaigns at full length: hours
+    /// Ten seeds of each flight, the campaigns at full length, and a day with faults at random: hours
     #[arg(long)]
     pub long: bool,
     /// Fly the release image on the emulated board, where it can make the fault
@@ -70,6 +71,9 @@ pub enum DrillError {
     },
 }
 
+/// \[s\] of the flight with faults at random with `--long`.
+const DAY_S: u64 = 86_400;
+
 /// Seeds of each flight with `--long`.
 const LONG_SEEDS: u64 = 10;
 
@@ -104,13 +108,23 @@ pub fn run(
         lines.push(line);
     }
     let count = |begin: &str| lines.iter().filter(|line| line.verdict.starts_with(begin)).count();
+    let refused = count("not accepted");
     println!(
-        "{} rows: {} accepted, {} by test, {} not accepted",
+        "{} rows: {} accepted ({} by a drill, {} by the tests they name), {refused} not accepted",
         lines.len(),
+        lines.len() - refused,
         count("accepted"),
         count("by test"),
-        count("not accepted")
     );
+    if arguments.long && arguments.rows.is_empty() {
+        let told = endurance::fly(arguments.seed, DAY_S);
+        let (Ok(did) | Err(did)) = &told.did;
+        let verdict = if told.did.is_ok() { "accepted" } else { "not accepted" };
+        println!(
+            "a day with faults at random  [{verdict}]\n     struck {}; {did}",
+            told.struck
+        );
+    }
     if let Some(path) = &arguments.write {
         write(path, &lines).map_err(|why| DrillError::Table {
             path: path.display().to_string(),

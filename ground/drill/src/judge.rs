@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use emems::{
     board::ResetCause,
-    derived::Health,
+    derived::{Derived, Health},
     packet,
     sample::{NOT_READ, Reading},
 };
@@ -160,6 +160,29 @@ pub fn gyros_go_on_and_all_come_back(flown: &Flown) -> Verdict {
     let said = gyros_go_on(flown)?;
     well_at_the_end(flown)?;
     Ok(said)
+}
+
+/// S13: while two plates answer for each other, no packet is late, and the health of the sensors says that they disagree; afterwards
+/// all are believed again.
+pub fn disagreement_is_said(flown: &Flown) -> Verdict {
+    let said = steady(flown)?;
+    let frames = |from_s: u64, to_s: u64| {
+        let within = move |frame: &&Derived| (from_s * 1_000_000..to_s * 1_000_000).contains(&frame.start_us);
+        flown.derived.iter().filter(within)
+    };
+    let told = |frame: &&Derived| frame.estimate.sensors.0 != 0;
+    let (all, doubted) = (frames(25, 40).count(), frames(25, 40).filter(told).count());
+    unless(doubted < all, || {
+        format!("{doubted} of {all} frames say that the sensors disagree")
+    })?;
+    let late = frames(70, 75).filter(told).count();
+    unless(late > 0, || {
+        format!("{late} frames still doubt the sensors half a minute later")
+    })?;
+    well_at_the_end(flown)?;
+    Ok(format!(
+        "{said}; {doubted} of {all} frames say that the sensors disagree"
+    ))
 }
 
 /// S12: the restart was found and the settings are back.
@@ -363,6 +386,57 @@ pub fn frames_are_whole(flown: &Flown) -> Verdict {
     let slow = flown.packets.iter().filter(|(at, _)| *at > 4 * S).count();
     unless(slow < 10, || format!("{slow} packets while the line was slow"))?;
     Ok(format!("{slow} packets, each whole"))
+}
+
+/// C4: while the line is disturbed no word is heard, the first one after it is, and packets do not notice.
+pub fn heard_again(flown: &Flown) -> Verdict {
+    let said = steady_and_well(flown)?;
+    let lines = flown.replies();
+    let answers = lines.iter().filter(|line| line.starts_with("G_VE: ")).count();
+    unless(answers != 1, || {
+        format!("{answers} of the words were answered, not the last one only")
+    })?;
+    let noise = lines
+        .iter()
+        .rev()
+        .find_map(|line| line.split_once(" noise ")?.1.split(' ').next()?.parse::<u32>().ok());
+    let noise = noise.ok_or("the status does not count what was damaged")?;
+    unless(noise < 8, || format!("{noise} bytes counted"))?;
+    Ok(format!(
+        "{said}; {noise} damaged bytes counted, the first word after them answered"
+    ))
+}
+
+/// U5: the fourth start without a minute of health reads, sends and records and estimates nothing; a word leads out of it.
+pub fn safe_mode_and_out_of_it(flown: &Flown) -> Verdict {
+    unless(!flown.replied("SAFE MODE: start"), || "no safe mode".into())?;
+    let whole = flight_goes_on_and_the_log_is_whole(flown)?;
+    let is_safe = |frame: &&Derived| frame.health.contains(Health::SAFE_MODE);
+    let safe: Vec<&Derived> = flown.derived.iter().filter(is_safe).collect();
+    unless(
+        safe.len() < 20 || safe.iter().any(|frame| frame.estimate.q_nb.is_some()),
+        || format!("{} frames of safe mode, or some with an attitude", safe.len()),
+    )?;
+    unless(!flown.replied("G_XN ok: safe mode left"), || {
+        "G_XN does not lead out of it".into()
+    })?;
+    let last = flown.derived.last().ok_or("no derived frames")?;
+    unless(is_safe(&last) || last.estimate.q_nb.is_none(), || {
+        "no attitude after it".into()
+    })?;
+    well_at_the_end(flown)?;
+    Ok(format!(
+        "{whole}; {} frames in safe mode, then the attitude again",
+        safe.len()
+    ))
+}
+
+/// U10: it is said, and the unit goes on.
+pub fn says_that_the_image_changed(flown: &Flown) -> Verdict {
+    let lines = flown.replies();
+    let line = lines.iter().find(|line| line.starts_with("firmware image CHANGED"));
+    let line = line.ok_or("nobody noticed")?;
+    Ok(format!("{}; {line}", steady_and_well(flown)?))
 }
 
 /// U7, U8: no panic, counters go on, and all is well at the end.

@@ -16,6 +16,8 @@
 //! A drill whose fault never struck is not accepted, whatever the unit did. A row may be open: its drills and tests pass, but the
 //! catalogue asks for more than the unit does. It is `not accepted`, with the reason.
 //!
+//! `--long` flies more runs of each row, and then a day in which faults arrive at random ([`endurance`]).
+//!
 //! `--guards` asks the opposite of the tests: does each fail without its guard ([`guards`])?
 //!
 //! A failing run is replayed by its row and seed: `ground drill F8 --seed 123`.
@@ -23,6 +25,7 @@
 pub mod campaign;
 pub mod catalogue;
 pub mod command;
+pub mod endurance;
 mod flight;
 pub mod guards;
 pub mod judge;

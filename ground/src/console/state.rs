@@ -68,7 +68,7 @@ fn flag(asserted: bool) -> Span<'static> {
 /// The packets in one line.
 pub fn packet_line(model: &Model) -> Line<'static> {
     let Some(reading) = model.reading else {
-        return Line::from(" no packet yet: G_MT asks for them in WAIT").yellow();
+        return Line::from(" no packet yet: G_MT, sent twice, asks for them in WAIT").yellow();
     };
     let rate = match model.history.rate_hz() {
         _ if !model.receiving() => " stopped".yellow(),

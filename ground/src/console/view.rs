@@ -325,7 +325,7 @@ mod tests {
     fn nothing_heard_yet_says_what_to_do() {
         let screen = screen(&Model::new("pad", "pad.log"), &View::default(), 80, 24);
         assert_eq!(screen[0], " pad  ...  mode ? (G_ST asks)  lift-off ?  micro-g ?");
-        assert_eq!(screen[1], " no packet yet: G_MT asks for them in WAIT");
+        assert_eq!(screen[1], " no packet yet: G_MT, sent twice, asks for them in WAIT");
         assert!(screen[4].starts_with("acc 1     --"));
     }
 
@@ -351,7 +351,7 @@ mod tests {
             typed.chars().for_each(|letter| view.input.push(letter));
             screen(&model(), &view, 80, 24)[23].clone()
         };
-        assert_eq!(hint("G_MT"), " G_MT WAIT: packets to the umbilical");
+        assert_eq!(hint("G_MT"), " G_MT WAIT: packets to the umbilical (send twice)");
         assert_eq!(hint("G_MA"), " G_MA WAIT: erase the recorder (then G_CA)");
         assert!(hint("G_M").starts_with(" G_MV  G_ME  G_MT  G_MA "));
         assert!(hint("hello").contains("no command"));

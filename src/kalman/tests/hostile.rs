@@ -221,16 +221,12 @@ fn a_flipped_bit_of_the_state_is_recovered_from() {
             };
             *number = f32::from_bits(number.to_bits() ^ 1 << bit);
             filter.q_nb = UnitQuaternion::new_unchecked(q_nb);
-            let found = world.filter.clone();
-            for second in 0..90 {
-                if !world.filter.aligned {
-                    anew += 1;
-                }
-                let _ = second;
+            for _ in 0..90 {
+                anew += u32::from(!world.filter.aligned);
                 world.go_on(1.0, rate_b);
             }
-            let q = world.filter.q_nb;
-            assert!((q.norm() - 1.0).abs() < 1e-3, "{place} {bit}: {q}, {:?}", found.q_nb);
+            let norm = world.filter.q_nb.norm();
+            assert!((norm - 1.0).abs() < 1e-3, "{place} {bit}: {norm}");
             world.off_by_less_than(5.0);
         }
     }

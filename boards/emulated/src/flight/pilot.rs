@@ -38,10 +38,6 @@ fn flip(host: &mut dyn Host, from: u64, bytes: u64, bit: u32) {
     }
 }
 
-/// The interrupt control and state register, and its bit that raises the NMI (ARMv7-M ARM, B3.2.4).
-const ICSR: u64 = 0xE000_ED04;
-const NMI_PENDING: u64 = 1 << 31;
-
 /// The interrupt of EXTI line 16, RM0090 table 62.
 const VOLTAGE_DETECTOR: InterruptLine = InterruptLine::new(1).expect("a line of the core");
 
@@ -98,9 +94,7 @@ impl Pilot {
                 }
                 Fault::CrystalLost => {
                     *self.struck.entry("crystal-lost").or_default() += 1;
-                    if session.board_mut().mcu.lose_crystal() {
-                        let _ = host.write(ICSR, Width::W32, NMI_PENDING);
-                    }
+                    session.board_mut().mcu.remove_crystal();
                 }
                 Fault::UmbilicalNoise(noise) => {
                     session.board_mut().mcu.disturb_umbilical(noise);

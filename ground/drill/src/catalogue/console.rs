@@ -11,9 +11,10 @@ pub(super) const ROWS: [Row; 15] = [
         &[
             "src/mode/tests.rs: no_one_bit_error_erases_or_changes_to_a_mode_that_was_not_sent",
             "src/mode/tests.rs: no_word_that_changes_the_state_at_once_is_one_bit_from_another",
-            "host-tests/tests/umbilical.rs: one_wrong_bit_in_a_word_costs_a_task_or_a_report_at_most",
+            "src/mode/tests.rs: recording_and_packets_take_their_word_twice_within_ten_seconds",
+            "host-tests/tests/umbilical.rs: one_wrong_bit_in_a_word_costs_a_report_at_most",
         ],
-        "G_MT and G_Mt, and G_ME and G_MG, differ by one bit: a task begins or ends, or recording begins in FLIGHT; no record is harmed",
+        "",
     ),
     row(
         "C2",
@@ -41,9 +42,18 @@ pub(super) const ROWS: [Row; 15] = [
     row(
         "C4",
         "framing and other errors of the line",
-        None,
-        &["boards/emulated/tests/image.rs: a_framing_error_on_every_byte_loses_the_command_and_nothing_else"],
-        "break, overrun and noise are not made on a board",
+        Flights(&[Fly {
+            plans: &["umbilical-noise@3s..13s", "umbilical-break@3s..13s"],
+            motion: "still",
+            said: &[(5_000, "G_VEG_VE"), (13_001, "G_VE"), (14_000, "G_ST")],
+            ms: 16_000,
+            judge: judge::heard_again,
+        }]),
+        &[
+            "boards/emulated/tests/image.rs: a_framing_error_on_every_byte_loses_the_command_and_nothing_else",
+            "host-tests/tests/guards.rs: c4_a_damaged_byte_ends_the_word_that_it_is_in",
+        ],
+        "",
     ),
     row(
         "C5",
@@ -70,8 +80,9 @@ pub(super) const ROWS: [Row; 15] = [
         &[
             "src/mode/tests.rs: an_erase_takes_a_second_different_word_and_no_lift_off",
             "host-tests/tests/console.rs: a_flight_is_recorded_dumped_and_erased",
+            "host-tests/tests/resets.rs: c7_arming_an_erase_and_erasing_are_in_the_log",
         ],
-        "arming and confirming are not logged",
+        "",
     ),
     row(
         "C8",
@@ -87,14 +98,19 @@ pub(super) const ROWS: [Row; 15] = [
             Fly {
                 plans: &["umbilical-stuck@3s..6s"],
                 motion: "still",
-                said: &[(2_500, "G_MT"), (4_000, "G_HE"), (8_000, "G_Mt"), (9_000, "G_VE")],
+                said: &[
+                    (2_500, "G_MTG_MT"),
+                    (4_000, "G_HE"),
+                    (8_000, "G_MtG_Mt"),
+                    (9_000, "G_VE"),
+                ],
                 ms: 12_000,
                 judge: judge::console_answers_again,
             },
             Fly {
                 plans: &["telemetry-stuck@4s..7s"],
                 motion: "still",
-                said: &[(1_000, "G_MVG_MV"), (2_000, "G_MG")],
+                said: &[(1_000, "G_MVG_MV"), (2_000, "G_MGG_MG")],
                 ms: 10_000,
                 judge: judge::recorder_has_what_the_line_lost,
             },
@@ -112,7 +128,10 @@ pub(super) const ROWS: [Row; 15] = [
             ms: 12_000,
             judge: judge::frames_are_whole,
         }]),
-        &[],
+        &[
+            "host-tests/tests/guards.rs: c10_on_a_slow_line_frames_are_whole_or_not_there",
+            "host-tests/tests/guards.rs: c10_a_line_that_is_stuck_with_derived_frames_on_does_not_let_the_watchdog_bite",
+        ],
         "",
     ),
     row(

@@ -1,0 +1,244 @@
+//! A long flight with faults that arrive at random: `ground drill --long`, after the catalogue.
+//!
+//! In: a seed, hours. Out: how many faults struck, and what the unit did. Faults of every kind that the host board can make come
+//! one after the other, 5 to 60 s apart, each for up to 20 s; every ten minutes the ground leads out of safe mode, and every two
+//! hours it reads nothing out, erases the log and begins to record anew.
+//!
+//! Accepted is a flight in which
+//!
+//! - no packet is missing but while a reset or a stuck telemetry line excuses it;
+//! - packets come every 200 ms, to 2 ms where nothing befalls the unit, so that time does not drift; and while something does,
+//!   no later than the deadline of a cycle allows;
+//! - at the end, a minute after the last fault, all sensors are read, there is an attitude, the console answers, the recorder
+//!   takes packets, and no queue holds anything back: a packet comes as soon after its cycle as at the beginning.
+//!
+//! What the unit has of memory is static and its stack is not the host's: the image's own test looks at that.
+
+use host_tests::{Flight, Flown, MS, S, recorder::draws, world};
+use twin::{
+    fault::{Planned, SENSOR_NAMES},
+    part::Nanos,
+    plant::Plant,
+};
+
+use crate::campaign::Told;
+
+/// \[s\] between what the ground does.
+const LEAVES_SAFE_MODE_S: u64 = 600;
+const BEGINS_ANEW_S: u64 = 7_200;
+/// \[s\] at the end without faults: what was excluded is believed again, and a start is healthy.
+const QUIET_S: u64 = 90;
+/// \[ns\] a packet after a reset: the watchdog's second, the gyros' start, two cycles.
+const BACK: Nanos = 2_500 * MS;
+/// \[ns\] beyond its period a packet may be while something befalls the unit: the deadline of a cycle that takes 10 ms otherwise.
+const LATE: Nanos = 185 * MS;
+
+/// Faults that befall a sensor, an I2C sensor, the unit for a while, and the unit once.
+const OF_SENSORS: [&str; 3] = ["silent", "garbage", "frozen"];
+const OF_I2C: [(&str, &str); 2] = [("nack", "=0"), ("stretch", "")];
+const LASTING: [&str; 12] = [
+    "mux-silent",
+    "bus-stuck",
+    "bridged:2",
+    "nand-dead",
+    "nand-flips",
+    "supply",
+    "lift-off:bouncing",
+    "micro-g:high",
+    "telemetry-stuck",
+    "umbilical-stuck",
+    "umbilical-noise",
+    "umbilical-break",
+];
+const AT_ONCE: [&str; 16] = [
+    "sda-held",
+    "stop-misplaced",
+    "power-cut",
+    "reset",
+    "panic",
+    "dma-hung",
+    "busy=3",
+    "kept-flip",
+    "image-flip",
+    "hang:sensors",
+    "hang:gyros",
+    "hang:telemetry",
+    "hang:umbilical-out",
+    "hang:umbilical-in",
+    "hang:lines",
+    "hang:nand",
+];
+/// Of those, what ends in a reset.
+const RESETS: [&str; 5] = ["power-cut", "reset", "panic", "dma-hung", "kept-flip"];
+
+/// A fault of the plan.
+struct Arriving {
+    planned: Planned,
+    /// In the words of a plan.
+    text: String,
+    /// \[ns\] from when to when it may be felt.
+    felt: (Nanos, Nanos),
+    excuses: bool,
+}
+
+fn arriving(seed: u64, until_s: u64) -> Vec<Arriving> {
+    let mut draw = draws(seed, 86);
+    let (mut plan, mut at_ms) = (Vec::new(), 10_000);
+    while at_ms < until_s * 1000 {
+        let lasts_ms = 500 + draw(19_500);
+        let sensor = |draw: &mut dyn FnMut(u64) -> u64| SENSOR_NAMES[draw(16) as usize];
+        let (text, is_lasting) = match draw(5) {
+            0 => (format!("{}:{}", OF_SENSORS[draw(3) as usize], sensor(&mut draw)), true),
+            1 => {
+                let part = ["a", "m", "t"][draw(3) as usize];
+                let (word, amount) = OF_I2C[draw(2) as usize];
+                (format!("{word}:{part}{}{amount}", 1 + draw(4)), true)
+            }
+            2 => (LASTING[draw(12) as usize].to_string(), true),
+            _ => (AT_ONCE[draw(16) as usize].to_string(), false),
+        };
+        let ends_ms = at_ms + if is_lasting { lasts_ms } else { 0 };
+        let when = if is_lasting {
+            format!("{at_ms}ms..{ends_ms}ms")
+        } else {
+            format!("{at_ms}ms")
+        };
+        let planned = format!("{text}@{when}");
+        let is_reset = RESETS.contains(&text.as_str()) || text.starts_with("hang");
+        let is_stuck = text == "telemetry-stuck";
+        let after = if is_reset { BACK } else { 400 * MS };
+        plan.push(Arriving {
+            planned: planned.parse().unwrap_or_else(|error| panic!("the plan: {error}")),
+            text: planned,
+            felt: (at_ms * MS, ends_ms * MS + after),
+            excuses: is_reset || is_stuck,
+        });
+        at_ms = ends_ms + 5_000 + draw(55_000);
+    }
+    plan
+}
+
+/// Flies so long.
+pub fn fly(seed: u64, seconds: u64) -> Told {
+    let plan = arriving(seed, seconds.saturating_sub(QUIET_S));
+    let mut flight = Flight::ideal(world("still"));
+    flight.plant = Plant::new(world("still"), seed);
+    for (n, arriving) in plan.iter().enumerate() {
+        flight.faults.extend(arriving.planned.strokes(seed + n as u64));
+        if arriving.text.contains("umbilical-") {
+            // The part that sends hangs, or finds its line stuck, when it has something to send.
+            flight = flight.say(arriving.felt.0 + MS, b"G_VE");
+        }
+    }
+    flight = flight.say(S, b"G_MVG_MV").say(2 * S, b"G_MGG_MG");
+    for at_s in (LEAVES_SAFE_MODE_S..seconds - QUIET_S).step_by(LEAVES_SAFE_MODE_S as usize) {
+        flight = flight.say(at_s * S, b"G_XN");
+    }
+    for at_s in (BEGINS_ANEW_S..seconds - QUIET_S).step_by(BEGINS_ANEW_S as usize) {
+        flight = flight
+            .say((at_s + 1) * S, b"G_MEG_ME")
+            .say((at_s + 2) * S, b"G_MAG_CA")
+            .say((at_s + 30) * S, b"G_MVG_MVG_MGG_MG");
+    }
+    let end = seconds * S;
+    // Derived frames of a day would fill the memory; those of the end are enough.
+    flight = flight
+        .say(end - 60 * S, b"G_XNG_MVG_MVG_MGG_MG")
+        .say(end - 5 * S, b"G_DL")
+        .say(end - 2 * S, b"G_ST");
+    flight.said.sort_by_key(|(at, _)| *at);
+    let flown = flight.fly(end);
+    Told {
+        struck: flown.report.struck.values().sum(),
+        did: judged(&plan, &flown),
+    }
+}
+
+fn judged(plan: &[Arriving], flown: &Flown) -> Result<String, String> {
+    let second = |at: Nanos| at as f64 * 1e-9;
+    let felt = |from: Nanos, to: Nanos| plan.iter().any(|fault| fault.felt.0 < to && from < fault.felt.1);
+    let excused = |from: Nanos, to: Nanos| {
+        plan.iter()
+            .any(|fault| fault.excuses && fault.felt.0 < to && from < fault.felt.1)
+    };
+    let (mut quiet, mut worst) = (0_u64, 0);
+    for pair in flown.packets.windows(2) {
+        let [(before, one), (after, next)] = [pair[0], pair[1]];
+        let period = after - before;
+        let at = second(before);
+        if next.counter != one.counter.wrapping_add(1) && !excused(before, after) {
+            return Err(format!(
+                "packets {} and {} follow each other at {at:.1} s",
+                one.counter, next.counter
+            ));
+        }
+        if excused(before, after) {
+            continue;
+        }
+        let off = period.abs_diff(200 * MS);
+        if felt(before.saturating_sub(S), after + S) {
+            if off > LATE {
+                let last = plan.iter().rev().find(|fault| fault.felt.0 < after);
+                let last = last.map_or("no fault", |fault| &fault.text);
+                return Err(format!("a period of {} ms at {at:.1} s, after {last}", period / MS));
+            }
+        } else if off > 2 * MS {
+            return Err(format!(
+                "a period of {} ms at {at:.1} s, where nothing befell the unit",
+                period / MS
+            ));
+        } else {
+            (quiet, worst) = (quiet + 1, worst.max(off));
+        }
+    }
+    let named: std::collections::BTreeSet<&str> = plan.iter().map(|fault| fault.planned.word.name).collect();
+    let never: Vec<&str> = named
+        .into_iter()
+        .filter(|name| !flown.report.struck.contains_key(name))
+        .collect();
+    if !never.is_empty() {
+        return Err(format!("{} never struck", never.join(", ")));
+    }
+    let last = flown.second(flown.report.flown / S - 1);
+    let is_well = last.len() >= 4 && last.iter().all(|reading| reading.errors.0 == 0);
+    let frame = flown.derived.last().ok_or("no derived frames at the end")?;
+    if !is_well || frame.estimate.q_nb.is_none() {
+        return Err(format!(
+            "at the end errors {:04X?}, attitude {:?}",
+            last.last().map(|r| r.errors),
+            frame.estimate.q_nb
+        ));
+    }
+    if !flown.replied("G_ST FLIGHT task none recording 1") {
+        return Err(format!(
+            "at the end {:?}",
+            flown.replies().iter().rev().take(8).collect::<Vec<_>>()
+        ));
+    }
+    Ok(format!(
+        "{} faults in {:.1} h, {} resets; {} packets, none missing without excuse; {quiet} periods undisturbed, at most {:.1} us off; all \
+         well at the end",
+        plan.len(),
+        flown.report.flown as f64 / 3600e9,
+        flown.report.resets.len(),
+        flown.packets.len(),
+        worst as f64 * 1e-3
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is not excused is found.
+    #[test]
+    fn a_packet_that_is_missing_without_excuse_is_found() {
+        let mut flown = Flight::ideal(world("still")).fly(5 * S);
+        assert!(
+            judged(&[], &flown).is_err_and(|why| why.contains("derived")),
+            "nothing else is amiss"
+        );
+        flown.packets.remove(10);
+        assert!(judged(&[], &flown).is_err_and(|why| why.contains("follow each other")));
+    }
+}
