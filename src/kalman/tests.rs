@@ -59,16 +59,6 @@ impl World {
         last
     }
 
-    /// The same, of a filter whose state may be anything.
-    fn go_on(&mut self, duration_s: f32, rate_b: Vector3<f32>) {
-        for _ in 0..(duration_s / STEP_S) as u32 {
-            self.at_us += STEP_US;
-            self.q_nb = renormalised(self.q_nb * from_rotation_vector(rate_b * STEP_S));
-            let step = self.step(rate_b);
-            self.filter.step(&step);
-        }
-    }
-
     /// What an ideal unit has of this instant.
     fn step(&self, rate_b: Vector3<f32>) -> Step {
         let sampled = |value_b: Vector3<f32>| {
