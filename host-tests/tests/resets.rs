@@ -478,3 +478,17 @@ fn a_power_cut_without_weight_goes_on_from_the_newest_record() {
         "{last:?}"
     );
 }
+
+/// A magnetometer that measures by its own clock, of which 200 ms are 15 periods, can be writing whenever it is read, for as long as
+/// the unit's clock stands so to it: after one reset in fifty it was lost for hours. What measures when it is asked has its set ready.
+#[test]
+fn after_a_reset_at_any_phase_of_a_magnetometer_s_clock_it_is_read_again() {
+    // 13.3 ms in steps of the 0.25 ms for which it writes.
+    for phase in 0..54 {
+        let reset = 3 * S + phase * MS / 4;
+        let flown = still().fault(reset, Fault::Reset).fly(reset + 3 * S);
+        let last = flown.packets.last().expect("packets").1;
+        assert_eq!(flown.report.resets.len(), 1);
+        assert_eq!(last.errors.0, 0, "after a reset at {reset} ns");
+    }
+}
