@@ -4,8 +4,9 @@
 //! its noise, and on it a linear Gaussian fit ([`joint`]) of what the [`calibration`] and the reference leave open: normal
 //! equations with the calibration marginalised ([`normal`]), their [`evidence`], and the finished [`model`]. A [`misfit`] that
 //! looks like noise is told from noise by how long it stays alike. An effect that comes and goes is on in an [`interval`].
-//! What errs slowly, alike in several channels, is taken out by one Kalman pass over a residual and every column ([`whitening`]); what an
-//! effect is worth [`beyond`] that and the [`point`] whose position is told says whether the reference may have done it.
+//! What errs slowly, alike in several channels ([`wander`]), is taken out by one Kalman pass over a residual and every column
+//! ([`whitening`]). What an effect is worth [`beyond`] that, the field's [`gradient`] and the [`point`] whose position is told says whether
+//! reference and field may have done it.
 //!
 //! With thousands of samples any error of 0.1 % is significant. That is why the calibration is marginalised everywhere: none of
 //! what it leaves open is an effect.
@@ -21,4 +22,5 @@ pub mod model;
 pub mod normal;
 pub mod point;
 pub mod problem;
+pub mod wander;
 pub mod whitening;

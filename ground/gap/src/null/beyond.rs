@@ -2,79 +2,27 @@
 //!
 //! In: the problem, how reference and field err slowly ([`SlowErrors`]), a model, one of its effects. Out: by how many nats the model is
 //! likelier with the effect than without, `(E(r_without) - E(r_with)) / 2`, where `E(r) = r'K^-1 r - b'(A + I)^-1 b`. `K` is the covariance
-//! of white noise, of an attitude error and its rate (Matern 3/2) and of a field that wanders (Ornstein-Uhlenbeck), which
-//! [`super::whitening`] takes out. `A` and `b` are the inner products, in those units, of what is open, each column times its sigma, with
+//! of white noise and of how reference and field [`wander`](super::wander), which [`super::whitening`] takes out. `A` and `b` are the inner products, in those units, of what is open, each column times its sigma, with
 //! each other and with `r`: the calibration, the field and its [`gradient`], and the [`point`] whose position is told.
 //!
 //! A table that tilts slowly by two sigmas of the attitude is worth two nats here, however long the log is. The search has a coarser null,
 //! for it asks thousands of times. There the point is not open: a lever arm of a centimetre would be ten sigmas of it and worth fifty nats,
 //! however plain it is.
 //!
-//! A reference that is exact errs by nothing, and what the search says then stands.
+//! A reference that is exact errs by nothing, and what the search says then stands. A column that is not finite at a sample says nothing there.
 
-use nalgebra::{Cholesky, DMatrix, Dyn, Vector3};
-use twin::predict::{Channel, Column, Feel, Kind};
+use nalgebra::{Cholesky, DMatrix, Dyn};
+use twin::predict::{Column, Feel};
 
 use crate::{
     input::case::SlowErrors,
     null::{
         gradient, point,
         problem::{Component, Problem},
-        whitening::{Process, Sample, Whitening, places},
+        wander::{of_states, processes, sees},
+        whitening::{Sample, Whitening, places},
     },
 };
-
-/// What a sensor feels of the vector that it looks along.
-pub fn felt_b(kind: Kind, feel: &Feel) -> Vector3<f64> {
-    match kind {
-        Kind::Accelerometer => feel.force_b,
-        Kind::Gyro => feel.rate_b,
-        Kind::Magnetometer => feel.field_b_ut,
-        Kind::Thermometer => Vector3::zeros(),
-    }
-}
-
-/// What a channel sees of an attitude error about the axes of n, of its rate, and of a field error along them.
-pub fn sees(channel: &Channel, feel: &Feel) -> [f64; 9] {
-    let [axis_n, turned_n] =
-        [channel.axis_b, channel.axis_b.cross(&felt_b(channel.sensor, feel))].map(|v_b| feel.q_nb * v_b);
-    let mut seen = [0.0; 9];
-    // n.C(v + v x phi) for a vector v that stands in n.
-    if matches!(channel.sensor, Kind::Accelerometer | Kind::Magnetometer) {
-        seen[..3].copy_from_slice(turned_n.as_slice());
-    }
-    if channel.sensor == Kind::Gyro {
-        seen[3..6].copy_from_slice(axis_n.as_slice());
-    }
-    if channel.sensor == Kind::Magnetometer {
-        seen[6..].copy_from_slice(axis_n.as_slice());
-    }
-    seen
-}
-
-/// The three axes of the attitude and of the field.
-pub fn processes(errors: &SlowErrors) -> [Process; 6] {
-    let attitude = Process::Matern {
-        sigma: errors.attitude_sigma_rad,
-        alike_s: errors.attitude_correlation_s,
-    };
-    let field = Process::Alike {
-        sigma: errors.field_wander_sigma_ut,
-        alike_s: errors.field_correlation_s,
-    };
-    [attitude, attitude, attitude, field, field, field]
-}
-
-/// Which states, and how much of each, a channel sees of such processes that begin `at`: an angle's rate is its second state.
-pub fn of_states(seen: &[f64; 9], at: &[usize]) -> Vec<(usize, f64)> {
-    let state = |of: usize| match of {
-        0..3 => at[of],
-        3..6 => at[of - 3] + 1,
-        _ => at[of - 3],
-    };
-    let parts = seen.iter().enumerate().filter(|(_, part)| **part != 0.0);
-    parts.map(|(of, part)| (state(of), *part)).collect()
-}
 
 /// What is known of a log when nothing is wrong.
 pub struct Beyond<'a> {
@@ -124,7 +72,7 @@ impl<'a> Beyond<'a> {
         for (mut into, column) in open.column_iter_mut().zip(&columns) {
             for (channel, rows) in &column.entries {
                 for (value, [own, _, row]) in into.iter_mut().zip(&order) {
-                    if own == channel {
+                    if own == channel && rows[*row].is_finite() {
                         *value = rows[*row] * column.sigma;
                     }
                 }

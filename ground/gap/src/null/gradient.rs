@@ -1,7 +1,8 @@
 //! The gradient of the field where the body moves: what magnetometers feel of it.
 //!
-//! In: the twin, how fields err ([`SlowErrors`]). Out: a column for each of its five components, which are symmetric and have no trace, about
-//! the place where the log begins. None of a field that is stated as exact.
+//! In: the twin, how fields err ([`SlowErrors`]). Out: a column for each of its five components, for it is symmetric and
+//! has no trace, about the place where the log begins. None of a field that is stated as exact. It is
+//! that at the centre of the body; what the places of the sensors about it add is not in them.
 
 use nalgebra::Matrix3;
 use twin::predict::{Column, Feel, Kind, Twin};

@@ -1,4 +1,4 @@
-//! The point of the body whose position a reference tells: how far what an effect adds may be an error of it.
+//! The point of the body whose position a reference tells: what accelerometers feel if it is another.
 //!
 //! In: the twin, what is known of the reference. Out: what every accelerometer feels of a point that is off along each axis by
 //! [`POINT_SIGMA_M`]: where the body turns, all feel `dw/dt x r + w x (w x r)` of the same `r`.
@@ -13,7 +13,7 @@ use twin::predict::{Accuracy, Column, Feel, Kind, Twin};
 /// that were calibrated on the spot come out 0.4 to 2 mm otherwise.
 const POINT_SIGMA_M: f64 = 0.001;
 
-/// What each accelerometer feels of a point that is a metre off along x, y and z of the body.
+/// What each accelerometer feels of a point that is a metre off along x, y and z of the body. None of a reference that is exact.
 pub fn columns(twin: &Twin, accuracy: &Accuracy) -> Vec<Column> {
     if accuracy.attitude_sigma_rad <= 0.0 || accuracy.position_sigma_m <= 0.0 {
         return Vec::new();

@@ -45,12 +45,12 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         .for_each(|(cause, energy)| cause.share = energy.max(0.0));
 }
 
-/// Per effect of a model that a calibration can imitate, the energy that it takes off what the description as it is leaves, in squares of
-/// noise; nothing for another.
+/// Per effect of a model: if a calibration can imitate it, the energy that it takes off the residual of the unit as described, in squares of
+/// noise; 0 if not.
 ///
-/// Evidence counts what the calibration cannot take up at its sigmas, and that is all that tells iron from a zero. But whatever else the iron
-/// might stand in for would be in the readings as a whole: what it leaves is held against the whole. Ten sigmas of a zero are
-/// worth fifty nats and explain a thousand times as much.
+/// Evidence counts only what the calibration cannot take up at its sigmas: ten sigmas of a zero are worth fifty nats. But an unknown effect
+/// for which the iron stood in would be in the readings as a whole. So what is left is held against the whole that the iron explains,
+/// which may be a thousand times more.
 pub fn imitated(problem: &Problem, model: &Model) -> Vec<f64> {
     let nominal = |components: &[Component]| -> f64 {
         let residuals = problem.residuals(components);

@@ -45,8 +45,8 @@ pub struct Explanation {
     pub beneath: Vec<Vec<f64>>,
     /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
     pub louder: Vec<f64>,
-    /// Most different effects that the search chose, refused ones included, in the channels of one of them.
-    together: usize,
+    /// How many different effects, refused ones included, are in the channels of one of them, at most.
+    company: usize,
     /// Whether those that were refused explain more than those that were kept.
     is_refused: bool,
 }
@@ -101,7 +101,7 @@ impl Explanation {
                 found = attribute(problem, library, progress);
             }
         }
-        let patched = company(problem, library, &found.chosen, scatter.as_ref());
+        let company = company(problem, library, &found.chosen, scatter.as_ref());
         let (kept, refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
             .into_iter()
             .partition(|chosen| probability_of_any(library, chosen) >= SAID);
@@ -135,7 +135,7 @@ impl Explanation {
             model,
             beneath,
             louder,
-            together: patched,
+            company,
             is_refused,
         }
     }
@@ -145,10 +145,10 @@ impl Explanation {
         self.found.chosen.is_empty() && self.scatter.is_none()
     }
 
-    /// Whether it is more likely a patchwork for an effect that the library does not have: what patches that is where it is. A bias of the
-    /// gyros, iron at the magnetometers and a lever arm stand in for nothing together.
+    /// Whether it is more likely a patchwork for an effect that the library does not have: whatever stands in for that
+    /// together is in the same channels. A bias of the gyros, iron at the magnetometers and a lever arm are not.
     pub fn is_patchwork(&self) -> bool {
-        self.is_refused || self.together > MOST_CAUSES
+        self.is_refused || self.company > MOST_CAUSES
     }
 
     /// What its effect on the scatter makes of noise, given as residuals in units of noise. Louder white noise is in those
@@ -212,8 +212,8 @@ fn gains(chosen: &[Chosen]) -> f64 {
     chosen.iter().map(|chosen| chosen.gain).sum()
 }
 
-/// How many different effects are in the channels of one of them, at most, the one on the scatter included. Those count whose packets, lost at
-/// three instants, are one, and that bring more than a fiftieth of all, which is what the laws of the others leave.
+/// How many different effects are in the channels of one of them, at most, the effect on the scatter included. An effect counts once, wherever and
+/// however often it was found, and if it brings more than a fiftieth of all: less may be what the laws of the others leave.
 fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Option<&Scatter>) -> usize {
     let least = COUNTED_PART * gains(chosen);
     let component = |one: &Chosen| library.hypotheses[one.hypothesis].component(&one.theta);

@@ -21,7 +21,7 @@ use super::{
     discrepancy::{Posterior, courses},
     remainder::Setting,
 };
-use crate::null::{beyond::felt_b, model::Model, problem::Problem};
+use crate::null::{model::Model, problem::Problem, wander::felt_b};
 
 /// Courses in time: the last has a period of a sixteenth of the log.
 const COURSES: usize = 32;

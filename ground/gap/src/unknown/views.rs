@@ -2,7 +2,7 @@
 //! converts, and what a small rotation would add to it: `d(n.v) = (v x n).delta` for the vector `v` (force, rate or field) a
 //! sensor along `n` feels.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 use twin::predict::{Channel, Feel, Kind};
 
 use crate::{
@@ -10,6 +10,7 @@ use crate::{
         calibration::conversion_period_s,
         model::Model,
         problem::{Frame, Problem},
+        wander::felt_b,
     },
     unknown::adequacy::{Clock, Codes, Instrument, LEVELS, Open, Suspect, View},
 };
@@ -53,15 +54,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
     let view = |(index, frame): (usize, &Frame)| {
         let channel = &problem.true_twin().unit().channels[index];
         let own = problem.predict(index, &[]);
-        let felt_b = |row: usize| {
-            let feel = &feels[frame.series.rows[row] as usize];
-            match channel.sensor {
-                Kind::Accelerometer => feel.force_b,
-                Kind::Gyro => feel.rate_b,
-                Kind::Magnetometer => feel.field_b_ut,
-                Kind::Thermometer => Vector3::zeros(),
-            }
-        };
+        let felt_b = |row: usize| felt_b(channel.sensor, &feels[frame.series.rows[row] as usize]);
         let at = |quantity: &dyn Fn(usize) -> f64| {
             let values: Vec<f64> = frame.series.rows.iter().map(|row| quantity(*row as usize)).collect();
             levels(&values)

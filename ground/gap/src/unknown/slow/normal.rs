@@ -10,8 +10,8 @@ use super::{Open, Seen, Slow, courses, design};
 use crate::{
     input::case::SlowErrors,
     null::{
-        beyond::{of_states, processes, sees},
         problem::Problem,
+        wander::{of_states, processes, sees},
         whitening::{Process, Sample, Whitening, places},
     },
 };
@@ -228,6 +228,8 @@ pub(super) fn sets(problem: &Problem, errors: &SlowErrors) -> Vec<Vec<usize>> {
 /// Of a channel what it sees of an attitude error about the axes of n, of its rate, and of a field error along them, averaged.
 fn seen_states(problem: &Problem, seen: &Seen, channel: usize) -> Vec<Vec<f64>> {
     let own = &problem.twin.unit().channels[channel];
-    let state = |of: usize| (seen.binned).means(|sample| sees(own, &seen.feels[sample])[of]);
-    (0..9).map(state).collect()
+    let states: Vec<[f64; 9]> = seen.feels.iter().map(|feel| sees(own, feel)).collect();
+    (0..9)
+        .map(|of| seen.binned.means(|sample| states[sample][of]))
+        .collect()
 }
