@@ -173,13 +173,13 @@ struct Pending {
 /// Two copies of what of a state must not change by itself, the second one complemented, against flipped bits of the RAM
 /// (fault U9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sworn([u8; 2]);
+pub struct Copies([u8; 2]);
 
-impl Sworn {
+impl Copies {
     /// Of a state as it is to be.
     pub fn of(state: &State) -> Self {
         let vital = state.vital();
-        Sworn([vital, !vital])
+        Copies([vital, !vital])
     }
 
     /// Makes state and copies what two of the three are; whether there was anything to put right.
@@ -191,7 +191,7 @@ impl Sworn {
             state.restore(one);
             return found != one;
         }
-        *self = Sworn::of(state);
+        *self = Copies::of(state);
         *self != found
     }
 }

@@ -360,15 +360,15 @@ fn a_flipped_bit_of_the_mode_is_put_right_by_its_copies() {
         let mut sound = State::default();
         sound.restore(vital);
         assert_eq!(sound.vital(), vital);
-        let sworn = Sworn::of(&sound);
+        let sound_copies = Copies::of(&sound);
         for bit in 0..20 {
-            let (mut state, mut copies) = (sound, sworn);
+            let (mut state, mut copies) = (sound, sound_copies);
             match bit {
                 0..4 => state.restore(vital ^ 1 << bit),
                 _ => copies.0[(bit - 4) / 8] ^= 1 << ((bit - 4) % 8),
             }
             assert!(copies.mend(&mut state), "{vital} {bit}");
-            assert_eq!((state, copies), (sound, sworn), "{vital} {bit}");
+            assert_eq!((state, copies), (sound, sound_copies), "{vital} {bit}");
             assert!(!copies.mend(&mut state), "{vital} {bit}: once");
         }
     }

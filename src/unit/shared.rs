@@ -24,7 +24,7 @@ use crate::{
         record::{self, Name, RecordBytes},
     },
     increments::{Force, Increments, Integrator},
-    mode::{Cause, Change, State, Sworn, Task},
+    mode::{Cause, Change, Copies, State, Task},
     packet::PACKET_BYTES,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
@@ -167,7 +167,7 @@ pub struct Shared {
     /// Checksum of the firmware's image, once it was read to its end.
     pub image: Cell<Option<u32>>,
     /// Copies of the state.
-    sworn: Cell<Sworn>,
+    copies: Cell<Copies>,
     /// Checksum of the calibration set in use.
     pub set_sum: Cell<u32>,
     /// Changes of mode that are not in the log yet.
@@ -193,7 +193,7 @@ impl Shared {
             clock: Clock::new(),
             settings,
             state: Cell::new(state),
-            sworn: Cell::new(Sworn::of(&state)),
+            copies: Cell::new(Copies::of(&state)),
             image: Cell::default(),
             set_sum: Cell::new(set.checksum()),
             safe: Cell::new(start.starts.ask_for_safe_mode()),
@@ -266,10 +266,10 @@ impl Shared {
 
     /// Puts right what a flipped bit of the RAM has made of the state: of it and its two copies two agree.
     pub fn mend(&self) {
-        let (mut sworn, mut state) = (self.sworn.get(), self.state.get());
-        if sworn.mend(&mut state) {
+        let (mut copies, mut state) = (self.copies.get(), self.state.get());
+        if copies.mend(&mut state) {
             self.state.set(state);
-            self.sworn.set(sworn);
+            self.copies.set(copies);
             self.say(format_args!("a flipped bit of the mode was put right"));
         }
     }
@@ -281,7 +281,7 @@ impl Shared {
         let mut after = before;
         let outcome = act(&mut after);
         self.state.set(after);
-        self.sworn.set(Sworn::of(&after));
+        self.copies.set(Copies::of(&after));
         if after.mode != before.mode {
             let text = line(format_args!("mode {}: {}", after.mode.name(), cause.name()));
             for announced in &self.announced {

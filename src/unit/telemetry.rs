@@ -15,7 +15,7 @@ use crate::{board::Board, derived};
 /// \[baud\] the slowest line there may be: a packet takes 162.5 of the 200 ms to the next one there, and 13.5 at 115200.
 const SLOWEST_BAUD: u64 = 9600;
 
-/// \[ms\] what a write may take besides: the estimation holds the processor no longer.
+/// \[ms\] a write may take longer by, because the estimation holds the processor meanwhile: for less than that.
 const SPARE_MS: u64 = 20;
 
 /// Sends for ever.
