@@ -32,14 +32,16 @@ use crate::{
     probability::{
         cause::{Cause, share_out},
         doubt::Promised,
+        importance::setting,
         outcome::{Outcome, is_unexplained},
         posterior::Believed,
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
-    thresholds::SAID,
+    thresholds::{MOST_EFFECTS, SAID},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
+        recognised::recognised,
         remainder::{Remainder, Setting},
         traces::{Trace, cells, traces},
         views,
@@ -169,6 +171,21 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     } else {
         Vec::new()
     };
+    let seen = recognise(subject, &problem, &library, &mut explanation, &quiet);
+    let events = if seen {
+        Events::of(&problem, &explanation.model)
+    } else {
+        events
+    };
+    if seen {
+        left = left_by(&problem, &explanation);
+        shrink = subject.held.judge(Finished {
+            after: &explanation.model.predicted,
+            louder: &explanation.louder,
+            events: events.as_ref(),
+            ..without
+        });
+    }
     let again = |left: &Leftover, components: &[Component]| {
         let found = left.aspects.first().filter(|_| left.is_doubtful())?;
         progress("again", 0.0);
@@ -280,6 +297,38 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         causes,
         withdrawn,
     }
+}
+
+/// Takes in what is recognised beneath what an explanation leaves, where the reference is not exact; whether anything was.
+fn recognise(
+    subject: &Subject,
+    problem: &Problem,
+    library: &Library,
+    explanation: &mut Explanation,
+    quiet: &Model,
+) -> bool {
+    if subject.slow.attitude_sigma_rad <= 0.0 {
+        return false;
+    }
+    let before = explanation.found.chosen.len();
+    while explanation.found.chosen.len() < MOST_EFFECTS {
+        let model = if explanation.found.chosen.is_empty() {
+            quiet
+        } else {
+            &explanation.model
+        };
+        let Some(chosen) = recognised(
+            problem,
+            library,
+            model,
+            &explanation.found.chosen,
+            &setting(subject, explanation),
+        ) else {
+            break;
+        };
+        explanation.add(problem, library, chosen);
+    }
+    explanation.found.chosen.len() > before
 }
 
 /// The effects on readings that are named, without those that were found and are not likely enough.

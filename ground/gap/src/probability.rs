@@ -7,6 +7,7 @@
 pub mod cause;
 pub mod contribution;
 pub mod doubt;
+pub mod importance;
 pub mod outcome;
 pub mod posterior;
 pub mod regime;

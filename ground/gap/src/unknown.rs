@@ -11,6 +11,7 @@ pub mod discrepancy;
 mod fast;
 pub mod octaves;
 pub mod place;
+pub mod recognised;
 pub mod remainder;
 pub mod shapley;
 pub mod slow;

@@ -28,6 +28,8 @@ const BEND_STEP_S: f64 = 2e-3;
 pub struct Accuracy {
     /// \[rad\] attitude of the truth instrument.
     pub attitude_sigma_rad: f64,
+    /// \[s\] over which that error stays alike, as a Matern 3/2 process.
+    pub attitude_correlation_s: f64,
     /// \[m\] its position.
     pub position_sigma_m: f64,
     /// \[uT\] the field, and how uniform it is.

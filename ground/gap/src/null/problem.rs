@@ -15,7 +15,7 @@ mod frame;
 use nalgebra::{DMatrix, DVector};
 use twin::{
     effect::{Active, Cause},
-    predict::{Column, Kind, Memory, Twin},
+    predict::{Accuracy, Column, Kind, Memory, Twin},
 };
 
 pub use self::frame::Frame;
@@ -62,18 +62,12 @@ impl<'a> Problem<'a> {
         let starts_s = twin.starts_s();
         let steps = starts_s.len().saturating_sub(1).max(1) as f64;
         let rate_hz = steps / (starts_s.last().unwrap_or(&1.0) - starts_s.first().unwrap_or(&0.0)).max(f64::EPSILON);
-        let alike = (2.0 * REFERENCE_CORRELATION_S * rate_hz).max(1.0);
         let (mut sigmas, mut steady) = (Vec::new(), Vec::new());
         let mut frames = Vec::new();
         for (index, (channel, series)) in twin.unit().channels.iter().zip(&fit.channels).enumerate() {
-            let slow = match channel.sensor {
-                Kind::Accelerometer => twin.environment().gravity * accuracy.attitude_sigma_rad,
-                Kind::Magnetometer => accuracy
-                    .field_sigma_ut
-                    .hypot(twin.environment().field_n_ut.norm() * accuracy.attitude_sigma_rad),
-                Kind::Gyro => accuracy.attitude_sigma_rad / REFERENCE_CORRELATION_S,
-                Kind::Thermometer => 0.0,
-            };
+            let slow = Slow::of(twin, accuracy, channel.sensor);
+            let alike = (rate_hz * slow.alike_s).max(1.0);
+            let slow = slow.sigma;
             let fast = |row: usize| channel.sigma().hypot(instrument.fast_sigma(index, row));
             steady.push(channel.sigma().hypot(slow));
             sigmas.push((0..starts_s.len()).map(|row| fast(row).hypot(slow)).collect());
@@ -351,6 +345,39 @@ impl<'a> Problem<'a> {
             .iter()
             .map(|column| self.in_noise(column, None))
             .collect()
+    }
+}
+
+/// What a reference that errs slowly puts into the readings of a kind of sensor.
+struct Slow {
+    /// Standard deviation, in physical units.
+    sigma: f64,
+    /// \[s\] the time for which one sample of it stands: the largest density of its spectrum, two-sided, over its variance.
+    alike_s: f64,
+}
+
+impl Slow {
+    fn of(twin: &Twin, accuracy: &Accuracy, kind: Kind) -> Self {
+        let attitude = accuracy.attitude_sigma_rad;
+        if kind == Kind::Gyro && attitude > 0.0 {
+            // Its rate: of a Matern 3/2 error the variance is `3 s^2 / T^2`, and the density `4 l^3 s^2 w^2 / (l^2 + w^2)^2`, `l` being
+            // `sqrt(3) / T`, at most `l s^2` (Rasmussen and Williams 2006, section 4.2).
+            let per_s = 3f64.sqrt() / accuracy.attitude_correlation_s;
+            return Slow {
+                sigma: per_s * attitude,
+                alike_s: per_s.recip(),
+            };
+        }
+        let environment = twin.environment();
+        let sigma = match kind {
+            Kind::Accelerometer => environment.gravity * attitude,
+            Kind::Magnetometer => (accuracy.field_sigma_ut).hypot(environment.field_n_ut.norm() * attitude),
+            Kind::Gyro | Kind::Thermometer => 0.0,
+        };
+        Slow {
+            sigma,
+            alike_s: 2.0 * REFERENCE_CORRELATION_S,
+        }
     }
 }
 

@@ -20,38 +20,49 @@ use crate::{
     input::{case::SlowErrors, hold::Held},
     library::hypotheses::Library,
     null::{beyond::Beyond, model::Model, problem::Problem},
-    probability::cause::Cause,
+    probability::{cause::Cause, importance::Importance},
     search::explanation::Explanation,
     thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
-    unknown::adequacy::Leftover,
+    unknown::{adequacy::Leftover, slow::Slow},
 };
 
 /// What is left over, and how much that says against names.
 pub struct Belief<'a> {
     left: &'a Leftover,
+    /// Slow courses that are left beside what a reference that is not exact errs by; `None` where it is exact.
+    courses: Option<&'a [Slow]>,
     /// Per channel, energy that stands out in some octave, in squares of noise.
     loud: &'a [f64],
-    /// Probability that every promise was kept.
-    kept: f64,
-    /// Energy of those that were not.
-    broken: f64,
+    promises: &'a [Promised],
 }
 
 impl<'a> Belief<'a> {
     /// From what is left over, where it is loud, and promises: what an effect explained and does not explain on the held-out windows is
     /// left over too.
-    pub fn of(left: &'a Leftover, loud: &'a [f64], promises: &[Promised]) -> Self {
+    pub fn of(left: &'a Leftover, courses: Option<&'a [Slow]>, loud: &'a [f64], promises: &'a [Promised]) -> Self {
         Self {
             left,
+            courses,
             loud,
-            kept: promises.iter().map(|promised| 1.0 - promised.doubt()).product(),
-            broken: promises.iter().map(Promised::broken).sum(),
+            promises,
         }
+    }
+
+    /// Probability that every promise in some channels was kept, and the energy of those that were not. What an effect does not keep in
+    /// the accelerometers says nothing of another in the gyros.
+    fn kept(&self, channels: &[usize]) -> (f64, f64) {
+        let is_there = |promised: &&Promised| promised.channels.iter().any(|channel| channels.contains(channel));
+        let there = || self.promises.iter().filter(is_there);
+        (
+            there().map(|promised| 1.0 - promised.doubt()).product(),
+            there().map(Promised::broken).sum(),
+        )
     }
 
     /// Probability that something outside the library is needed.
     pub fn unknown(&self) -> f64 {
-        1.0 - (1.0 - self.left.unknown(UNKNOWN_PRIOR)) * self.kept
+        let kept: f64 = self.promises.iter().map(|promised| 1.0 - promised.doubt()).product();
+        1.0 - (1.0 - self.left.unknown(UNKNOWN_PRIOR)) * kept
     }
 
     /// Probability that an effect, which explains so much energy in these channels, is no stand-in for something else; of an explanation as
@@ -59,16 +70,38 @@ impl<'a> Belief<'a> {
     pub fn trust(&self, effect: Option<&str>, channels: &[usize], explained: f64) -> f64 {
         let left = self.left.against(effect, channels);
         let loud: f64 = channels.iter().map(|channel| self.loud[*channel]).sum();
-        let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * self.kept;
-        let energy = left.energy().max(loud) + self.broken;
+        let (kept, broken) = self.kept(channels);
+        let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * kept;
+        let energy = left.energy().max(loud) + broken;
         1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
     }
 
-    /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise.
-    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64]) {
+    /// The same of an effect on readings where the reference is not exact. Everything is significant there, for the search's null has not
+    /// the colour of what a reference errs by. So the evidence of the slow courses that are left speaks, which has: the same that says what
+    /// the effect is worth.
+    fn trust_beside_reference(&self, courses: &[Slow], channels: &[usize], explained: f64) -> f64 {
+        let others = courses.len() as f64;
+        let is_there = |slow: &&Slow| slow.channels.iter().any(|channel| channels.contains(channel));
+        let nats = courses
+            .iter()
+            .filter(is_there)
+            .map(|slow| slow.posterior.log_bayes_factor);
+        let nats = nats.fold(0.0, f64::max);
+        let (kept, broken) = self.kept(channels);
+        let unknown = 1.0 - kept / (1.0 + nats.exp() / others);
+        let energy = 2.0 * nats + broken;
+        1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+    }
+
+    /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
+    /// effects on readings.
+    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
-        for (cause, explained) in causes.iter_mut().zip(explained) {
-            let trust = self.trust(Some(cause.effect), &cause.channels, *explained);
+        for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
+            let trust = match self.courses.filter(|_| index < on_readings) {
+                Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
+                None => self.trust(Some(cause.effect), &cause.channels, *explained),
+            };
             let is_no_chance = above_doubt(cause.gain);
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
@@ -80,19 +113,31 @@ impl<'a> Belief<'a> {
     }
 }
 
-/// Believes causes less, which are the model's effects in their order, that may be an error of the reference or the field.
-pub fn beyond_reference(problem: &Problem, errors: &SlowErrors, model: &Model, causes: &mut [Cause]) {
+/// Believes causes less, which are the model's effects in their order, that may be an error of the reference or the field. Returns what each
+/// is worth \[nats\] beyond that, sample by sample or in means over short stretches, whichever shows more; none where the reference is
+/// exact.
+pub fn beyond_reference(
+    problem: &Problem,
+    errors: &SlowErrors,
+    explanation: &Explanation,
+    importance: Option<&Importance>,
+    causes: &mut [Cause],
+) -> Vec<f64> {
+    let model = &explanation.model;
     if causes.is_empty() || causes.len() != model.components.len() {
         // They were withdrawn.
-        return;
+        return Vec::new();
     }
     let Some(beyond) = Beyond::of(problem, errors) else {
-        return;
+        return Vec::new();
     };
-    for (index, cause) in causes.iter_mut().enumerate() {
-        let nats = beyond.nats(&model.components, index);
+    let weighed = causes.iter_mut().enumerate().map(|(index, cause)| {
+        let slow = importance.map_or(0.0, |importance| importance.worth[index]);
+        let nats = beyond.nats(&model.components, index).max(slow);
         cause.probability *= above_doubt(nats);
-    }
+        nats
+    });
+    weighed.collect()
 }
 
 /// How far so many nats are no chance.
@@ -125,6 +170,8 @@ pub fn second_keys(
 pub struct Promised {
     /// Its name.
     pub effect: &'static str,
+    /// Where it is.
+    channels: Vec<usize>,
     /// How strong it is there; `None` where it is not there at all.
     pub promise: Option<Promise>,
     /// How far that is what it promised on the fit windows, 0 to 1.
@@ -184,6 +231,7 @@ pub fn promises(
         cause.probability *= confidence;
         Promised {
             effect: cause.effect,
+            channels: cause.channels.clone(),
             promise,
             confidence,
             believed,
@@ -211,14 +259,14 @@ mod tests {
     #[test]
     fn a_small_misfit_of_a_large_effect_is_its_own_and_a_large_one_another_effect() {
         let surely = left(1e-9);
-        let belief = Belief::of(&surely, &[0.0; 2], &[]);
+        let belief = Belief::of(&surely, None, &[0.0; 2], &[]);
         assert!(belief.unknown() > 0.99);
         let of_a_large_effect = belief.trust(Some("gyro-scale"), &[0], 1e6);
         let of_a_small_one = belief.trust(Some("gyro-scale"), &[0], 3e2);
         assert!(of_a_large_effect > 0.99, "{of_a_large_effect}");
         assert!(of_a_small_one < 0.4, "{of_a_small_one}");
         let hardly = left(0.5);
-        assert!(Belief::of(&hardly, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 1e3) > 0.94);
+        assert!(Belief::of(&hardly, None, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 1e3) > 0.94);
     }
 
     fn aspect(channels: &[usize], effect: Option<&str>, size: f64) -> Aspect {
@@ -238,7 +286,7 @@ mod tests {
             ..left(1e-9)
         };
         let trust = |left: &Leftover, channel: usize| {
-            Belief::of(left, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[channel], 1e2)
+            Belief::of(left, None, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[channel], 1e2)
         };
         let in_another = surely(vec![aspect(&[0], None, 12.0)]);
         assert!(trust(&in_another, 0) < 0.2 && trust(&in_another, 1) > 0.94);
@@ -256,7 +304,7 @@ mod tests {
             aspects: vec![aspect(&[0], None, 5.0)],
             ..left(1e-4)
         };
-        let trust = |loud: f64| Belief::of(&barely, &[loud, 0.0], &[]).trust(Some("current-field"), &[0], 2e3);
+        let trust = |loud: f64| Belief::of(&barely, None, &[loud, 0.0], &[]).trust(Some("current-field"), &[0], 2e3);
         assert!(
             trust(0.0) > 0.8 && trust(200.0) < 0.4,
             "{} {}",
@@ -266,11 +314,12 @@ mod tests {
     }
 
     #[test]
-    fn a_promise_that_one_cause_breaks_is_doubt_of_all() {
+    fn a_promise_that_one_cause_breaks_is_doubt_of_all_in_its_channels() {
         let promised = |factor: f64| {
             let promise = Promise { factor, sigma: 0.05 };
             Promised {
                 effect: "gyro-scale",
+                channels: vec![0, 1],
                 promise: Some(promise),
                 confidence: promise.confidence(),
                 believed: 1.0,
@@ -279,7 +328,7 @@ mod tests {
         };
         let hardly = left(0.5);
         let judged = |promises: &[Promised]| {
-            let belief = Belief::of(&hardly, &[0.0; 2], promises);
+            let belief = Belief::of(&hardly, None, &[0.0; 2], promises);
             (belief.unknown(), belief.trust(Some("gyro-scale"), &[0], 300.0))
         };
         let (unknown, trust) = judged(&[promised(1.1)]);
@@ -292,5 +341,11 @@ mod tests {
         assert!(unknown < 0.2 && trust > 0.85, "{unknown} {trust}");
         let (unknown, trust) = judged(&[promised(1.0), promised(-0.2)]);
         assert!(unknown > 0.99 && trust < 0.15, "{unknown} {trust}");
+        let elsewhere = Promised {
+            channels: vec![1],
+            ..promised(-0.2)
+        };
+        let (unknown, trust) = judged(&[promised(1.0), elsewhere]);
+        assert!(unknown > 0.99 && trust > 0.94, "{unknown} {trust}");
     }
 }

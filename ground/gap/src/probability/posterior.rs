@@ -15,6 +15,7 @@ use crate::{
         cause::{Cause, cause_of_scatter, causes_of},
         contribution,
         doubt::{Belief, Promised, beyond_reference, promises, second_keys},
+        importance::Importance,
     },
     search::{explanation::Explanation, odds::alternatives},
     thresholds::{NOISE_TAILS, SAID},
@@ -52,11 +53,17 @@ impl Believed {
         contribution::settle(problem, library, &explanation.found, &mut causes);
         let mut imitated = contribution::imitated(problem, &explanation.model);
         imitated.truncate(causes.len());
-        beyond_reference(problem, &subject.slow, &explanation.model, &mut causes);
+        let importance = Importance::of(subject, problem, explanation).filter(|_| !causes.is_empty());
+        let beyond = beyond_reference(problem, &subject.slow, explanation, importance.as_ref(), &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
         let loud = loud(problem, explanation, floor);
-        let belief = Belief::of(left, &loud, &promises);
+        if let Some(importance) = &importance {
+            (causes.iter_mut().zip(&importance.matters)).for_each(|(cause, matters)| cause.probability *= matters);
+        }
+        let courses = importance.as_ref().map(|importance| importance.courses.as_slice());
+        let belief = Belief::of(left, courses, &loud, &promises);
+        let on_readings = causes.len();
         let scatter = explanation.scatter.as_ref();
         causes.extend(scatter.map(|scatter| {
             let sigmas = scatter.sigmas(problem, &explanation.beneath);
@@ -70,23 +77,25 @@ impl Believed {
             Texture::Louder | Texture::Walk => whole,
             _ => whole - of_readings,
         });
-        let explained = imitated.into_iter().zip(&causes);
-        let explained = explained.map(|(whole, cause)| whole.max(2.0 * cause.gain));
+        let worth = beyond.into_iter().chain(std::iter::repeat(0.0));
+        let explained = imitated.into_iter().zip(&causes).zip(worth);
+        let explained = explained.map(|((whole, cause), nats)| whole.max(2.0 * cause.gain).max(2.0 * nats));
         let explained: Vec<f64> = explained.chain(of_scatter).collect();
-        belief.weigh(&mut causes, &explained);
+        belief.weigh(&mut causes, &explained, on_readings);
         one_name(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.
         let (causes, unnamed) = causes.into_iter().partition(|cause| cause.any() >= SAID);
+        let trust = match explanation.found.chosen.is_empty() {
+            true => 1.0 - belief.unknown(),
+            false => belief.trust(None, &(0..problem.frames.len()).collect::<Vec<_>>(), whole),
+        };
         Believed {
             causes,
             unnamed,
             keys,
             promises,
-            trust: match explanation.found.chosen.is_empty() {
-                true => 1.0 - belief.unknown(),
-                false => belief.trust(None, &(0..problem.frames.len()).collect::<Vec<_>>(), whole),
-            },
+            trust,
         }
     }
 

@@ -21,6 +21,7 @@ use crate::{
     },
     search::{
         bias_walk::Walk,
+        gauss_newton::refine,
         odds::probability_of_any,
         readings::{Attribution, Chosen, attribute},
         scatter::{Scatter, scatters},
@@ -183,6 +184,25 @@ impl Explanation {
     /// Square root of the energy that the model takes off the fit windows.
     pub fn signal_to_noise(&self, quiet: &Model) -> f64 {
         (quiet.left() - self.model.left()).max(0.0).sqrt()
+    }
+
+    /// Takes one more effect on readings in, and fits all of them anew.
+    pub fn add(&mut self, problem: &Problem, library: &Library, chosen: Chosen) {
+        self.found.chosen.push(chosen);
+        let set: Vec<usize> = self.found.chosen.iter().map(|chosen| chosen.hypothesis).collect();
+        let start: Vec<DVector<f64>> = self.found.chosen.iter().map(|chosen| chosen.theta.clone()).collect();
+        let refined = refine(problem, library, &set, &start);
+        (self.found.chosen.iter_mut().zip(refined.thetas)).for_each(|(chosen, theta)| chosen.theta = theta);
+        self.model = Model::around(problem, self.found.model(library));
+        self.beneath.clone_from(&self.model.predicted);
+        match &self.scatter {
+            Some(scatter) => {
+                for channel in &scatter.channels {
+                    self.model.predicted[*channel] = scatter.expected(problem, *channel, &self.beneath[*channel]);
+                }
+            }
+            None => self.louder.fill(1.0),
+        }
     }
 
     /// Takes every effect back; returns their names.

@@ -14,7 +14,7 @@ use twin::predict::Kind;
 
 use super::{
     fast::{Fast, excesses},
-    slow::{Slow, Where, discrepancies},
+    slow::{Beside, Slow, Where},
 };
 use crate::{
     input::case::{Bars, SlowErrors},
@@ -89,17 +89,33 @@ impl Default for Remainder {
     }
 }
 
+/// The slow courses that a model leaves, or leaves without one of its effects, each with its evidence and size.
+pub fn courses(problem: &Problem, beside: &Beside, setting: &Setting, without: Option<usize>) -> Vec<Slow> {
+    beside.courses(without, &|slow| bar(problem, slow, setting))
+}
+
+/// Probability that one of several slow courses is there, and that it is there and above its bar.
+pub fn judged(problem: &Problem, slow: &Slow, setting: &Setting, several: usize) -> [f64; 2] {
+    let present = present(slow.posterior.log_bayes_factor, several);
+    [present, present * slow.posterior.above(bar(problem, slow, setting))]
+}
+
+/// Probability of one of several discrepancies, which share even odds, by the ln of its own odds.
+fn present(log_bayes_factor: f64, several: usize) -> f64 {
+    1.0 / (1.0 + several.max(1) as f64 * (-log_bayes_factor).exp())
+}
+
 /// What a model leaves.
 pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Remainder {
-    let slow = discrepancies(problem, model, setting, &|slow| bar(problem, slow, setting));
+    let beside = Beside::of(problem, model, setting, None);
+    let slow = beside.map_or_else(Vec::new, |beside| courses(problem, &beside, setting, None));
     let fast = excesses(problem, model, floor, setting.louder).into_iter();
     let fast: Vec<Fast> = fast.filter(|fast| !setting.scattered.contains(&fast.channel)).collect();
-    let hypotheses = (slow.len() + fast.len()).max(1) as f64;
-    let present = |log_bayes_factor: f64| 1.0 / (1.0 + hypotheses * (-log_bayes_factor).exp());
+    let several = slow.len() + fast.len();
     let of_slow = slow.iter().map(|slow| {
         let bar = bar(problem, slow, setting);
         let size = QUANTILES.map(|share| slow.posterior.quantile(share));
-        let present = present(slow.posterior.log_bayes_factor);
+        let [present, matters] = judged(problem, slow, setting, several);
         Remainder {
             present,
             log_bayes_factor: slow.posterior.log_bayes_factor,
@@ -109,14 +125,14 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
             unit: unit(problem, slow.place),
             sigma: size.map(|size| size * slow.sigmas_per_unit),
             attitude_deg: degrees(problem, slow.place).map(|degrees| size.map(|size| size * degrees)),
-            matters: present * slow.posterior.above(bar),
+            matters,
             bar_over_size: bar / size[1],
         }
     });
     let of_fast = fast.iter().map(|fast| {
         let bar = (fast.floor.sqrt() + setting.bars.gap_sigma).powi(2) - fast.floor + REFERENCE_KNOWN * fast.reference;
         let sigma = GAUSSIAN.map(|many| (fast.excess + many * fast.error).max(0.0).sqrt());
-        let present = present(fast.log_bayes_factor);
+        let present = present(fast.log_bayes_factor, several);
         Remainder {
             present,
             log_bayes_factor: fast.log_bayes_factor,

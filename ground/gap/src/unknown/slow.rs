@@ -1,27 +1,35 @@
 //! Slow courses that a model leaves: in one sensor, in all of a kind, as a rotation, a factor, a delay.
 //!
-//! In: the problem, the model's effects with their parameters, how reference and field err slowly. Out: for each such discrepancy its
-//! [`Posterior`]. Calibration, field, its gradient and the effects' parameters are open beside it with their prior sigmas; attitude error
+//! In: the problem, the model's effects with their parameters, how reference and field err slowly. Out: [`Beside`], and of it for each such
+//! discrepancy its [`Posterior`], with the whole model and without one of its effects; and what [`effects`] of the library are worth there.
+//! Calibration, field, its gradient and the effects' parameters are open beside it with their prior sigmas; attitude error
 //! of the reference, field error and wandering zeros are taken out by [`crate::null::whitening`].
 //!
 //! Channels that share no state are whitened by themselves, and their normal equations added ([`normal`]).
 
+mod effects;
 mod normal;
 mod open;
 
-use nalgebra::Cholesky;
+use std::ops::Range;
+
+use nalgebra::DMatrix;
 use twin::predict::{Feel, Kind};
 
 use self::{
-    normal::{Pass, Sums, sets},
-    open::{Open, open_columns},
+    effects::{Asked, asked},
+    normal::{Pass, Sums, Tried},
+    open::open_columns,
 };
 use super::{
     binned::{BINS, Binned},
     discrepancy::{Posterior, courses},
     remainder::Setting,
 };
-use crate::null::{model::Model, problem::Problem, wander::felt_b};
+use crate::{
+    library::hypotheses::Library,
+    null::{model::Model, problem::Problem, wander::felt_b},
+};
 
 /// Courses in time: the last has a period of a sixteenth of the log.
 const COURSES: usize = 32;
@@ -80,7 +88,8 @@ pub struct Slow {
 /// What a channel has.
 struct Seen {
     binned: Binned,
-    residual: Vec<f64>,
+    /// What the whole model leaves, and what it leaves without each of its effects.
+    residuals: Vec<Vec<f64>>,
     /// What the unit does at each of its samples.
     feels: Vec<Feel>,
     /// Its reading's slope by the instant, and its reading without the zero.
@@ -88,69 +97,114 @@ struct Seen {
     reading: Vec<f64>,
 }
 
-/// All of a model; `about` is the size, in physical units, about which the grid of sizes is.
-pub fn discrepancies(problem: &Problem, model: &Model, setting: &Setting, about: &dyn Fn(&Slow) -> f64) -> Vec<Slow> {
-    let errors = setting.slow;
-    let channels = &problem.twin.unit().channels;
-    let rows = problem.fitted_rows();
-    let starts_s = problem.twin.starts_s();
-    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
-        return Vec::new();
-    };
-    let span_s = [starts_s[*first], starts_s[*last]];
-    let seen: Vec<Seen> = (0..channels.len())
-        .map(|channel| see(problem, model, channel, span_s, setting))
-        .collect();
-    // A course runs over the time that there are samples of.
+/// What a model leaves, with all that is open beside it marginalised.
+pub struct Beside {
+    sums: Sums,
+    /// Places of slow courses.
+    found: Vec<Slow>,
+    /// Courses of each.
+    count: usize,
+    /// Which open parameters are each effect's of the model.
+    of_effect: Vec<Range<usize>>,
+    /// Effects of the library, tried after the courses.
+    asked: Vec<Asked>,
+}
+
+impl Beside {
+    /// Of a model; with a library its effects are tried too. `None` where there is no sample.
+    pub fn of(problem: &Problem, model: &Model, setting: &Setting, library: Option<&Library>) -> Option<Self> {
+        let errors = setting.slow;
+        let channels = &problem.twin.unit().channels;
+        let rows = problem.fitted_rows();
+        let starts_s = problem.twin.starts_s();
+        let span_s = [starts_s[*rows.first()?], starts_s[*rows.last()?]];
+        let seen: Vec<Seen> = (0..channels.len())
+            .map(|channel| see(problem, model, channel, span_s, setting))
+            .collect();
+        let phases = phases(&seen);
+        let count = COURSES.min(phases.1 / BINS_A_COURSE).max(1);
+        let open = open_columns(problem, model, errors, &seen);
+        let mut found: Vec<Slow> = hypotheses(problem).map(|place| slow(problem, &seen, place)).collect();
+        found.retain(|slow| {
+            slow.channels
+                .iter()
+                .any(|channel| !seen[*channel].residuals[0].is_empty())
+        });
+        let asked = library.map_or_else(Vec::new, asked);
+        let of_place = |slow: &Slow| Tried {
+            channels: slow.channels.clone(),
+            width: count * slow.place.components(),
+            of_channel: {
+                let (seen, phases, place) = (&seen, &phases.0, slow.place);
+                Box::new(move |channel| of_course(problem, &seen[channel], channel, place, phases, count))
+            },
+        };
+        let mut tried: Vec<Tried> = found.iter().map(of_place).collect();
+        if let Some(library) = library {
+            tried.extend(asked.iter().map(|asked| asked.tried(problem, library, &seen)));
+        }
+        let pass = Pass {
+            problem,
+            errors,
+            seen: &seen,
+            open: &open,
+            tried: &tried,
+            step_s: (span_s[1] - span_s[0]) / BINS as f64,
+        };
+        let sums = pass.sums();
+        drop(tried);
+        Some(Beside {
+            sums,
+            found,
+            count,
+            of_effect: open.of_effect,
+            asked,
+        })
+    }
+
+    /// The slow courses, with the whole model or without one of its effects; `about` is the size, in physical units, about which the grid
+    /// of sizes is.
+    pub fn courses(&self, without: Option<usize>, about: &dyn Fn(&Slow) -> f64) -> Vec<Slow> {
+        let dropped = without.map_or(0..0, |effect| self.of_effect[effect].clone());
+        let Some(marginal) = self.sums.without(dropped) else {
+            return Vec::new();
+        };
+        let residual = without.map_or(0, |effect| effect + 1);
+        let (_, scales) = courses(self.count);
+        let mut found = self.found.clone();
+        for (at, slow) in found.iter_mut().enumerate() {
+            let (information, score) = marginal.of(at, residual);
+            let share = (slow.place.components() as f64).sqrt().recip();
+            let scales: Vec<f64> = (0..slow.place.components())
+                .flat_map(|_| scales.iter().map(|scale| scale * share))
+                .collect();
+            slow.posterior = Posterior::of(information, &score, &scales, about(slow));
+        }
+        found
+    }
+}
+
+impl Beside {
+    /// \[nats\] that an effect of the model is worth.
+    pub fn worth(&self, effect: usize) -> f64 {
+        let fixed = self.sums.without(self.of_effect[effect].clone());
+        fixed.map_or(0.0, |fixed| 0.5 * (fixed.energy(effect + 1) - fixed.energy(0)))
+    }
+}
+
+/// Of each stretch of the log, how far the courses have run there, 0 to 1, and how many stretches have samples: a course runs over the time
+/// that there are samples of.
+fn phases(seen: &[Seen]) -> (Vec<f64>, usize) {
     let mut is_there = vec![false; BINS];
     (seen.iter().flat_map(|seen| &seen.binned.bins)).for_each(|bin| is_there[*bin] = true);
     let there = is_there.iter().filter(|is_there| **is_there).count();
     let mut before = 0.0;
-    let phases: Vec<f64> = (is_there.iter())
-        .map(|is_there| {
-            let phase = (before + 0.5) / there as f64;
-            before += f64::from(u8::from(*is_there));
-            phase
-        })
-        .collect();
-    let count = COURSES.min(there / BINS_A_COURSE).max(1);
-    let open = open_columns(problem, model, errors, &seen);
-    let mut found: Vec<Slow> = hypotheses(problem).map(|place| slow(problem, &seen, place)).collect();
-    found.retain(|slow| slow.channels.iter().any(|channel| !seen[*channel].residual.is_empty()));
-    let mut sums = Sums::none(open.len(), &found, count);
-    let pass = Pass {
-        problem,
-        errors,
-        seen: &seen,
-        open: &open,
-        found: &found,
-        phases: &phases,
-        count,
-        step_s: (span_s[1] - span_s[0]) / BINS as f64,
-    };
-    for set in sets(problem, errors) {
-        pass.add(&set, &mut sums);
-    }
-    let Some(factor) = Cholesky::new(sums.open) else {
-        return Vec::new();
-    };
-    let (_, scales) = courses(count);
-    for (slow, (own, with_open, pull)) in found.iter_mut().zip(sums.own) {
-        let solved = factor.solve(&with_open);
-        let information = own - with_open.tr_mul(&solved);
-        let score = pull - solved.tr_mul(&sums.pull);
-        let share = (slow.place.components() as f64).sqrt().recip();
-        let scales: Vec<f64> = (0..slow.place.components())
-            .flat_map(|_| scales.iter().map(|scale| scale * share))
-            .collect();
-        slow.posterior = Posterior::of(
-            0.5 * (&information + information.transpose()),
-            &score,
-            &scales,
-            about(slow),
-        );
-    }
-    found
+    let phases = is_there.iter().map(|is_there| {
+        let phase = (before + 0.5) / there as f64;
+        before += f64::from(u8::from(*is_there));
+        phase
+    });
+    (phases.collect(), there)
 }
 
 fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setting: &Setting) -> Seen {
@@ -169,12 +223,19 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
     binned.variances.iter_mut().for_each(|variance| *variance *= factor);
     let predicted = problem.predict(channel, &model.components);
     let rows = &frame.series.rows;
-    let residual = binned.means(|sample| frame.series.values[sample] - predicted[rows[sample] as usize]);
+    let left =
+        |predicted: &[f64]| binned.means(|sample| frame.series.values[sample] - predicted[rows[sample] as usize]);
+    let mut residuals = vec![left(&predicted)];
+    residuals.extend((0..model.components.len()).map(|without| {
+        let mut others = model.components.clone();
+        others.remove(without);
+        left(&problem.predict(channel, &others))
+    }));
     let feels = problem.true_twin().feels(channel);
     let by_instant = problem.true_twin().by_instant(channel);
     let at = |series: &[f64], zero: f64| rows.iter().map(|row| series[*row as usize] - zero).collect();
     Seen {
-        residual,
+        residuals,
         by_instant: at(&by_instant, 0.0),
         reading: at(&predicted, own.bias),
         feels: rows.iter().map(|row| feels[*row as usize]).collect(),
@@ -215,6 +276,29 @@ fn design(problem: &Problem, seen: &Seen, channel: usize, place: Where, sample: 
         Where::Factor(_) => [seen.reading[sample], 0.0, 0.0],
         Where::Delay(_) => [-seen.by_instant[sample], 0.0, 0.0],
     }
+}
+
+/// The columns of a discrepancy at the means of a channel: its components, each with all courses.
+fn of_course(
+    problem: &Problem,
+    seen: &Seen,
+    channel: usize,
+    place: Where,
+    phases: &[f64],
+    count: usize,
+) -> DMatrix<f64> {
+    let (course, scales) = courses(count);
+    let components = place.components();
+    let share = (components as f64).sqrt().recip();
+    let means = |component: usize| {
+        seen.binned
+            .means(|sample| design(problem, seen, channel, place, sample)[component])
+    };
+    let designs: Vec<Vec<f64>> = (0..components).map(means).collect();
+    DMatrix::from_fn(seen.binned.bins.len(), count * components, |mean, column| {
+        let k = column % count;
+        share * scales[k] * course(k, phases[seen.binned.bins[mean]]) * designs[column / count][mean]
+    })
 }
 
 fn slow(problem: &Problem, seen: &[Seen], place: Where) -> Slow {

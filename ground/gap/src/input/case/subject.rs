@@ -129,7 +129,7 @@ impl Subject {
             let scene = Scene::new(motion, &environment, from_s, to_s, step_s);
             Twin::new(unit.clone(), environment, scene, starts_s.to_vec())
         };
-        let stated = accuracy(&opened);
+        let stated = accuracy(&opened, &slow);
         let (twin, reference) = if is_exact {
             (along(&record, &start_s)?, Reference::stated(stated))
         } else {
@@ -197,7 +197,7 @@ impl Subject {
         let starts_s = (0..used.len()).map(|row| row as f64).collect();
         Ok(Subject {
             twin: Twin::new(unit, environment, Scene::table(&used), starts_s)?,
-            reference: Reference::stated(accuracy(&opened)),
+            reference: Reference::stated(accuracy(&opened, &slow)),
             slow,
             bars,
             opened,
@@ -223,9 +223,10 @@ impl Subject {
     }
 }
 
-fn accuracy(opened: &Opened) -> Accuracy {
+fn accuracy(opened: &Opened, slow: &SlowErrors) -> Accuracy {
     Accuracy {
-        attitude_sigma_rad: opened.text.reference.attitude_sigma_rad,
+        attitude_sigma_rad: slow.attitude_sigma_rad,
+        attitude_correlation_s: slow.attitude_correlation_s,
         position_sigma_m: opened.text.reference.position_sigma_m,
         field_sigma_ut: opened.text.environment.field_sigma_ut,
     }

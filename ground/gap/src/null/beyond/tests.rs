@@ -89,6 +89,7 @@ fn worth_in(
     };
     let accuracy = Accuracy {
         attitude_sigma_rad,
+        attitude_correlation_s: 20.0,
         position_sigma_m,
         field_sigma_ut: 0.0,
     };

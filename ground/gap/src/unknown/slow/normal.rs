@@ -1,12 +1,15 @@
-//! The normal equations of slow courses, set by set of channels that share a state.
+//! The normal equations of columns that are tried, set by set of channels that share a state.
 //!
-//! In: what each channel has ([`Seen`]), what is open beside the courses ([`Open`]). Out: [`Sums`], to which each set adds what its own
-//! pass of [`crate::null::whitening`] says.
+//! In: what each channel has ([`Seen`]), what is open beside them ([`Open`]), and what is [`Tried`]. Out: [`Sums`], to which each set adds
+//! what its own pass of [`crate::null::whitening`] says, and of these the information and the score of what is tried with all else
+//! marginalised.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::predict::Kind;
 
-use super::{Open, Seen, Slow, courses, design};
+use super::{Seen, open::Open};
 use crate::{
     input::case::SlowErrors,
     null::{
@@ -22,31 +25,80 @@ const WALKS: [f64; 3] = [3e-4, 1e-6, 2e-3];
 /// States that a set of several channels shares: three axes of the attitude, three of the field.
 const SHARED: usize = 6;
 
-/// The normal equations of the discrepancies beside what is open.
+/// Columns that are tried beside what is open.
+pub(super) struct Tried<'a> {
+    /// Where they are not zero.
+    pub channels: Vec<usize>,
+    /// How many.
+    pub width: usize,
+    /// At the means of one of those channels, a mean a row.
+    pub of_channel: Box<dyn Fn(usize) -> DMatrix<f64> + 'a>,
+}
+
+/// The normal equations of what is tried beside what is open, for several residuals.
 pub(super) struct Sums {
-    /// Of what is open, with itself and with the residual.
-    pub open: DMatrix<f64>,
-    pub pull: DVector<f64>,
-    /// Of each discrepancy: with itself, with what is open, with the residual.
-    pub own: Vec<(DMatrix<f64>, DMatrix<f64>, DVector<f64>)>,
+    /// Of what is open, with itself and with the residuals.
+    open: DMatrix<f64>,
+    pull: DMatrix<f64>,
+    /// Energy of each residual.
+    energies: Vec<f64>,
+    /// Of what is tried, one after the other: with itself, with what is open, with the residuals.
+    own: Vec<(DMatrix<f64>, DMatrix<f64>, DMatrix<f64>)>,
 }
 
 impl Sums {
     /// Nothing but the prior of what is open.
-    pub fn none(open: usize, found: &[Slow], count: usize) -> Self {
-        let of_slow = |slow: &Slow| {
-            let width = count * slow.place.components();
+    fn none(open: usize, residuals: usize, tried: &[Tried]) -> Self {
+        let of_tried = |tried: &Tried| {
             (
-                DMatrix::zeros(width, width),
-                DMatrix::zeros(open, width),
-                DVector::zeros(width),
+                DMatrix::zeros(tried.width, tried.width),
+                DMatrix::zeros(open, tried.width),
+                DMatrix::zeros(tried.width, residuals),
             )
         };
         Sums {
             open: DMatrix::identity(open, open),
-            pull: DVector::zeros(open),
-            own: found.iter().map(of_slow).collect(),
+            pull: DMatrix::zeros(open, residuals),
+            energies: vec![0.0; residuals],
+            own: tried.iter().map(of_tried).collect(),
         }
+    }
+
+    /// What is open, factored, but for some of it that is not there.
+    pub fn without(&self, dropped: Range<usize>) -> Option<Marginal<'_>> {
+        let kept: Vec<usize> = (0..self.open.nrows()).filter(|at| !dropped.contains(at)).collect();
+        let open = self.open.select_rows(&kept).select_columns(&kept);
+        Some(Marginal {
+            sums: self,
+            factor: Cholesky::new(open)?,
+            kept,
+        })
+    }
+}
+
+/// Normal equations with what is open marginalised.
+pub(super) struct Marginal<'a> {
+    sums: &'a Sums,
+    kept: Vec<usize>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Marginal<'_> {
+    /// Energy of a residual, in squares of noise.
+    pub fn energy(&self, residual: usize) -> f64 {
+        let pull = self.sums.pull.select_rows(&self.kept).column(residual).into_owned();
+        self.sums.energies[residual] - pull.dot(&self.factor.solve(&pull))
+    }
+
+    /// Information and score of one that was tried, against one residual.
+    pub fn of(&self, tried: usize, residual: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let (own, with_open, pull) = &self.sums.own[tried];
+        let with_open = with_open.select_rows(&self.kept);
+        let open_pull = self.sums.pull.select_rows(&self.kept);
+        let solved = self.factor.solve(&with_open);
+        let information = own - with_open.tr_mul(&solved);
+        let score = pull.column(residual) - solved.tr_mul(&open_pull.column(residual));
+        (0.5 * (&information + information.transpose()), score)
     }
 }
 
@@ -56,11 +108,7 @@ pub(super) struct Pass<'a> {
     pub errors: &'a SlowErrors,
     pub seen: &'a [Seen],
     pub open: &'a Open,
-    pub found: &'a [Slow],
-    /// Of each stretch of the log, how far the courses have run there, 0 to 1.
-    pub phases: &'a [f64],
-    /// How many courses.
-    pub count: usize,
+    pub tried: &'a [Tried<'a>],
     /// \[s\] a stretch.
     pub step_s: f64,
 }
@@ -74,28 +122,41 @@ struct Mean {
 }
 
 impl Pass<'_> {
-    /// Adds the normal equations of one set of channels.
-    pub fn add(&self, set: &[usize], sums: &mut Sums) {
+    /// The normal equations of all sets of channels.
+    pub fn sums(&self) -> Sums {
+        let residuals = self.seen.first().map_or(0, |seen| seen.residuals.len());
+        let mut sums = Sums::none(self.open.columns.len(), residuals, self.tried);
+        for set in sets(self.problem, self.errors) {
+            self.add(&set, &mut sums);
+        }
+        sums
+    }
+
+    /// Adds those of one set.
+    fn add(&self, set: &[usize], sums: &mut Sums) {
         let means = self.means(set);
         let (processes, shared) = self.processes(set);
         let whitening = Whitening::new(&processes, &self.samples(set, &means, &processes, shared));
-        let touching: Vec<usize> = (0..self.open.len())
-            .filter(|at| self.open[*at].iter().any(|(channel, _)| set.contains(channel)))
+        let touching: Vec<usize> = (0..self.open.columns.len())
+            .filter(|at| self.open.columns[*at].iter().any(|(channel, _)| set.contains(channel)))
             .collect();
         let white = whitening.whiten(&self.beside(set, &means, &touching));
-        let (white_open, white_residual) = (white.columns(0, touching.len()), white.column(touching.len()));
-        let (own, pull) = (white_open.tr_mul(&white_open), white_open.tr_mul(&white_residual));
+        let white_open = white.columns(0, touching.len());
+        let white_residuals = white.columns(touching.len(), sums.pull.ncols());
+        let (own, pull) = (white_open.tr_mul(&white_open), white_open.tr_mul(&white_residuals));
+        (sums.energies.iter_mut().zip(white_residuals.column_iter())).for_each(|(sum, own)| *sum += own.norm_squared());
         for (row, one) in touching.iter().enumerate() {
-            sums.pull[*one] += pull[row];
+            let mut sum = sums.pull.row_mut(*one);
+            sum += pull.row(row);
             (touching.iter().enumerate()).for_each(|(column, other)| sums.open[(*one, *other)] += own[(row, column)]);
         }
-        for (slow, (own, with_open, pull)) in self.found.iter().zip(&mut sums.own) {
-            if !set.iter().any(|channel| slow.channels.contains(channel)) {
+        for (tried, (own, with_open, pull)) in self.tried.iter().zip(&mut sums.own) {
+            if !set.iter().any(|channel| tried.channels.contains(channel)) {
                 continue;
             }
-            let white = whitening.whiten(&self.of_slow(slow, set, &means));
+            let white = whitening.whiten(&of_set(tried, set, &means));
             *own += white.tr_mul(&white);
-            *pull += white.tr_mul(&white_residual);
+            *pull += white.tr_mul(&white_residuals);
             let cross = white_open.tr_mul(&white);
             for (row, at) in touching.iter().enumerate() {
                 let mut sum = with_open.row_mut(*at);
@@ -157,13 +218,14 @@ impl Pass<'_> {
         means.iter().map(sample).collect()
     }
 
-    /// The columns of what is open and touches the set, and the residual as the last.
+    /// The columns of what is open and touches the set, and the residuals after them.
     fn beside(&self, set: &[usize], means: &[Mean], touching: &[usize]) -> DMatrix<f64> {
-        let mut columns = DMatrix::zeros(means.len(), touching.len() + 1);
+        let residuals = self.seen[set[0]].residuals.len();
+        let mut columns = DMatrix::zeros(means.len(), touching.len() + residuals);
         for (column, at) in touching.iter().enumerate() {
             let of_place: Vec<Option<&Vec<f64>>> = (set.iter())
                 .map(|channel| {
-                    self.open[*at]
+                    self.open.columns[*at]
                         .iter()
                         .find(|(own, _)| own == channel)
                         .map(|(_, means)| means)
@@ -174,40 +236,29 @@ impl Pass<'_> {
             }
         }
         for (row, mean) in means.iter().enumerate() {
-            columns[(row, touching.len())] = self.seen[set[mean.place]].residual[mean.own];
-        }
-        columns
-    }
-
-    /// The columns of a discrepancy: its components, each with all courses.
-    fn of_slow(&self, slow: &Slow, set: &[usize], means: &[Mean]) -> DMatrix<f64> {
-        let (course, scales) = courses(self.count);
-        let components = slow.place.components();
-        let share = (components as f64).sqrt().recip();
-        let mut columns = DMatrix::zeros(means.len(), self.count * components);
-        let theirs = |(_, channel): &(usize, &usize)| slow.channels.contains(channel);
-        for (place, channel) in set.iter().enumerate().filter(theirs) {
-            let seen = &self.seen[*channel];
-            let of_component = |component: usize| {
-                let of = |sample: usize| design(self.problem, seen, *channel, slow.place, sample)[component];
-                seen.binned.means(of)
-            };
-            let designs: Vec<Vec<f64>> = (0..components).map(of_component).collect();
-            for (row, mean) in means.iter().enumerate().filter(|(_, mean)| mean.place == place) {
-                for (component, designs) in designs.iter().enumerate() {
-                    for (k, scale) in scales.iter().enumerate() {
-                        columns[(row, component * self.count + k)] =
-                            share * scale * course(k, self.phases[mean.bin]) * designs[mean.own];
-                    }
-                }
+            for (at, residual) in self.seen[set[mean.place]].residuals.iter().enumerate() {
+                columns[(row, touching.len() + at)] = residual[mean.own];
             }
         }
         columns
     }
 }
 
+/// The columns of what is tried at the means of a set.
+fn of_set(tried: &Tried, set: &[usize], means: &[Mean]) -> DMatrix<f64> {
+    let of_place = |channel: &usize| tried.channels.contains(channel).then(|| (tried.of_channel)(*channel));
+    let of_place: Vec<Option<DMatrix<f64>>> = set.iter().map(of_place).collect();
+    let mut columns = DMatrix::zeros(means.len(), tried.width);
+    for (row, mean) in means.iter().enumerate() {
+        if let Some(own) = &of_place[mean.place] {
+            columns.row_mut(row).copy_from(&own.row(mean.own));
+        }
+    }
+    columns
+}
+
 /// Channels that share a state, together; the others by themselves.
-pub(super) fn sets(problem: &Problem, errors: &SlowErrors) -> Vec<Vec<usize>> {
+fn sets(problem: &Problem, errors: &SlowErrors) -> Vec<Vec<usize>> {
     let (mut together, mut sets) = (Vec::new(), Vec::new());
     for (channel, own) in problem.twin.unit().channels.iter().enumerate() {
         let is_shared = match own.sensor {
