@@ -244,7 +244,7 @@ pub fn promises(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::unknown::adequacy::Aspect;
+    use crate::unknown::{adequacy::Aspect, discrepancy::Posterior, slow::Where};
 
     fn left(p: f64) -> Leftover {
         Leftover {
@@ -296,6 +296,29 @@ mod tests {
         assert!(trust(&of_its_law, 0) < 0.2);
         let less = surely(vec![aspect(&[0], None, 12.0), aspect(&[1], None, 6.0)]);
         assert!(trust(&less, 0) < trust(&less, 1) && trust(&less, 1) < 0.5);
+    }
+
+    #[test]
+    fn beside_a_reference_that_errs_slow_courses_speak_against_a_name_and_what_is_merely_significant_does_not() {
+        let surely = left(1e-9);
+        let trust = |channel: usize, nats: f64| {
+            let course = Slow {
+                place: Where::Sensor(channel),
+                channels: vec![channel],
+                sigmas_per_unit: 1.0,
+                posterior: Posterior {
+                    log_bayes_factor: nats,
+                    sizes: Vec::new(),
+                },
+            };
+            let courses = [course];
+            let belief = Belief::of(&surely, Some(&courses), &[0.0; 2], &[]);
+            belief.trust_beside_reference(&courses, &[0], 100.0)
+        };
+        assert!(trust(0, -1.0) > 0.99 && trust(1, 40.0) > 0.99);
+        assert!(trust(0, 40.0) < 0.1, "{}", trust(0, 40.0));
+        let hardly = Belief::of(&surely, None, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 100.0);
+        assert!(hardly < 0.15, "{hardly}");
     }
 
     #[test]

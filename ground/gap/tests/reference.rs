@@ -1,0 +1,71 @@
+//! Names beside a reference that errs slowly: three gyros whose table is told to 3 mrad.
+
+mod gyros;
+
+use std::fs;
+
+use gap::{
+    input::case::Subject,
+    library::hypotheses::Library,
+    null::{model::Model, problem::Problem},
+    search::readings::Chosen,
+    unknown::{recognised::recognised, remainder::Setting},
+};
+use gyros::{diagnosed_in, erring, rate};
+use tempfile::TempDir;
+
+/// gz reads `error` [rad/s] of the time \[s\] too much.
+fn beside_reference(error: impl Fn(f64) -> f64) -> TempDir {
+    let folder = erring(error, "");
+    let file = folder.path().join("case.toml");
+    let case = fs::read_to_string(&file).expect("a file");
+    let reference = "[reference]\nattitude_sigma_rad = 0.003\nattitude_correlation_s = 20.0\n";
+    fs::write(&file, case + reference).expect("a file");
+    folder
+}
+
+/// What is recognised where nothing was found, by name.
+fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, Chosen)> {
+    let folder = beside_reference(error);
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let library = Library::new(&problem, &[], &|_| {});
+    let setting = Setting {
+        slow: &subject.slow,
+        bars: &subject.bars,
+        louder: &[1.0; 3],
+        scattered: &[],
+        wandering: &[],
+    };
+    let quiet = Model::around(&problem, Vec::new());
+    let chosen = recognised(&problem, &library, &quiet, &[], &setting)?;
+    Some((library.hypotheses[chosen.hypothesis].effect(), chosen))
+}
+
+/// A bias is one number, and a free course that says the same has thirty-two.
+#[test]
+fn a_slow_error_with_the_law_of_an_effect_is_recognised_and_another_is_not() {
+    let (name, chosen) = seen(|_| 0.01).expect("a bias of ten sigmas");
+    assert_eq!(name, "gyro-bias");
+    // The calibration takes up its part: a twenty-sixth, for the prior that fits best is five of its sigmas.
+    assert!((chosen.theta[0] - 0.01).abs() < 0.001, "{}", chosen.theta);
+    assert!(chosen.rivals.iter().any(|rival| !rival.is_named));
+    // No effect switches its sign twice at instants of its own.
+    let switched = |t_s: f64| if (37.0..81.0).contains(&t_s) { 0.01 } else { -0.01 };
+    let other = seen(switched).map(|(name, _)| name);
+    assert_eq!(other, None);
+    assert!(seen(|_| 0.0).is_none());
+}
+
+/// A gyro that bends by a hundredth at a radian per second is significant after two minutes, and a quarter of its noise.
+#[test]
+fn what_is_significant_and_does_not_matter_has_no_name() {
+    let names = |bend: f64| {
+        let diagnosis = diagnosed_in(&beside_reference(|t_s| bend * rate(t_s).powi(2)), &[]).1;
+        let names = diagnosis.causes.iter().map(|cause| cause.effect);
+        let found = diagnosis.promises.iter().any(|promised| promised.effect.starts_with("gyro"));
+        (names.collect::<Vec<_>>(), found)
+    };
+    assert_eq!(names(0.04), (vec!["gyro-nonlinearity"], true));
+    assert_eq!(names(0.0125), (Vec::new(), true));
+}
