@@ -215,7 +215,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &left,
         &floor,
     );
-    let alternatives = believed.alternatives(&library, &explanation);
+    let mut alternatives = believed.alternatives(&library, &explanation);
     let is_named = !believed.causes.is_empty();
     if !is_named && !believed.unnamed.is_empty() {
         // What is not likely enough to be said may be there, or something else.
@@ -224,6 +224,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     progress("remainder", 0.0);
     let said = said(&explanation, &believed.causes);
     let remainder = remains(subject, &explanation, &believed.causes, &said, events.is_some());
+    if !is_named && subject.slow.attitude_sigma_rad > 0.0 {
+        // Of a log in which nothing matters they are what every real recording has.
+        alternatives
+            .iter_mut()
+            .for_each(|(_, probability)| *probability *= remainder.matters);
+    }
     let none_of_these = remainder.matters * believed.none_is_there();
     let Believed {
         mut causes,

@@ -63,7 +63,10 @@ fn what_is_significant_and_does_not_matter_has_no_name() {
     let names = |bend: f64| {
         let diagnosis = diagnosed_in(&beside_reference(|t_s| bend * rate(t_s).powi(2)), &[]).1;
         let names = diagnosis.causes.iter().map(|cause| cause.effect);
-        let found = diagnosis.promises.iter().any(|promised| promised.effect.starts_with("gyro"));
+        let found = diagnosis
+            .promises
+            .iter()
+            .any(|promised| promised.effect.starts_with("gyro"));
         (names.collect::<Vec<_>>(), found)
     };
     assert_eq!(names(0.04), (vec!["gyro-nonlinearity"], true));

@@ -1,6 +1,7 @@
 //! What is written about an effect: its name, its physics, its parameters, what it is mistaken for.
 
-use crate::channel::Kind;
+use super::sine_response::TURNS_OVER_RAD_S;
+use crate::channel::{Kind, UnitDescription};
 
 /// How an effect is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,10 +61,24 @@ impl Texture {
 /// What a unit must have, or an effect cannot be in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
-    /// A gyro of light: one that sends codes of its own is a vibrating one, whose answer has no Sagnac phase.
+    /// A gyro of light: one that sends codes of its own is a vibrating one, whose answer has no Sagnac phase, and one whose range goes
+    /// beyond where a sine of the usual size turns over has no such sine.
     Light,
     /// Cycles of one length, counted: rows that bring their own time leave a hole when they are lost, and nothing late.
     Counter,
+}
+
+impl Needs {
+    /// Whether a unit has it.
+    pub fn is_met(self, unit: &UnitDescription) -> bool {
+        let may_be_of_light = |range: [f64; 2]| range[0].abs().max(range[1].abs()) <= TURNS_OVER_RAD_S;
+        match self {
+            Needs::Light => (unit.channels.iter()).any(|channel| {
+                channel.sensor == Kind::Gyro && channel.bits.is_none() && may_be_of_light(channel.range)
+            }),
+            Needs::Counter => unit.cycle_s.is_some(),
+        }
+    }
 }
 
 /// What shares one block of parameters.

@@ -6,10 +6,7 @@
 //! by its places and variants (half to the widest places); so looking in more places costs what it should.
 
 use nalgebra::DVector;
-use twin::{
-    effect::{Active, Cause, LIBRARY, Locality, Nature, Needs, Page, Parameter, onsets},
-    predict::Kind,
-};
+use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Page, Parameter, onsets};
 
 use crate::{
     library::products::Products,
@@ -112,16 +109,8 @@ impl Library {
         for column in problem.reference_columns() {
             library.products.push(problem, column);
         }
-        let of_light = unit
-            .channels
-            .iter()
-            .any(|channel| channel.sensor == Kind::Gyro && channel.bits.is_none());
         let is_offered = |page: &Page| {
-            let is_possible = match page.needs {
-                None => true,
-                Some(Needs::Light) => of_light,
-                Some(Needs::Counter) => unit.cycle_s.is_some(),
-            };
+            let is_possible = page.needs.is_none_or(|needs| needs.is_met(unit));
             is_possible && withheld.iter().all(|withheld| withheld != page.name)
         };
         let offered: Vec<_> = LIBRARY

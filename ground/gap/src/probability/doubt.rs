@@ -20,17 +20,20 @@ use crate::{
     input::{case::SlowErrors, hold::Held},
     library::hypotheses::Library,
     null::{beyond::Beyond, model::Model, problem::Problem},
-    probability::{cause::Cause, importance::Importance},
+    probability::{
+        cause::Cause,
+        importance::{Course, Importance},
+    },
     search::explanation::Explanation,
     thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
-    unknown::{adequacy::Leftover, slow::Slow},
+    unknown::adequacy::Leftover,
 };
 
 /// What is left over, and how much that says against names.
 pub struct Belief<'a> {
     left: &'a Leftover,
     /// Slow courses that are left beside what a reference that is not exact errs by; `None` where it is exact.
-    courses: Option<&'a [Slow]>,
+    courses: Option<&'a [Course]>,
     /// Per channel, energy that stands out in some octave, in squares of noise.
     loud: &'a [f64],
     promises: &'a [Promised],
@@ -39,7 +42,7 @@ pub struct Belief<'a> {
 impl<'a> Belief<'a> {
     /// From what is left over, where it is loud, and promises: what an effect explained and does not explain on the held-out windows is
     /// left over too.
-    pub fn of(left: &'a Leftover, courses: Option<&'a [Slow]>, loud: &'a [f64], promises: &'a [Promised]) -> Self {
+    pub fn of(left: &'a Leftover, courses: Option<&'a [Course]>, loud: &'a [f64], promises: &'a [Promised]) -> Self {
         Self {
             left,
             courses,
@@ -76,21 +79,21 @@ impl<'a> Belief<'a> {
         1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
     }
 
-    /// The same of an effect on readings where the reference is not exact. Everything is significant there, for the search's null has not
-    /// the colour of what a reference errs by. So the evidence of the slow courses that are left speaks, which has: the same that says what
-    /// the effect is worth.
-    fn trust_beside_reference(&self, courses: &[Slow], channels: &[usize], explained: f64) -> f64 {
-        let others = courses.len() as f64;
-        let is_there = |slow: &&Slow| slow.channels.iter().any(|channel| channels.contains(channel));
-        let nats = courses
+    /// The same of an effect on readings where the reference is not exact. Everything is significant there, for no real recording is
+    /// without small errors of its own. So what speaks is a slow course that matters, by the evidence that says what the effect is worth.
+    fn trust_beside_reference(&self, courses: &[Course], channels: &[usize], explained: f64) -> f64 {
+        let (kept, broken) = self.kept(channels);
+        let is_there = |course: &&Course| course.channels.iter().any(|channel| channels.contains(channel));
+        let doubt = |matters: f64, nats: f64| {
+            let unknown = 1.0 - (1.0 - matters) * kept;
+            let energy = 2.0 * nats.max(0.0) + broken;
+            unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+        };
+        let doubts = courses
             .iter()
             .filter(is_there)
-            .map(|slow| slow.posterior.log_bayes_factor);
-        let nats = nats.fold(0.0, f64::max);
-        let (kept, broken) = self.kept(channels);
-        let unknown = 1.0 - kept / (1.0 + nats.exp() / others);
-        let energy = 2.0 * nats + broken;
-        1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+            .map(|course| doubt(course.matters, course.nats));
+        1.0 - doubts.fold(doubt(0.0, 0.0), f64::max)
     }
 
     /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
@@ -244,7 +247,7 @@ pub fn promises(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::unknown::{adequacy::Aspect, discrepancy::Posterior, slow::Where};
+    use crate::unknown::adequacy::Aspect;
 
     fn left(p: f64) -> Leftover {
         Leftover {
@@ -301,22 +304,16 @@ mod tests {
     #[test]
     fn beside_a_reference_that_errs_slow_courses_speak_against_a_name_and_what_is_merely_significant_does_not() {
         let surely = left(1e-9);
-        let trust = |channel: usize, nats: f64| {
-            let course = Slow {
-                place: Where::Sensor(channel),
+        let trust = |channel: usize, matters: f64| {
+            let courses = [Course {
                 channels: vec![channel],
-                sigmas_per_unit: 1.0,
-                posterior: Posterior {
-                    log_bayes_factor: nats,
-                    sizes: Vec::new(),
-                },
-            };
-            let courses = [course];
-            let belief = Belief::of(&surely, Some(&courses), &[0.0; 2], &[]);
-            belief.trust_beside_reference(&courses, &[0], 100.0)
+                nats: 40.0,
+                matters,
+            }];
+            Belief::of(&surely, Some(&courses), &[0.0; 2], &[]).trust_beside_reference(&courses, &[0], 100.0)
         };
-        assert!(trust(0, -1.0) > 0.99 && trust(1, 40.0) > 0.99);
-        assert!(trust(0, 40.0) < 0.1, "{}", trust(0, 40.0));
+        assert!(trust(0, 0.01) > 0.99 && trust(1, 0.99) > 0.99);
+        assert!(trust(0, 0.99) < 0.1, "{}", trust(0, 0.99));
         let hardly = Belief::of(&surely, None, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 100.0);
         assert!(hardly < 0.15, "{hardly}");
     }

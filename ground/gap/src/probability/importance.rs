@@ -19,10 +19,21 @@ use crate::{
     },
 };
 
+/// A slow course that is left.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// Where.
+    pub channels: Vec<usize>,
+    /// ln of its odds against nothing.
+    pub nats: f64,
+    /// Probability that it is there and above its bar.
+    pub matters: f64,
+}
+
 /// What is left beside a reference that is not exact.
 pub struct Importance {
-    /// The slow courses that the whole model leaves.
-    pub courses: Vec<Slow>,
+    /// By the whole model.
+    pub courses: Vec<Course>,
     /// Per effect of the model, the probability that what it explains matters.
     pub matters: Vec<f64>,
     /// \[nats\] that each is worth.
@@ -46,8 +57,14 @@ impl Importance {
             let slow = slow.map(|slow| judged(problem, slow, &setting, without.len())[1]);
             slow.fold(f64::from(u8::from(grows(problem, model, effect, &setting))), f64::max)
         };
+        let left = courses(problem, &beside, &setting, None);
+        let course = |slow: &Slow| Course {
+            channels: slow.channels.clone(),
+            nats: slow.posterior.log_bayes_factor,
+            matters: judged(problem, slow, &setting, left.len())[1],
+        };
         Some(Self {
-            courses: courses(problem, &beside, &setting, None),
+            courses: left.iter().map(course).collect(),
             matters: (0..model.components.len()).map(matters).collect(),
             worth: (0..model.components.len()).map(|effect| beside.worth(effect)).collect(),
         })
