@@ -129,8 +129,10 @@ pub struct Filter {
     silent_s: f32,
     /// \[s\] for how long each kind of measurement has been rejected without a break: velocity, field.
     rejected_s: [f32; 2],
-    /// \[s\] for how long the field has been disturbed without a break.
+    /// \[s\] for how long the field has been disturbed, with breaks shorter than [`Params::recovery_s`].
     disturbed_s: f32,
+    /// \[s\] for how long it has not been.
+    calm_s: f32,
     /// The window before was one of rest.
     rested: bool,
     /// Rest contradicts the bias without a break.
@@ -166,6 +168,7 @@ impl Filter {
             silent_s: 0.0,
             rejected_s: [0.0; 2],
             disturbed_s: 0.0,
+            calm_s: 0.0,
             rested: false,
             contradicted: None,
             going: None,

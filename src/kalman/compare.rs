@@ -84,18 +84,18 @@ impl Filter {
     }
 
     /// Third. The mean field against the reference, across it: east and in the meridian. Where the field is too disturbed
-    /// its rejection says nothing of the attitude.
+    /// its rejection says nothing of the attitude. Iron that goes round shows neither in the norm nor in the dip twice in a turn, when
+    /// it turns the heading most: so the field is disturbed until it has been calm for as long as an attitude is not given up.
     pub(super) fn compare_field(&mut self) {
         self.measured.field_accepted = None;
         let Some(compared) = &self.measured.compared else {
             return;
         };
         let disturbed = compared.disturbance > square(self.params.field_gate);
-        self.disturbed_s = if disturbed {
-            self.disturbed_s + self.measured.means.duration_s
-        } else {
-            0.0
-        };
+        let duration_s = self.measured.means.duration_s;
+        self.calm_s = if disturbed { 0.0 } else { self.calm_s + duration_s };
+        let disturbed = disturbed || (self.disturbed_s > 0.0 && self.calm_s < self.params.recovery_s);
+        self.disturbed_s = if disturbed { self.disturbed_s + duration_s } else { 0.0 };
         self.correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
         let mut accepted = true;
         for scalar in &compared.scalars {

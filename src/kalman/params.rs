@@ -61,7 +61,8 @@ pub struct Params {
     pub field_spread: f32,
     /// \[1\] gate in standard deviations of the innovation. Small: good data are lost; large: bad data get in.
     pub gate: f32,
-    /// \[s\] a kind of measurement rejected for so long starts the attitude afresh.
+    /// \[s\] a kind of measurement rejected for so long starts the attitude afresh; a field that was disturbed is used again after so
+    /// long without.
     pub recovery_s: f32,
     /// \[rad\] an attitude known no better starts afresh.
     pub lost_sd: f32,

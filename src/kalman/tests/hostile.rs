@@ -167,3 +167,50 @@ fn the_covariance_stays_positive_for_a_day_at_rest() {
     assert!((world.filter.q_nb.norm() - 1.0).abs() < 1e-6);
     world.off_by_less_than(0.05);
 }
+
+/// N3: an attitude of which nothing is known (10 rad2), and measurements that claim to be exact (1e-8), with parameters that take
+/// their word for it. The covariance stays definite, which in f32 it does only by the floor of the noise, and above its own floors; an
+/// attitude that is wrong by half a turn is found afresh by TRIAD.
+#[test]
+fn a_huge_covariance_and_tiny_noise_leave_it_finite_definite_and_right() {
+    let exact = Params {
+        velocity_sd: 1e-4,
+        velocity_rest_sd: 1e-4,
+        velocity_lasts_s: 0.0,
+        acc_error: 1e-4,
+        heading_sd: 1e-4,
+        dip_sd: 1e-4,
+        field_lasts_s: 0.0,
+        ..params()
+    };
+    for params in [params(), exact] {
+        for (rate_b, wrong_rad) in [Vector3::zeros(), Vector3::new(0.05, 0.1, 0.0)]
+            .into_iter()
+            .flat_map(|rate_b| [0.0, 0.3, 3.0].map(|wrong_rad| (rate_b, wrong_rad)))
+        {
+            let mut world = World::new(tilted(), params);
+            let wrong = from_rotation_vector(Vector3::new(0.6, -0.5, 0.6) * wrong_rad);
+            world.filter = Filter::resumed(params, wrong * world.q_nb, Matrix3::from_diagonal_element(10.0));
+            assert!(world.filter.covariance().worst() >= 10.0);
+            let mut afresh = 0;
+            // A window, and the work on it.
+            for _ in 0..300 {
+                let outcome = world.fly(0.2, rate_b, |_, step| {
+                    step.acc.as_mut().unwrap().variance = 1e-8;
+                    step.mag.as_mut().unwrap().variance = 1e-8;
+                });
+                afresh += u32::from(outcome.aligned);
+                // As a matrix of correlations, so that radians and metres a second compare.
+                let p = world.filter.covariance().matrix();
+                let scaled =
+                    p.map_with_location(|row, column, value| value / (p[(row, row)] * p[(column, column)]).sqrt());
+                let least = scaled.symmetric_eigenvalues().min();
+                assert!(least > 0.0, "{wrong_rad} rad, {} rad/s: {least}", rate_b.x);
+                // Of the attitude, as covariance.rs has it, to rounding.
+                assert!((0..3).all(|k| p[(k, k)] >= 0.999e-9));
+            }
+            assert!(wrong_rad < 1.0 || afresh > 0, "{wrong_rad} rad were never found afresh");
+            world.off_by_less_than(0.5);
+        }
+    }
+}
