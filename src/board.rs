@@ -26,6 +26,10 @@ pub trait Board {
     type Retained: Retained;
     /// The flight recorder's memory.
     type Nand: NandBus;
+
+    /// A checksum of the bytes that a value stands in, those between its fields too, on top of the one `before`: it is another if a
+    /// bit of the RAM has flipped. The same where the RAM does not flip, as on a host.
+    fn ram_sum<T>(value: &T, before: u32) -> u32;
 }
 
 /// Everything [`crate::unit::run`] takes, ready to use: clocks run, peripherals are configured, nothing has been sent.

@@ -35,6 +35,7 @@ pub use site::{Launch, Site};
 
 use crate::{
     attitude::{self, dcm_bn},
+    board::Board,
     calibration::{Ranges, Set, Temperatures},
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
@@ -175,6 +176,56 @@ impl Estimator {
         self.axes_n = axes_n(site);
         self.last_us = None;
         self.settlements = None;
+    }
+
+    /// A checksum of all that it keeps from one step to the next, and of `kept`, by which a bit of the RAM that flipped is found. Its
+    /// set is left out, which has a copy, and the readings of force between two cycles, which are still coming and are each held
+    /// against the others.
+    #[inline(never)]
+    pub fn ram_sum<B: Board>(&self, kept: &[u8; KEPT_BYTES]) -> u32 {
+        // By their names: a field that is added is in the sum, or said to be left out.
+        let Self {
+            set: _,
+            averager: _,
+            temperatures,
+            monitor,
+            filter,
+            turn_solver,
+            boost,
+            white,
+            closed,
+            axes_n,
+            last_us,
+            settlements,
+            covariance_n,
+            bias_sd,
+        } = self;
+        let sum = B::ram_sum(kept, 0);
+        let sum = B::ram_sum(temperatures, sum);
+        let sum = B::ram_sum(monitor, sum);
+        let sum = B::ram_sum(filter, sum);
+        let sum = B::ram_sum(turn_solver, sum);
+        let sum = B::ram_sum(boost, sum);
+        let sum = B::ram_sum(white, sum);
+        let sum = B::ram_sum(closed, sum);
+        let sum = B::ram_sum(axes_n, sum);
+        let sum = B::ram_sum(last_us, sum);
+        let sum = B::ram_sum(settlements, sum);
+        let sum = B::ram_sum(covariance_n, sum);
+        B::ram_sum(bias_sd, sum)
+    }
+
+    /// Begins afresh where a bit of it has flipped, and goes on from what was kept after the latest step, if that is still whole.
+    #[inline(never)]
+    pub fn restore(&mut self, set: &Set, site: &Site, kept: Option<&[u8; KEPT_BYTES]>) {
+        self.renew(set, site);
+        if let Some(kept) = kept {
+            let outage = Outage {
+                ended_us: Estimator::kept_at_us(kept),
+                ..Outage::default()
+            };
+            self.resume(kept, outage);
+        }
     }
 
     /// Puts right its set, or the other copy of it, where a flipped bit makes them differ; whether it did. Right is the one that

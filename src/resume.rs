@@ -160,6 +160,7 @@ const WATCHDOG_SD_S: f32 = 0.45;
 pub const POWER_CUT: Outage = Outage {
     lasted_s: 1.0,
     sd_s: 0.6,
+    ended_us: 0,
 };
 
 /// What a reset missed since `kept_us` of the run before. A pin that is held low is not known of: it counts as if it were not.
@@ -193,6 +194,7 @@ pub fn outage(kept_us: u64, reset: ResetCause, pulse: Pulse, crash: Option<&Cras
     Outage {
         lasted_s: struck_us.saturating_sub(kept_us).saturating_add(START_US) as f32 * 1e-6,
         sd_s,
+        ended_us: 0,
     }
 }
 
@@ -265,7 +267,7 @@ mod tests {
     fn an_outage_is_as_long_as_the_reset_allows() {
         let pulse = |at_us, fed_us| Pulse { at_us, fed_us };
         let missed = |reset, pulse: Pulse, crash| {
-            let Outage { lasted_s, sd_s } = outage(5_000_000, reset, pulse, crash);
+            let Outage { lasted_s, sd_s, .. } = outage(5_000_000, reset, pulse, crash);
             ((lasted_s * 1e3).round_ties_even(), sd_s)
         };
         assert_eq!(

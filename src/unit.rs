@@ -137,7 +137,7 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
     let data = join::join4(
         acquire::run::<B>(&shared, &votes, &switch, &gyros, &memory),
         gyros::run::<B>(&shared, &votes, &gyros, &memory),
-        estimate::run(&shared, &votes, &mut estimator, &memory),
+        estimate::run::<B>(&shared, &votes, &mut estimator, &memory),
         record::run::<B>(&shared, &votes, parts.nand, &memory),
     );
     let care = join::join3(

@@ -22,6 +22,7 @@ mod gyros;
 mod lines;
 #[allow(dead_code, reason = "a board without a NAND only says that it has none")]
 mod nand;
+mod ram;
 mod retained;
 mod stack;
 
@@ -71,6 +72,10 @@ impl<Scl: bus::Scl, Sda: bus::Sda> Board for Stm32f407<Scl, Sda> {
     type Watchdog = Iwdg;
     type Retained = ResetSafeRam;
     type Nand = NandPort;
+
+    fn ram_sum<T>(value: &T, before: u32) -> u32 {
+        ram::sum(value, before)
+    }
 }
 
 /// The independent watchdog. Nothing but a reset stops it.

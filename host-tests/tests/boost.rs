@@ -3,8 +3,9 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use emems::{
+    calibration::{Ranges, Set},
     derived::Derived,
-    estimate::{Estimator, Site},
+    estimate::{Estimator, KEPT_BYTES, Site},
     sample::{Reading, Sample},
     unit::Settings,
 };
@@ -224,6 +225,51 @@ fn a_reset_in_the_boost_costs_two_packets_and_not_the_attitude() {
         is_right("after a reset", &met(from_s, 83.0), within_deg);
         is_right("in micro-gravity", &met(97.0, 110.0), within_deg);
     }
+}
+
+/// U9: a bit of either filter has flipped: on the pad, in the spin, in the yo-yo and in micro-gravity. What was kept after the latest
+/// step takes its place, in the same packet.
+#[test]
+fn after_a_flipped_bit_in_the_boost_the_attitude_goes_on_from_its_copy() {
+    let world = rocket(Course::NOMINAL);
+    let motion = world.motion.clone();
+    let flown = flight(world).fly(130 * S);
+    let settings = Settings {
+        site: Site::ALCANTARA,
+        ..Settings::NOMINAL
+    };
+    let set = Set::compiled_in(Ranges::of(&settings));
+    let readings: BTreeMap<u16, Reading> = flown
+        .packets
+        .iter()
+        .map(|(_, reading)| (reading.counter, *reading))
+        .collect();
+    let (mut estimator, mut kept) = (Estimator::of(&settings), [0; KEPT_BYTES]);
+    let mut flips_s = vec![20.0, 33.0, 40.0, 50.0, 60.3, 84.0, 90.1, 105.0];
+    let mut frames = Vec::new();
+    for frame in &flown.derived {
+        let struck = flips_s
+            .first()
+            .is_some_and(|flip_s| frame.start_us as f64 * 1e-6 > *flip_s);
+        if struck {
+            flips_s.remove(0);
+            estimator.restore(&set, &settings.site, Some(&kept));
+        }
+        let sample = Sample {
+            reading: readings[&frame.counter],
+            start_us: frame.start_us,
+            slots_us: frame.slots_us,
+        };
+        let estimate = estimator.step(&sample, &frame.increments);
+        estimator.keep(&mut kept);
+        frames.push(Derived { estimate, ..*frame });
+        assert!(!struck || estimate.q_nb.is_some(), "packet {}", frame.counter);
+    }
+    assert!(flips_s.is_empty());
+    is_right("pad", &met(&frames, &motion, 20.0, 30.0), SPINNING_DEG);
+    is_right("boost", &met(&frames, &motion, 36.0, 83.0), SPINNING_DEG);
+    is_right("yo-yo", &met(&frames, &motion, 83.0, 97.0), SPINNING_DEG);
+    is_right("micro-gravity", &met(&frames, &motion, 97.0, 130.0), 1.5);
 }
 
 /// Gyros that stand at their stops from the tenth second on, on a pad that does not move.

@@ -204,6 +204,77 @@ proptest! {
     }
 }
 
+/// Flips a bit of a number.
+fn flip(number: &mut f32, bit: u32) {
+    *number = f32::from_bits(number.to_bits() ^ 1 << bit);
+}
+
+/// U9: any bit of what is estimated, or of what the estimation goes by, has flipped between two steps. The next one goes on from the copy
+/// as if nothing had been; left alone, some would have turned the attitude by degrees. That it is found is the board's part.
+#[test]
+fn after_a_flipped_bit_of_the_filter_the_attitude_goes_on_from_its_copy() {
+    let step = |estimator: &mut Estimator, counter: u16| {
+        let (sample, increments) = resting(counter);
+        let q_nb = estimator.step(&sample, &increments).q_nb.expect("an attitude");
+        attitude::from_parts(q_nb).expect("a quaternion")
+    };
+    let degrees = |one: UnitQuaternion<f32>, other: UnitQuaternion<f32>| one.angle_to(&other).to_degrees();
+    let settings = Settings::NOMINAL;
+    let mut sound = Estimator::of(&settings);
+    for counter in 0..6 {
+        let (sample, increments) = resting(counter);
+        sound.step(&sample, &increments);
+    }
+    (6..53).for_each(|counter| {
+        step(&mut sound, counter);
+    });
+    let (mut kept, set) = ([0; KEPT_BYTES], sound.set);
+    assert!(sound.keep(&mut kept));
+    let places: [&dyn Fn(&mut Estimator, u32); 12] = [
+        &|estimator, bit| {
+            let mut parts = *estimator.filter.q_nb.quaternion();
+            flip(&mut parts.coords[bit as usize % 4], bit);
+            estimator.filter.q_nb = UnitQuaternion::new_unchecked(parts);
+        },
+        &|estimator, bit| flip(&mut estimator.filter.bias_b.z, bit),
+        &|estimator, bit| flip(&mut estimator.filter.gyro_matrix.m12, bit),
+        &|estimator, bit| flip(&mut estimator.filter.velocity_n.x, bit),
+        &|estimator, bit| flip(&mut estimator.filter.reference.dip, bit),
+        &|estimator, bit| flip(&mut estimator.filter.reference.declination, bit),
+        &|estimator, bit| flip(&mut estimator.filter.iron.iron_b.y, bit),
+        &|estimator, bit| flip(&mut estimator.filter.params.gravity, bit),
+        &|estimator, bit| flip(&mut estimator.filter.params.window_s, bit),
+        &|estimator, bit| flip(&mut estimator.covariance_n[3], bit),
+        &|estimator, bit| estimator.last_us = estimator.last_us.map(|last_us| last_us ^ 1 << bit),
+        &|estimator, bit| flip(&mut estimator.white[1], bit),
+    ];
+    let mut worst_unnoticed_deg = 0.0_f32;
+    for (place, strike) in places.iter().enumerate() {
+        for bit in 0..32 {
+            let mut struck = sound.clone();
+            strike(&mut struck, bit);
+            let mut unnoticed = struck.clone();
+            struck.restore(&set, &settings.site, Some(&kept));
+            let mut undisturbed = sound.clone();
+            for counter in 53..60 {
+                let expected = step(&mut undisturbed, counter);
+                let off_deg = degrees(step(&mut struck, counter), expected);
+                assert!(off_deg < 0.05, "place {place}, bit {bit}: {off_deg} deg");
+                let (sample, increments) = resting(counter);
+                let q_nb = unnoticed.step(&sample, &increments).q_nb.and_then(attitude::from_parts);
+                worst_unnoticed_deg = worst_unnoticed_deg.max(q_nb.map_or(0.0, |q_nb| degrees(q_nb, expected)));
+            }
+        }
+    }
+    assert!(
+        worst_unnoticed_deg > 5.0,
+        "no flip did any harm: {worst_unnoticed_deg} deg"
+    );
+    // With nothing to go on from the attitude is found afresh, which takes a window.
+    sound.restore(&set, &settings.site, None);
+    assert!(!sound.filter.aligned);
+}
+
 /// U9: a bit of either copy of the calibration set.
 #[test]
 fn a_flipped_bit_of_the_calibration_is_put_right_by_the_copy_whose_checksum_fits() {
@@ -213,7 +284,7 @@ fn a_flipped_bit_of_the_calibration_is_put_right_by_the_copy_whose_checksum_fits
     let flipped = |axis: usize, bit: u32| {
         let mut flipped = set;
         let scale = &mut flipped.acc[axis % 12].scale;
-        *scale = f32::from_bits(scale.to_bits() ^ 1 << (bit % 32));
+        flip(scale, bit % 32);
         flipped
     };
     for bit in 0..64 {

@@ -32,10 +32,12 @@ pub const KEPT_BYTES: usize = 8 + 4 * (STATE_NUMBERS + COVARIANCE_NUMBERS);
 /// What a reset missed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outage {
-    /// \[s\] from the time of what was kept to the start of the new clock.
+    /// \[s\] from the time of what was kept to its end, which is the start of a new clock after a reset.
     pub lasted_s: f32,
     /// \[s\] standard deviation of that.
     pub sd_s: f32,
+    /// \[us\] when it ended, in the clock of what comes after it: 0 for a clock that starts then.
+    pub ended_us: u64,
 }
 
 /// How an attitude goes on once the gyros are heard.
@@ -131,7 +133,7 @@ impl Filter {
             Going::Unless(outage, _) => (outage, rate_b),
         };
         let params = &self.params;
-        let missed_s = outage.lasted_s + seconds(from_us);
+        let missed_s = outage.lasted_s + seconds(from_us.saturating_sub(outage.ended_us));
         let fastest = if before_b.norm() > rate_b.norm() {
             before_b.norm()
         } else {

@@ -69,9 +69,9 @@ impl Spin {
             return None;
         }
         spin.q_nb = renormalised(spin.q_nb);
-        spin.at_us = 0_u64.wrapping_sub((outage.lasted_s * 1e6) as u64);
-        spin.carry(0);
-        spin.slice_us = 0;
+        spin.at_us = outage.ended_us.wrapping_sub((outage.lasted_s * 1e6) as u64);
+        spin.carry(outage.ended_us);
+        spin.slice_us = outage.ended_us;
         let nose_n = dcm_nb(&spin.q_nb).column(0).into_owned();
         let along = nose_n * nose_n.transpose();
         let [about, across] = [spin.spin * spin.spin, spin.across.iter().map(|rate| rate * rate).sum()];

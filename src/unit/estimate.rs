@@ -8,6 +8,10 @@
 //! there is no vertical to find the attitude by. In WAIT it is found afresh, which takes a second and needs no belief in what the
 //! unit was turned through meanwhile. After a power cut in FLIGHT it goes on from the log's newest record, unless the first
 //! second of readings tells better.
+//!
+//! From the end of a step to the next one nothing of the estimation changes but the sums of what is read between cycles. A checksum
+//! over the rest finds a bit that flipped meanwhile, and the estimation goes on from what was kept. One that flips in the few
+//! milliseconds of a step is not found.
 
 use embassy_futures::{
     select::{Either, select},
@@ -20,7 +24,7 @@ use super::{
     vote::{Voter, Votes},
 };
 use crate::{
-    board::{Oscillator, Retained},
+    board::{Board, Oscillator, Retained},
     derived::{Derived, Health, Start},
     estimate::{Estimate, Estimator, KEPT_BYTES},
     mode::{Mode, State},
@@ -29,7 +33,7 @@ use crate::{
 };
 
 /// Derives for ever.
-pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &impl Retained) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &B::Retained) {
     let Some(mut cycles) = shared.cycle_reader() else {
         never().await
     };
@@ -43,6 +47,7 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
     } else {
         go_on(shared, estimator, memory, &mut kept);
     }
+    let mut left = estimator.ram_sum::<B>(&kept);
     loop {
         let next = select(cycles.next_message_pure(), shared.force.wait());
         let cycle = match votes.waiting(Voter::Estimate, next).await {
@@ -69,10 +74,15 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             shared.publish_derived(derive(&cycle, state, health, start, 0, Estimate::NOTHING));
             continue;
         }
-        if shared.set_loaded.take() {
+        let is_as_left = estimator.ram_sum::<B>(&kept) == left;
+        let is_renewed = shared.set_loaded.take();
+        if is_renewed {
             estimator.renew(&shared.calibration.get(), &shared.settings.site);
         }
         mend_set(shared, estimator);
+        if !(is_as_left || is_renewed) {
+            restore(shared, estimator, memory, &mut kept);
+        }
         if let Some(found) = shared.attitude_found.take() {
             estimator.resume_near(&found, POWER_CUT);
         }
@@ -88,7 +98,29 @@ pub async fn run(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memo
             estimate,
         ));
         keep(estimator, memory, &mut kept);
+        left = estimator.ram_sum::<B>(&kept);
     }
+}
+
+/// Goes on from what was kept in retained memory after the latest step where a bit of the estimation's RAM has flipped since: a reset
+/// that takes no time. Not inlined: it is seldom.
+#[cold]
+#[inline(never)]
+fn restore(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kept: &mut [u8; KEPT_BYTES]) {
+    let is_whole = ATTITUDE.recall(memory, kept).map(<[u8]>::len) == Some(KEPT_BYTES);
+    estimator.restore(
+        &shared.calibration.get(),
+        &shared.settings.site,
+        is_whole.then_some(&*kept),
+    );
+    shared.say(format_args!(
+        "a flipped bit of the attitude filter was found: it {}",
+        if is_whole {
+            "goes on from its copy"
+        } else {
+            "begins anew"
+        }
+    ));
 }
 
 /// Puts right what a flipped bit of the RAM has made of the calibration set in use. Not inlined: a set is large.

@@ -18,6 +18,7 @@ use emems::{
 };
 use emulated::{Options, flight::fly_keeping, fly_with};
 use twin::{
+    part::Nanos,
     plant::Plant,
     run::{Fault, Scheduled},
 };
@@ -141,4 +142,96 @@ fn a_flipped_bit_of_the_mode_in_ram_is_put_right_and_said() {
         "{said}"
     );
     assert!(is_pair(&after, place, 0b1000));
+}
+
+/// Where the block of the filter's covariance begins that has attitude and velocity, from the beginning of the variables; and when
+/// a window's work on it is done \[ns\]. It is what a derived frame says of the attitude's covariance, in rows of five.
+fn covariance() -> (usize, Nanos) {
+    let script = || vec![(MS, b"G_DL".to_vec())];
+    let mut tape = Tape {
+        script: script(),
+        ..Tape::default()
+    };
+    let plant = || Plant::new(world("still"), 7);
+    emulated::fly(image(), plant(), &[], 6_000 * MS, &mut tape).expect("it flies");
+    let frames = tape.derived();
+    let settled = frames
+        .windows(2)
+        .rfind(|pair| pair[0].estimate.covariance_n != pair[1].estimate.covariance_n);
+    let [_, settled] = settled.expect("windows that close") else {
+        unreachable!()
+    };
+    let [nn, ne, nd, ..] = settled.estimate.covariance_n;
+    // The step follows its cycle, and the next one is 200 ms later.
+    let at = settled.start_us * 1_000 + 120 * MS;
+    let options = Options {
+        statics: vec![(VARIABLES.into(), VARIABLES_BYTES)],
+        ..Options::default()
+    };
+    let mut tape = Tape {
+        script: script(),
+        ..Tape::default()
+    };
+    let report = fly_with(&options, image(), plant(), &[], at, &mut tape).expect("it flies");
+    let row: Vec<u8> = [nn, ne, nd].iter().flat_map(|number| number.to_le_bytes()).collect();
+    let bytes = &report.statics[0];
+    let numbers = |from: usize| bytes[from..from + 12] == row[..];
+    let places: Vec<usize> = (0..VARIABLES_BYTES - 100)
+        .step_by(4)
+        .filter(|at| numbers(*at))
+        .collect();
+    // The other places have six numbers, where this one has the covariance with the velocity after three.
+    let second = ne.to_le_bytes();
+    let of_five = places.iter().filter(|at| bytes[**at + 20..**at + 24] == second);
+    let of_five: Vec<&usize> = of_five.collect();
+    let [place] = of_five[..] else {
+        panic!("{places:x?} {of_five:x?}")
+    };
+    (*place, at)
+}
+
+/// U9: bits of the attitude filter flip in the RAM, one in seven packets. Each is found and said, and no frame is without an attitude
+/// or has one that is off by more than it says.
+#[test]
+fn flipped_bits_of_the_filter_in_ram_are_found_and_the_attitude_goes_on() {
+    let (place, from) = covariance();
+    // Any bit of any of the 25 numbers, both odd so that all of them have their turn.
+    let flips: Vec<Scheduled> = (0..25)
+        .map(|n| Scheduled {
+            at: from + 1_400 * MS * n,
+            fault: Fault::RamFlip(8 * (VARIABLES_AT + place) as u32 + 32 * (n as u32 * 7 % 25) + n as u32 * 11 % 32),
+        })
+        .collect();
+    let flown = |faults: &[Scheduled]| {
+        let mut tape = Tape {
+            script: vec![(MS, b"G_DL".to_vec())],
+            ..Tape::default()
+        };
+        let plant = Plant::new(world("still"), 7);
+        let end = from + 36_000 * MS;
+        let report = emulated::fly(image(), plant, faults, end, &mut tape).expect("it flies");
+        assert!(report.resets.is_empty(), "{:?}", report.resets);
+        tape
+    };
+    let (undisturbed, struck) = (flown(&[]), flown(&flips));
+    let said = struck.said();
+    let found = said.matches("a flipped bit of the attitude filter was found: it goes on from its copy");
+    assert_eq!(found.count(), flips.len(), "{said}");
+    assert!(!undisturbed.said().contains("flipped"));
+    let (expected, frames) = (undisturbed.derived(), struck.derived());
+    assert_eq!(expected.len(), frames.len());
+    for (expected, frame) in expected.iter().zip(&frames) {
+        let Some(was) = expected.estimate.q_nb else { continue };
+        let is = frame.estimate.q_nb.expect("an attitude in every frame");
+        let cosine: f32 = was.iter().zip(is).map(|(was, is)| was * is).sum();
+        let off = 2.0 * (1.0 - cosine * cosine).max(0.0).sqrt();
+        let [nn, _, _, ee, _, dd] = frame.estimate.covariance_n;
+        let said = (nn + ee + dd).sqrt();
+        // Two degrees, as of any attitude here; a window that was begun is lost, and gyros alone go on.
+        assert!(
+            off < 0.035 && off < 3.0 * said,
+            "{}: {off} of {said} rad",
+            frame.counter
+        );
+    }
 }
