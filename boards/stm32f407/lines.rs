@@ -135,7 +135,7 @@ impl Read for Receiver {
                 }
                 Err(_) => break,
             }
-            count += 1;
+            count = usize::saturating_add(count, 1);
         }
         Ok(count)
     }

@@ -5,7 +5,7 @@ use emems::{
     sample::SENSOR_COUNT,
 };
 use host_tests::{Flight, Flown, MS, S, changed, world};
-use twin::run::Fault;
+use twin::{host::timing::BOOT, run::Fault};
 
 /// Slots of the gyros in the reading order.
 const GYROS: std::ops::Range<usize> = 8..12;
@@ -153,6 +153,34 @@ fn s8_a_gyro_that_dies_between_two_cycles_adds_no_zeros_to_its_increments() {
     }
 }
 
+/// S8: `Gyros::fast` leaves out the word of a line that died within the sample, after its identity was seen: it would be a rate of zero
+/// in a unit that turns.
+#[test]
+fn s8_a_gyro_that_dies_within_a_fast_sample_adds_no_zero_to_its_increments() {
+    // Each gyro sees at least a third of it. Between the two frames of a sample there is time for a fault where the others are gone: then
+    // the second frame waits for 30 us from the first, which takes 18.
+    let spin = || changed("still", |_, truth| truth.rate_b.z = 150_f64.to_radians());
+    for plate in 0..4 {
+        let flight = || {
+            let others = (0..4).filter(|other| *other != plate);
+            let flight = Flight::ideal(spin()).say(1, b"G_DL");
+            others.fold(flight, |flight, other| flight.fault(S, Fault::Silent(8 + other)))
+        };
+        let sampled_us = flight().fly(3 * S).derived.last().expect("frames").increments.end_us;
+        for offset_us in (0..60).step_by(2) {
+            let at = BOOT + (sampled_us + 30_000 + offset_us) * 1_000;
+            let flown = flight().fault(at, Fault::Silent(8 + plate)).fly(at + 300 * MS);
+            assert!(flown.report.struck["silent"] > 0);
+            let frames = flown.derived.iter().filter(|frame| frame.start_us > 2_000_000);
+            let gyros: Vec<_> = frames.map(|frame| frame.increments.gyro[plate]).collect();
+            let turned = gyros.iter().filter(|gyro| gyro.count > 0);
+            let least = turned.map(|gyro| gyro.least.unsigned_abs().min(gyro.most.unsigned_abs()));
+            let least = least.min().expect("it was alive");
+            assert!(least > 200, "plate {plate}, {offset_us} us: {gyros:?}");
+        }
+    }
+}
+
 /// S8: the identity that ends each fast sample, and `Adis16265::confirm` after a wrong one. Half of all random words look new.
 #[test]
 fn s8_a_gyro_that_answers_at_random_is_marked_from_the_second_packet_on() {
@@ -184,9 +212,9 @@ fn s6_a_byte_that_is_not_acknowledged_once_costs_no_reading() {
     assert_eq!(marked, 0, "{:?}", flown.report.struck);
 }
 
-/// S3: `Standing::Doubted`. Whichever sensor is being read, it is back in the next packet but one.
+/// S3: `Standing::Doubted`. Whichever sensor is being read, it is back in the next packet.
 #[test]
-fn s3_a_part_that_holds_sda_costs_two_packets_at_most() {
+fn s3_a_part_that_holds_sda_costs_one_packet() {
     let mut flight = still().say(1, b"G_DL");
     for second in 3..16 {
         let at = second * S + 150 * MS + (second - 3) * 500_000;
@@ -195,7 +223,7 @@ fn s3_a_part_that_holds_sda_costs_two_packets_at_most() {
     let flown = flight.fly(17 * S);
     let marked = |second: u64| flown.second(second).iter().filter(|r| r.errors.0 != 0).count();
     let marked: Vec<usize> = (3..16).map(marked).collect();
-    assert!(marked.iter().all(|packets| *packets <= 2), "{marked:?}");
+    assert!(marked.iter().all(|packets| *packets <= 1), "{marked:?}");
     assert!(marked.iter().filter(|packets| **packets > 0).count() >= 6, "{marked:?}");
     assert!(ever(&flown, Health::BUS_RECOVERED));
 }

@@ -230,7 +230,8 @@ fn after_a_flipped_bit_of_the_filter_the_attitude_goes_on_from_its_copy() {
     });
     let (mut kept, set) = ([0; KEPT_BYTES], sound.set);
     assert!(sound.keep(&mut kept));
-    let places: [&dyn Fn(&mut Estimator, u32); 12] = [
+    type Strike = dyn Fn(&mut Estimator, u32);
+    let places: [&Strike; 12] = [
         &|estimator, bit| {
             let mut parts = *estimator.filter.q_nb.quaternion();
             flip(&mut parts.coords[bit as usize % 4], bit);

@@ -184,7 +184,13 @@ impl Gyros {
                 // While one gyro leaps the others say how the unit turns.
                 let change = match self.leaping {
                     Some(leaping) => {
-                        solve(&self.axes_b, cycle.values, &[1.0; PLATES], candidates & !(1 << leaping)).vector_b
+                        solve(
+                            &self.axes_b,
+                            cycle.values,
+                            &[1.0; PLATES],
+                            candidates & !1_u16.wrapping_shl(leaping as u32),
+                        )
+                        .vector_b
                     }
                     None => rough_b,
                 } - course_b;

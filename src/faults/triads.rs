@@ -125,7 +125,7 @@ impl Triads {
     pub(super) fn step(&mut self, cycle: &Cycle<TRIAD_AXES>, apart: &Apart) {
         let doubled = self.catch_up();
         if cycle.frozen != 0 {
-            for k in (0..TRIAD_AXES).filter(|k| cycle.frozen >> k & 1 == 1) {
+            for k in (0..TRIAD_AXES).filter(|k| cycle.frozen.wrapping_shr(*k as u32) & 1 == 1) {
                 self.watches[k].exclude(Verdict::Frozen);
             }
         }
@@ -257,7 +257,7 @@ impl Triads {
         }
         if doubted {
             let doubted = present & self.excluded();
-            for k in (0..TRIAD_AXES).filter(|k| doubted >> k & 1 == 1) {
+            for k in (0..TRIAD_AXES).filter(|k| doubted.wrapping_shr(*k as u32) & 1 == 1) {
                 self.resemble(k);
             }
         }
@@ -306,7 +306,8 @@ impl Triads {
     fn resemble(&mut self, k: usize) {
         let expected = |k: usize| self.solution.along(&self.axes_b[k]).0;
         let plate = k / 3 * 3;
-        let (next, after) = (plate + (k + 1) % 3, plate + (k + 2) % 3);
+        let on_plate = |steps: usize| plate.wrapping_add(k.wrapping_add(steps) % 3);
+        let (next, after) = (on_plate(1), on_plate(2));
         let seen = &self.seen[k];
         let measured = seen.value + self.watches[k].offset;
         for (kept, other) in

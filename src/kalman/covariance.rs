@@ -188,7 +188,7 @@ impl Covariance {
         // The upper triangle.
         let fours = self.drivers.as_chunks_mut::<4>().0.iter_mut();
         for (n, (four, of_four)) in fours.zip(drivers.as_chunks::<4>().0).enumerate() {
-            take_off_four(four, *of_four, &drivers, 4 * n);
+            take_off_four(four, *of_four, &drivers, n.wrapping_mul(4));
         }
         mirror(&mut self.driven);
         mirror(&mut self.drivers);

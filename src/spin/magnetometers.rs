@@ -27,8 +27,8 @@ const SHUT: [u8; 2] = [3, 10];
 impl Spin {
     /// The field of a plate; whether it was taken, `None` if it was not read whole.
     pub(super) fn take_field(&mut self, set: &Set, measured: &Measured, plate: usize) -> Option<bool> {
-        let first = 3 * plate;
-        let present = measured.present.of(Kind::Magnetometer) >> first & 0b111;
+        let first = plate.wrapping_mul(3);
+        let present = measured.present.of(Kind::Magnetometer).wrapping_shr(first as u32) & 0b111;
         if present != 0b111 {
             return None;
         }

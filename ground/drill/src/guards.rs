@@ -246,10 +246,29 @@ mod tests {
             let text = fs::read_to_string(root().join(&guard.file)).expect("a source file");
             guard.made_removable(0, &text).expect("one expression");
             assert_ne!(guard.expression, guard.without);
+            for expression in [&guard.expression, &guard.without] {
+                assert!(is_whole(expression), "{}: {expression} is no expression", guard.guard);
+            }
             let (file, name) = guard.test.split_once(": ").expect("file: function");
             let tests = fs::read_to_string(root().join(file)).expect("a file of tests");
             assert!(tests.contains(&format!("fn {name}(")), "{}", guard.test);
         }
+    }
+
+    /// Whether it may stand alone, as far as brackets and operators tell: one guard that may not keeps the copy from being built.
+    fn is_whole(expression: &str) -> bool {
+        let count = |of: char| expression.matches(of).count();
+        let is_closed = ["()", "[]", "{}"].iter().all(|pair| {
+            let mut pair = pair.chars().map(count);
+            pair.next() == pair.next()
+        });
+        is_closed && !expression.ends_with(['|', '&', '=', '+', '-', '{'])
+    }
+
+    #[test]
+    fn half_an_expression_is_none() {
+        assert!(is_whole("a || b(c)"));
+        assert!(!is_whole("is_repeated ||") && !is_whole("if !answers {") && !is_whole("f(a"));
     }
 
     #[test]

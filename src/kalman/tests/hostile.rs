@@ -93,6 +93,26 @@ fn rubbish_in_any_input_leaves_the_state_finite_and_is_recovered_from() {
     }
 }
 
+/// Nothing that comes in leads there, so it is put there.
+#[test]
+fn iron_that_is_no_number_begins_the_filter_anew() {
+    let rate_b = Vector3::new(0.1, 0.0, 0.05);
+    let mut world = World::new(tilted(), params());
+    world.fly(5.0, rate_b, nothing);
+    world.filter.iron.each(&mut |number| *number = f32::NAN);
+    world.filter.iron.go_on();
+    assert!(!world.filter.iron.is_finite());
+    for _ in 0..100 {
+        world.at_us += STEP_US;
+        world.q_nb = renormalised(world.q_nb * from_rotation_vector(rate_b * STEP_S));
+        let step = world.step(rate_b);
+        world.filter.step(&step);
+    }
+    // It fails at any step whose state is no number.
+    world.fly(20.0, rate_b, nothing);
+    world.off_by_less_than(1.0);
+}
+
 #[test]
 fn one_bad_sample_costs_itself_and_not_its_window() {
     let mut world = World::new(tilted(), params());

@@ -73,7 +73,7 @@ pub(super) const ROWS: [Row; 23] = [
             judge::freed_within_two_cycles,
         )]),
         &[
-            "host-tests/tests/guards.rs: s3_a_part_that_holds_sda_costs_two_packets_at_most",
+            "host-tests/tests/guards.rs: s3_a_part_that_holds_sda_costs_one_packet",
             "boards/emulated/tests/faults.rs: a_part_that_holds_sda_is_clocked_free",
         ],
         "",
