@@ -3,7 +3,7 @@
 use core::{arch::asm, ptr};
 
 /// A checksum of a value's bytes on top of the one before: each word changes it one to one (a product with an odd number and a
-/// rotation, as in Y. Collet's xxHash32), so that a word which alone is another always shows.
+/// rotation, as in xxHash32), so that a word which alone is another always shows.
 pub fn sum<T>(value: &T, before: u32) -> u32 {
     of_words(
         ptr::from_ref(value).cast(),
