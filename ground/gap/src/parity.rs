@@ -29,11 +29,13 @@ pub mod codes;
 pub mod course;
 pub mod findings;
 pub mod flight;
+pub mod followed;
 pub mod nulls;
 pub mod packet;
 pub mod page;
 pub mod search;
 pub mod smooth;
+pub mod smoothed;
 pub mod space;
 pub mod spline;
 pub mod text;
@@ -44,7 +46,7 @@ use std::path::Path;
 
 use crate::{
     input::case::CaseError,
-    parity::{findings::Findings, flight::Flight, smooth::told::Told, verdict::Verdict},
+    parity::{findings::Findings, flight::Flight, followed::Followed, smooth::told::Told, verdict::Verdict},
 };
 
 /// File of the verdict, of the screen and of the page among the texts.
@@ -77,8 +79,10 @@ pub fn analysed(
     progress: &dyn Fn(&'static str, f64),
 ) -> Result<Vec<(String, String)>, ParityError> {
     let flight = Flight::open(case)?;
-    let findings = Findings::of(&flight, withheld, progress)?;
-    let told = Told::of(&flight, &|share| progress("attitude", share))?;
+    let coded = Findings::coded(&flight, withheld);
+    let followed = Followed::of(&flight, &flight.log, &coded);
+    let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
+    let told = Told::along(&followed, &|share| progress("attitude", share))?;
     let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings))?;
     let screen = text::screen(&flight, &findings, &told);
     let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings, &told)?];

@@ -16,38 +16,50 @@ use statrs::{
 };
 use twin::{
     effect::{Parameter, by_name},
-    predict::{Kind, Twin},
+    predict::Kind,
 };
 
 use crate::{
-    input::{case::CaseError, reference::Reference, windows::Fit},
-    library::{
-        hypotheses::{Hypothesis, Library},
-        products::Entries,
-    },
+    holdout::strength::Promise,
+    input::{case::CaseError, reference::Reference},
+    library::hypotheses::{Hypothesis, Library},
     null::problem::{Component, Problem},
     parity::{
         codes::{self, Finding},
-        course::Course,
         flight::Flight,
+        followed::Followed,
         nulls,
         packet::Motion,
-        search::{self, Chosen},
-        space::{Elimination, Projected, Space},
+        search::{self, Chosen, First, residual_of},
+        smoothed::{Fitted, Second, promises, strengths},
+        space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
     },
     probability::{cause::Sized, outcome::Outcome},
-    thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, UNKNOWN_PRIOR},
+    thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
 };
 
 /// Probability of a name that codes alone give: chance is ruled out, the library's other effects on codes are not.
 const BY_CODES: f64 = 0.99;
+
+/// What an effect is said by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// Codes, without a model.
+    Codes,
+    /// Each packet by itself.
+    Parity,
+    /// All packets, about the smoothed motion.
+    Smoothing,
+}
 
 /// An effect that is said.
 #[derive(Clone, Debug)]
 pub struct Name {
     /// In the library.
     pub effect: &'static str,
+    /// By what.
+    pub by: By,
     /// Where, in words.
     pub locality: String,
     /// Other places that the log does not tell from this one.
@@ -60,6 +72,8 @@ pub struct Name {
     pub gain: Option<f64>,
     /// Ratio by parity, at plausible size and at the size found; none of what codes say.
     pub snr: Option<[f64; 2]>,
+    /// What the held-out windows say of its strength; none where they were not asked.
+    pub promise: Option<Promise>,
     /// Its parameters.
     pub parameters: Vec<Sized>,
     /// What was seen, or which of what it may be.
@@ -124,57 +138,94 @@ impl Findings {
     /// # Errors
     /// When the unit has no redundancy, or its description names an effect there is not.
     pub fn of(flight: &Flight, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Result<Self, CaseError> {
-        let coded: Vec<Finding> = (codes::look(&flight.log, &flight.unit).into_iter())
+        let coded = Self::coded(flight, withheld);
+        let followed = Followed::of(flight, &flight.log, &coded);
+        Self::along(flight, withheld, &coded, &followed, progress)
+    }
+
+    /// What the codes of a flight say.
+    pub fn coded(flight: &Flight, withheld: &[String]) -> Vec<Finding> {
+        let coded = codes::look(&flight.log, &flight.unit).into_iter();
+        coded
             .filter(|finding| withheld.iter().all(|name| name != finding.effect))
-            .collect();
-        let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
-        codes::taken_out(&mut log, &mut unit, &coded);
-        progress("motion", 0.0);
-        let (course, _) = Course::of(&log, &unit, &flight.environment);
-        let starts_s = log.start_s.clone();
-        let twin = Twin::new(unit, flight.environment, course.scene.clone(), starts_s)?;
-        let fit = Fit { channels: log.channels };
-        let reference = Reference::default();
+            .collect()
+    }
+
+    /// Of a flight whose motion is followed, and of whose codes this is known.
+    ///
+    /// # Errors
+    /// When the unit has no redundancy, or its description names an effect there is not.
+    pub fn along(
+        flight: &Flight,
+        withheld: &[String],
+        coded: &[Finding],
+        followed: &Followed,
+        progress: &dyn Fn(&'static str, f64),
+    ) -> Result<Self, CaseError> {
+        let (twin, fit, reference) = (followed.twin_of_course()?, followed.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
-        let motion = Motion::of(&problem, &course);
+        let motion = Motion::of(&problem, &followed.course);
         let free = free(&problem, &motion);
         if free[..3].iter().sum::<f64>() < PARITY_FREE {
             return Err(empty(flight, free));
         }
         let library = Library::new(&problem, withheld, &|share| progress("effects", share));
         let space = Space::new(&problem, &motion, nulls::columns(&library));
-        let residual = projected(&space, residual_of(&problem, &[]));
+        let residual = projected(&space, &[]);
         progress("visible", 0.0);
         let seen = search::look(&space, &library, &residual, &|share| progress("visible", share));
-        let visible = visible::table(&library.hypotheses, &seen);
-        let chosen = search::choose(&space, &library, &residual, &seen, &|share| progress("search", share));
+        let mut visible = visible::table(&library.hypotheses, &seen);
+        let chosen = search::choose(&space, &library, &residual, &seen, &First::default(), &|share| {
+            progress("search", share);
+        });
+        let mut rivals = search::rivals(&library, &chosen);
+        let by_parity = search::said(&chosen).into_iter();
+        let mut causes: Vec<(Name, Fitted)> = by_parity.map(|one| Name::of(&problem, &library, one, By::Parity)).collect();
+        let named: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
+        if let Some(second) = Second::look(followed, withheld, &named, progress)? {
+            if std::env::var_os("HELD").is_some() {
+                for left in &second.left {
+                    let most = left.calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
+                    println!(
+                        "  smoothed gap {:.4} calibration {most:.2} of {} p {:.4}",
+                        left.gap,
+                        left.calibration.len(),
+                        erfc(most / 2f64.sqrt()) * left.calibration.len() as f64
+                    );
+                }
+            }
+            visible::add(&mut visible, &second.visible);
+            rivals.extend(second.rivals);
+            causes.extend(second.names);
+        }
+        let broken = weigh(flight, coded, &space, &mut causes, progress)?;
+        rivals.extend(causes.iter().map(|(name, _)| (name.effect, name.probability)));
+        let mut is_believed = true;
+        causes.retain(|(name, _)| {
+            // What is found beside something that is not there was not found.
+            is_believed &= name.probability >= SAID;
+            is_believed
+        });
+        let model: Vec<Component> = causes.iter().map(|(_, (component, _))| component.clone()).collect();
         let kept = space.kept(&residual);
-        let said: Vec<&Chosen> = chosen.iter().take_while(|one| one.probability >= SAID).collect();
-        let left = projected(&space, residual_of(&problem, &components(&library, &said)));
-        let gap = [total(&kept), total(&space.kept(&left))];
-        let packets = problem.twin.starts_s().len();
-        let mut names: Vec<Name> = coded.iter().map(by_codes).collect();
-        names.extend(said.iter().map(|one| by_search(&problem, &library, one)));
+        let left = projected(&space, &model);
+        let gap = [gap(&kept), gap(&space.kept(&left))];
+        let names: Vec<Name> = coded.iter().map(Name::by_codes).chain(causes.into_iter().map(|(name, _)| name)).collect();
+        rivals.retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
+        rivals.sort_by(|one, other| other.1.total_cmp(&one.1));
         let mut alternatives: Vec<(&'static str, f64)> = Vec::new();
-        let unsaid = chosen.iter().find(|one| one.probability < SAID);
-        for one in &said {
-            alternatives.extend(one.rivals.iter().copied());
+        for rival in rivals {
+            if alternatives.iter().all(|(name, _)| *name != rival.0) {
+                alternatives.push(rival);
+            }
         }
-        if let Some(one) = unsaid {
-            alternatives.push((library.hypotheses[one.hypothesis].effect(), one.probability));
-            alternatives.extend(one.rivals.iter().copied());
-        }
-        alternatives
-            .retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
-        alternatives.sort_by(|one, other| other.1.total_cmp(&one.1));
-        alternatives.dedup_by_key(|(name, _)| *name);
         let none_of_these = if is_unexplained(gap[1], &space.calibration(&left)) {
             1.0 - UNKNOWN_PRIOR
         } else {
-            UNKNOWN_PRIOR
+            UNKNOWN_PRIOR.max(broken)
         };
         Ok(Self {
-            rows: packets,
+            rows: problem.twin.starts_s().len(),
             free,
             channels: (twin.unit().channels.iter().zip(&kept))
                 .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
@@ -187,6 +238,52 @@ impl Findings {
             none_of_these,
         })
     }
+}
+
+/// Believes causes as far as the held-out windows, and of those that smoothing alone names parity too, keep what they promise; the
+/// probability that one that parity names does not, and something else was taken for it.
+fn weigh(
+    flight: &Flight,
+    coded: &[Finding],
+    parity: &Space,
+    causes: &mut [(Name, Fitted)],
+    progress: &dyn Fn(&'static str, f64),
+) -> Result<f64, CaseError> {
+    if causes.is_empty() {
+        return Ok(0.0);
+    }
+    let fitted: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
+    let held = match &flight.held {
+        Some(log) => {
+            let held = Followed::of(flight, log, coded);
+            promises(&held, &fitted, &|share| progress("held out", share))?
+        }
+        None => vec![None; fitted.len()],
+    };
+    let by_parity = strengths(parity, &DVector::zeros(0), &fitted);
+    let mut kept = 1.0;
+    for ((name, _), (held, by_parity)) in causes.iter_mut().zip(held.into_iter().zip(by_parity)) {
+        if std::env::var_os("HELD").is_some() {
+            println!(
+                "  {} {:?} at {} p {:.3} gain {:.1?} held {:.3?} parity {:.3?}",
+                name.effect, name.by, name.locality, name.probability, name.gain, held, by_parity
+            );
+        }
+        let believed = name.probability;
+        name.promise = held;
+        match name.by {
+            By::Codes | By::Parity => {
+                name.probability *= held.map_or(1.0, |held| held.confidence());
+                kept *= 1.0 - (believed - name.probability);
+            }
+            By::Smoothing => {
+                let told = held.filter(|held| held.sigma <= STRENGTH_SHOWN);
+                name.probability *= told.map_or(UNTOLD, |held| held.confidence());
+                name.probability *= by_parity.map_or(1.0, |strength| strength.confidence());
+            }
+        }
+    }
+    Ok(1.0 - kept)
 }
 
 fn empty(flight: &Flight, free: [f64; 4]) -> CaseError {
@@ -208,26 +305,8 @@ fn free(problem: &Problem, motion: &Motion) -> [f64; 4] {
     })
 }
 
-fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
-    problem.residuals(model).into_iter().enumerate().collect()
-}
-
-fn projected(space: &Space, column: Entries) -> Projected {
-    space.project_residual(column, &DVector::zeros(0))
-}
-
-fn components(library: &Library, said: &[&Chosen]) -> Vec<Component> {
-    said.iter()
-        .map(|one| library.hypotheses[one.hypothesis].component(&one.theta))
-        .collect()
-}
-
-/// Root mean square over degrees of freedom.
-fn total(kept: &[(f64, f64)]) -> f64 {
-    let (energy, free) = kept
-        .iter()
-        .fold((0.0, 0.0), |(energy, free), own| (energy + own.0, free + own.1));
-    (energy / free.max(1.0)).max(0.0).sqrt()
+fn projected(space: &Space, model: &[Component]) -> Projected {
+    space.project_residual(residual_of(space.problem, model), &DVector::zeros(0))
 }
 
 /// Whether something is there that nothing named explains: a gap too large, or a calibration that is off by more of its own sigmas
@@ -249,43 +328,51 @@ fn places<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> Vec<String> {
     places
 }
 
-fn by_codes(finding: &Finding) -> Name {
-    let page = by_name(finding.effect).map(|effect| effect.page());
-    Name {
-        effect: finding.effect,
-        locality: String::new(),
-        or_at: Vec::new(),
-        channels: finding.channels.clone(),
-        probability: BY_CODES,
-        gain: None,
-        snr: None,
-        parameters: Vec::new(),
-        which: Some(finding.what.clone()),
-        physics: page.map_or("", |page| page.physics),
-        confirm_by: page.map_or("", |page| page.confirm_by),
+impl Name {
+    fn by_codes(finding: &Finding) -> Self {
+        let page = by_name(finding.effect).map(|effect| effect.page());
+        Self {
+            effect: finding.effect,
+            by: By::Codes,
+            locality: String::new(),
+            or_at: Vec::new(),
+            channels: finding.channels.clone(),
+            probability: BY_CODES,
+            gain: None,
+            snr: None,
+            promise: None,
+            parameters: Vec::new(),
+            which: Some(finding.what.clone()),
+            physics: page.map_or("", |page| page.physics),
+            confirm_by: page.map_or("", |page| page.confirm_by),
+        }
     }
-}
 
-fn by_search(problem: &Problem, library: &Library, chosen: &Chosen) -> Name {
-    let hypothesis = &library.hypotheses[chosen.hypothesis];
-    let page = hypothesis.cause.effect.page();
-    let sized = |(index, parameter): (usize, &Parameter)| Sized {
-        parameter: parameter.clone(),
-        value: chosen.theta[index],
-        sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
-    };
-    Name {
-        effect: hypothesis.effect(),
-        locality: hypothesis.cause.locality.to_string(),
-        or_at: places(chosen.elsewhere.iter().map(|at| &library.hypotheses[*at])),
-        channels: hypothesis.cause.channels(problem.twin.unit()),
-        probability: chosen.probability,
-        gain: Some(chosen.gain),
-        snr: Some([chosen.snr, chosen.found_snr]),
-        parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
-        which: hypothesis.cause.effect.told(hypothesis.cause.variant),
-        physics: page.physics,
-        confirm_by: page.confirm_by,
+    /// Of an effect that a search chose, and as it was fitted.
+    pub fn of(problem: &Problem, library: &Library, chosen: &Chosen, by: By) -> (Self, Fitted) {
+        let hypothesis = &library.hypotheses[chosen.hypothesis];
+        let page = hypothesis.cause.effect.page();
+        let sized = |(index, parameter): (usize, &Parameter)| Sized {
+            parameter: parameter.clone(),
+            value: chosen.theta[index],
+            sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
+        };
+        let name = Self {
+            effect: hypothesis.effect(),
+            by,
+            locality: hypothesis.cause.locality.to_string(),
+            or_at: places(chosen.elsewhere.iter().map(|at| &library.hypotheses[*at])),
+            channels: hypothesis.cause.channels(problem.twin.unit()),
+            probability: chosen.probability,
+            gain: Some(chosen.gain),
+            snr: Some([chosen.snr, chosen.found_snr]),
+            promise: None,
+            parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
+            which: hypothesis.cause.effect.told(hypothesis.cause.variant),
+            physics: page.physics,
+            confirm_by: page.confirm_by,
+        };
+        (name, (hypothesis.component(&chosen.theta), chosen.covariance.clone()))
     }
 }
 

@@ -1,4 +1,4 @@
-//! A case whose motion nobody recorded: the fit windows of its log, and the unit in its environment.
+//! A case whose motion nobody recorded: the windows of its log, and the unit in its environment.
 //!
 //! In: the folder of a case. Out: [`Flight`]. A `motion` that is there is not opened.
 //!
@@ -11,6 +11,7 @@ use twin::{environment::Environment, predict::UnitDescription};
 use crate::input::{
     case::{CaseError, Kind, Opened, columns_of, environment_of},
     log::{Log, Series},
+    windows::Span,
 };
 
 /// Rows that are kept at most: 20 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
@@ -29,6 +30,8 @@ pub struct Flight {
     pub environment: Environment,
     /// The rows of the fit windows.
     pub log: Log,
+    /// Those of the held-out windows, which no fit reads; none where they are too few.
+    pub held: Option<Log>,
     /// One row in so many was kept.
     pub thinned: usize,
 }
@@ -47,16 +50,19 @@ impl Flight {
         let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
         let environment = environment_of(&opened, &unit)?;
         let log = opened.log(&columns_of(&unit), unit.cycle_s)?;
-        let is_fit = |start_s: f64| opened.windows.fit().iter().any(|span| span.contains(start_s));
-        let rows: Vec<usize> = (0..log.start_s.len()).filter(|row| is_fit(log.start_s[*row])).collect();
+        let rows = rows(&log, opened.windows.fit());
         if rows.len() < LEAST_ROWS {
             let problem = format!("hold {} rows of the log; at least {LEAST_ROWS} are needed", rows.len());
             return Err(CaseError::key(&opened.file, "windows.fit", problem));
         }
         let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
         let rows: Vec<usize> = rows.into_iter().step_by(thinned).collect();
+        let held = self::rows(&log, opened.windows.hold());
+        let every = held.len().div_ceil(MOST_ROWS).max(1);
+        let held: Vec<usize> = held.into_iter().step_by(every).collect();
         Ok(Flight {
-            log: only(log, &rows),
+            log: only(&log, &rows),
+            held: (held.len() >= LEAST_ROWS).then(|| only(&log, &held)),
             opened,
             unit,
             environment,
@@ -71,8 +77,14 @@ impl Flight {
     }
 }
 
+/// Rows of a log that begin in these windows.
+fn rows(log: &Log, windows: &[Span]) -> Vec<usize> {
+    let is_in = |start_s: f64| windows.iter().any(|span| span.contains(start_s));
+    (0..log.start_s.len()).filter(|row| is_in(log.start_s[*row])).collect()
+}
+
 /// These rows of a log, which rise.
-fn only(log: Log, rows: &[usize]) -> Log {
+fn only(log: &Log, rows: &[usize]) -> Log {
     let mut new_row = vec![None; log.start_s.len()];
     rows.iter()
         .enumerate()
@@ -86,6 +98,7 @@ fn only(log: Log, rows: &[usize]) -> Log {
     Log {
         start_s: rows.iter().map(|row| log.start_s[*row]).collect(),
         channels: log.channels.iter().map(series).collect(),
-        ..log
+        masked: log.masked.clone(),
+        stream: log.stream,
     }
 }

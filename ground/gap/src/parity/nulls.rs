@@ -56,6 +56,7 @@ pub const NULLS: &[Null] = &[
             "gyro-scale",
             "accel-bias",
             "accel-scale",
+            "accel-range",
             "hard-iron",
         ],
         settled_by: "rest in two opposite attitudes tells bias and scale of the accelerometers; a full turn of a table, \
@@ -75,7 +76,12 @@ pub const NULLS: &[Null] = &[
 
 /// The null that a hypothesis belongs to: one sensor's delay or bias among others is none.
 pub fn of(hypothesis: &Hypothesis) -> Option<&'static Null> {
-    let is_shared = matches!(hypothesis.cause.locality, Locality::Unit | Locality::Common);
+    let is_shared = match hypothesis.cause.locality {
+        Locality::Unit | Locality::Common => true,
+        // What is there or not is the same in each.
+        Locality::All => hypothesis.parameters.is_empty(),
+        Locality::Group(_) | Locality::Channel(_) => false,
+    };
     let own = NULLS.iter().find(|null| null.effects.contains(&hypothesis.effect()));
     own.filter(|_| is_shared)
 }

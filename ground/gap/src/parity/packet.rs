@@ -108,15 +108,16 @@ impl Elimination for Motion {
         part
     }
 
-    fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64> {
-        let samples = self.packet[channel]
-            .iter()
-            .zip(self.rows[channel].chunks_exact(UNKNOWNS));
-        let values = samples.map(|(packet, row)| {
-            let own = &part.as_slice()[UNKNOWNS * packet..UNKNOWNS * (packet + 1)];
-            own.iter().zip(row).map(|(part, q)| part * q).sum()
-        });
-        DVector::from_iterator(self.packet[channel].len(), values)
+    fn imitated(&self, part: &DVector<f64>) -> Vec<DVector<f64>> {
+        let of_channel = |(packets, rows): (&Vec<usize>, &Vec<f64>)| {
+            let samples = packets.iter().zip(rows.chunks_exact(UNKNOWNS));
+            let values = samples.map(|(packet, row)| {
+                let own = &part.as_slice()[UNKNOWNS * packet..UNKNOWNS * (packet + 1)];
+                own.iter().zip(row).map(|(part, q)| part * q).sum()
+            });
+            DVector::from_iterator(packets.len(), values)
+        };
+        self.packet.iter().zip(&self.rows).map(of_channel).collect()
     }
 
     fn free(&self, channel: usize) -> f64 {

@@ -9,6 +9,7 @@
 use std::iter::once;
 
 use nalgebra::{DMatrix, DVector};
+use twin::effect::Nature;
 
 use crate::{
     library::{
@@ -17,14 +18,14 @@ use crate::{
     },
     null::{
         evidence::{Screen, probabilities},
-        problem::Component,
+        problem::{Component, Problem},
     },
     parity::{
         space::{Projected, Space},
         visible::may_be_named,
     },
     search::odds::{itself, oversize},
-    thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, TEMPERATURE},
+    thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, SAID, TEMPERATURE},
 };
 
 /// A hypothesis in this log.
@@ -62,6 +63,27 @@ pub struct Chosen {
     pub elsewhere: Vec<usize>,
     /// Other effects with theirs, most first.
     pub rivals: Vec<(&'static str, f64)>,
+}
+
+/// Those that are said: the first ones that are likelier than not.
+pub fn said(chosen: &[Chosen]) -> Vec<&Chosen> {
+    chosen.iter().take_while(|one| one.probability >= SAID).collect()
+}
+
+/// Effects that may be there instead of those that are said, and what was taken next and is not said.
+pub fn rivals(library: &Library, chosen: &[Chosen]) -> Vec<(&'static str, f64)> {
+    let said = said(chosen);
+    let mut rivals: Vec<(&'static str, f64)> = said.iter().flat_map(|one| one.rivals.clone()).collect();
+    if let Some(one) = chosen.get(said.len()) {
+        rivals.push((library.hypotheses[one.hypothesis].effect(), one.probability));
+        rivals.extend(one.rivals.iter().copied());
+    }
+    rivals
+}
+
+/// What a model leaves of a problem.
+pub fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
+    problem.residuals(model).into_iter().enumerate().collect()
 }
 
 /// Every hypothesis, alone. `progress` is told how far it is.
@@ -160,12 +182,39 @@ fn on_the_whole(space: &Space, hypothesis: &Hypothesis) -> Entries {
     space.problem.contribution(&model, 0)
 }
 
-/// Takes effects while the evidence asks for one.
+/// Effects that are in the residual's model before anything is sought: their slopes there, free in every fit.
+#[derive(Default)]
+pub struct First {
+    effects: Vec<&'static str>,
+    taken: Vec<(Vec<Projected>, Vec<f64>)>,
+}
+
+impl First {
+    /// These.
+    pub fn of(space: &Space, model: &[Component]) -> Self {
+        let unit = space.problem.twin.unit();
+        let slopes = |(at, component): (usize, &Component)| {
+            let cause = &component.active.cause;
+            if cause.effect.page().nature == Nature::Discrete {
+                return (Vec::new(), Vec::new());
+            }
+            let sigmas = cause.parameters(unit).iter().map(|own| own.prior_sigma).collect();
+            (space.project(space.problem.slopes(model, at)), sigmas)
+        };
+        Self {
+            effects: model.iter().map(|own| own.active.cause.effect.page().name).collect(),
+            taken: model.iter().enumerate().map(slopes).collect(),
+        }
+    }
+}
+
+/// Takes effects while the evidence asks for one, beside those that are in already.
 pub fn choose(
     space: &Space,
     library: &Library,
     residual: &Projected,
     seen: &[Seen],
+    first: &First,
     progress: &dyn Fn(f64),
 ) -> Vec<Chosen> {
     let eligible: Vec<usize> = (seen.iter())
@@ -173,19 +222,19 @@ pub fn choose(
         .map(|one| one.hypothesis)
         .collect();
     let mut chosen: Vec<Chosen> = Vec::new();
-    let mut taken: Vec<(Vec<Projected>, Vec<f64>)> = Vec::new();
-    while chosen.len() < MOST_CAUSES {
+    let mut taken = first.taken.clone();
+    while first.effects.len() + chosen.len() < MOST_CAUSES {
         progress(chosen.len() as f64 / MOST_CAUSES as f64);
         let mut fits: Vec<(usize, Fit)> = Vec::new();
-        if chosen.is_empty() {
+        if chosen.is_empty() && taken.is_empty() {
             for one in seen.iter().filter(|one| eligible.contains(&one.hypothesis)) {
                 fits.extend(fit_alone(library, one).map(|fit| (one.hypothesis, fit)));
             }
         } else {
             let is_other = |at: &usize| {
-                chosen
-                    .iter()
-                    .all(|chosen| library.hypotheses[chosen.hypothesis].effect() != library.hypotheses[*at].effect())
+                let mut known = chosen.iter().map(|own| library.hypotheses[own.hypothesis].effect());
+                let effect = library.hypotheses[*at].effect();
+                known.all(|own| own != effect) && !first.effects.contains(&effect)
             };
             let others: Vec<usize> = eligible
                 .iter()

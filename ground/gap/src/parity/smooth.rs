@@ -242,9 +242,9 @@ pub fn fit(log: &Log) -> Fit {
 /// Covariance of the attitude at instants \[s\]: of a turn in b \[rad2\], noise and calibration together.
 pub fn covariances(space: &Space, motion: &Smoothing, instants_s: &[f64]) -> Vec<Matrix3<f64>> {
     let parts = space.open_parts();
-    let mut moved = DMatrix::zeros(parts.nrows(), 3 * instants_s.len());
-    for (at, part) in parts.row_iter().enumerate() {
-        let turned = motion.correction(&part.transpose());
+    let mut moved = DMatrix::zeros(parts.len(), 3 * instants_s.len());
+    for (at, part) in parts.iter().enumerate() {
+        let turned = motion.correction(part);
         for (instant, t_s) in instants_s.iter().enumerate() {
             let (first, weights) = motion.turn_rows(*t_s);
             for axis in 0..3 {

@@ -11,16 +11,13 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::{library::products::Entries, null::problem::Problem};
 
-/// Columns that are projected at once: enough for a matrix product, few enough for the memory.
-const AT_ONCE: usize = 32;
-
 /// A motion that can be eliminated, whichever way it is described.
 pub trait Elimination {
     /// `Q'u` of a column, `Q` being orthonormal: what the motion can imitate of it.
     fn part(&self, column: &Entries) -> DVector<f64>;
 
-    /// What a [`Elimination::part`] is in the samples of a channel.
-    fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64>;
+    /// What a [`Elimination::part`] is in the samples of each channel, `Q` times it.
+    fn imitated(&self, part: &DVector<f64>) -> Vec<DVector<f64>>;
 
     /// Degrees of freedom that the motion leaves a channel.
     fn free(&self, channel: usize) -> f64;
@@ -56,41 +53,48 @@ pub struct Space<'a> {
     pub problem: &'a Problem<'a>,
     motion: &'a dyn Elimination,
     nulls: Vec<Entries>,
-    /// `(Q'C)'`, a row a column of the calibration.
-    spread: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
 }
 
 impl<'a> Space<'a> {
     /// Sets it up; `nulls` are columns for a standard deviation that leaves them free.
     pub fn new(problem: &'a Problem<'a>, motion: &'a dyn Elimination, nulls: Vec<Entries>) -> Self {
-        let own = problem.frames.iter().enumerate().flat_map(|(channel, frame)| {
-            let columns = frame.nuisance.column_iter();
-            columns.map(move |column| vec![(channel, column.into_owned())])
-        });
-        let columns: Vec<Entries> = own.chain(nulls.iter().cloned()).collect();
         let mut space = Self {
             problem,
             motion,
             nulls,
-            spread: DMatrix::zeros(0, 0),
             factor: None,
         };
-        let parts: Vec<DVector<f64>> = columns.iter().map(|column| motion.part(column)).collect();
-        let Some(length) = parts.first().map(DVector::len) else {
+        let columns = space.columns();
+        if columns.is_empty() {
             return space;
-        };
-        let mut spread = DMatrix::zeros(parts.len(), length);
-        (parts.iter().enumerate()).for_each(|(at, part)| spread.row_mut(at).tr_copy_from(part));
+        }
         let mut inner = DMatrix::identity(columns.len(), columns.len());
         for (at, column) in columns.iter().enumerate() {
-            let plain = space.plain(column);
-            inner.column_mut(at).axpy(1.0, &plain, 1.0);
+            let apart = space.apart(column, &motion.part(column));
+            inner.column_mut(at).axpy(1.0, &space.plain(&apart), 1.0);
         }
-        inner -= &spread * spread.transpose();
-        space.spread = spread;
         space.factor = Cholesky::new(inner);
         space
+    }
+
+    /// Calibration, channel by channel, then nulls.
+    fn columns(&self) -> Vec<Entries> {
+        let own = self.problem.frames.iter().enumerate().flat_map(|(channel, frame)| {
+            let columns = frame.nuisance.column_iter();
+            columns.map(move |column| vec![(channel, column.into_owned())])
+        });
+        own.chain(self.nulls.iter().cloned()).collect()
+    }
+
+    /// A column without what the motion imitates of it.
+    fn apart(&self, column: &Entries, part: &DVector<f64>) -> Entries {
+        let mut apart = self.motion.imitated(part);
+        apart.iter_mut().for_each(|values| values.neg_mut());
+        for (channel, values) in column {
+            apart[*channel] += values;
+        }
+        apart.into_iter().enumerate().collect()
     }
 
     /// `C'u`.
@@ -117,38 +121,24 @@ impl<'a> Space<'a> {
     }
 
     fn projected(&self, columns: Vec<Entries>, prior: &DVector<f64>) -> Vec<Projected> {
-        let mut projected = Vec::with_capacity(columns.len());
-        let mut columns = columns.into_iter();
-        loop {
-            let some: Vec<Entries> = columns.by_ref().take(AT_ONCE).collect();
-            if some.is_empty() {
-                return projected;
-            }
-            let mut parts: Vec<DVector<f64>> = some.iter().map(|column| self.motion.part(column)).collect();
-            for part in &mut parts {
-                part.rows_mut(0, prior.len()).add_assign(prior);
-            }
-            let mut open = match self.factor {
-                Some(_) => -(&self.spread * DMatrix::from_columns(&parts)),
-                None => DMatrix::zeros(0, parts.len()),
-            };
-            if let Some(factor) = &self.factor {
-                for (at, column) in some.iter().enumerate() {
-                    let plain = self.plain(column);
-                    open.column_mut(at).axpy(1.0, &plain, 1.0);
+        let project = |column: Entries| {
+            let mut motion = self.motion.part(&column);
+            motion.rows_mut(0, prior.len()).add_assign(prior);
+            let open = match &self.factor {
+                Some(factor) => {
+                    let mut open = self.plain(&self.apart(&column, &motion));
+                    factor.l_dirty().solve_lower_triangular_mut(&mut open);
+                    open
                 }
-                factor.l_dirty().solve_lower_triangular_mut(&mut open);
+                None => DVector::zeros(0),
+            };
+            Projected {
+                column,
+                prior: prior.clone(),
+                imitated: Imitated { motion, open },
             }
-            for (at, (column, motion)) in some.into_iter().zip(parts).enumerate() {
-                let open = open.column(at).into_owned();
-                let imitated = Imitated { motion, open };
-                projected.push(Projected {
-                    column,
-                    prior: prior.clone(),
-                    imitated,
-                });
-            }
-        }
+        };
+        columns.into_iter().map(project).collect()
     }
 
     /// `<u, v>`.
@@ -180,9 +170,9 @@ impl<'a> Space<'a> {
         }
     }
 
-    /// What the motion can imitate of each column of calibration and nulls, a row each.
-    pub fn open_parts(&self) -> &DMatrix<f64> {
-        &self.spread
+    /// What the motion can imitate of each column of calibration and nulls.
+    pub fn open_parts(&self) -> Vec<DVector<f64>> {
+        self.columns().iter().map(|column| self.motion.part(column)).collect()
     }
 
     /// What calibration and nulls leave of a residual, and what of each channel's calibration that costs: the energy of how far it
@@ -224,13 +214,21 @@ impl<'a> Space<'a> {
         let (left, price) = self.left(residual);
         let part = residual.with_prior(self.motion.part(&left));
         let mut kept = vec![(0.0, 0.0); self.problem.frames.len()];
+        let imitated = self.motion.imitated(&part);
         for (channel, values) in &left {
-            let imitated = self.motion.imitated(*channel, &part);
-            let energy = values.dot(values) - values.dot(&imitated) + price[*channel];
+            let energy = values.dot(values) - values.dot(&imitated[*channel]) + price[*channel];
             kept[*channel] = (energy, self.motion.free(*channel));
         }
         kept
     }
+}
+
+/// Root mean square of what channels keep ([`Space::kept`]), over degrees of freedom.
+pub fn gap(kept: &[(f64, f64)]) -> f64 {
+    let (energy, free) = kept
+        .iter()
+        .fold((0.0, 0.0), |(energy, free), own| (energy + own.0, free + own.1));
+    (energy / free.max(1.0)).max(0.0).sqrt()
 }
 
 /// `u'v`.

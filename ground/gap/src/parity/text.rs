@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::{
     parity::{
-        findings::{Findings, Name, Place},
+        findings::{By, Findings, Name, Place},
         flight::Flight,
         nulls::NULLS,
         smooth::told::Told,
@@ -55,7 +55,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
 fn seen_and_not(findings: &Findings) -> String {
     let (seen, unseen) = effects(&findings.visible);
     format!(
-        "SEEN    of usual size, by parity: {}\nUNSEEN  never named from this log: {}\n",
+        "SEEN    of usual size, by parity or about the smoothed motion: {}\nUNSEEN  never named from this log: {}\n",
         seen.join(", "),
         unseen.join(", ")
     )
@@ -139,7 +139,19 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
 fn evidence(name: &Name) -> String {
     match (name.gain, name.snr) {
         (Some(gain), Some([usual, found])) => {
-            format!(", {gain:.1} nats, signal-to-noise ratio {found:.1} at this size and {usual:.1} at the usual")
+            let by = match name.by {
+                By::Smoothing => ", about the smoothed motion",
+                By::Codes | By::Parity => "",
+            };
+            let held = name.promise.map_or(String::new(), |promise| {
+                format!(
+                    "; {:.2} +- {:.2} times as strong on the held-out windows",
+                    promise.factor, promise.sigma
+                )
+            });
+            format!(
+                ", {gain:.1} nats{by}, signal-to-noise ratio {found:.1} at this size and {usual:.1} at the usual{held}"
+            )
         }
         _ => ", by the codes alone".to_owned(),
     }
@@ -159,16 +171,18 @@ pub fn next(findings: &Findings) -> String {
 /// What of each effect can be seen, and what cannot and why.
 pub fn visibility(findings: &Findings) -> String {
     let mut out = format!(
-        "signal-to-noise ratio of an effect of usual size, where it is seen best:\nwith the motion known, by parity, and the \
-         share that remains; from {PARITY_SNR:.0} on it may be named\n{:30} {:8} {:>10} {:>8} {:>6}\n",
-        "effect", "place", "reference", "parity", "share"
+        "signal-to-noise ratio of an effect of usual size, where it is seen best:\nwith the motion known, by parity, the \
+         share that remains, and about the smoothed motion; from {PARITY_SNR:.0} on it may be named\n\
+         {:30} {:8} {:>10} {:>8} {:>6} {:>9}\n",
+        "effect", "place", "reference", "parity", "share", "smoothed"
     );
     for row in &findings.visible {
         let (effect, place) = (row.effect, row.place);
         let note = if row.is_visible { "" } else { "  not seen" };
+        let smoothed = row.smoothed.map_or("-".to_owned(), |snr| format!("{snr:.1}"));
         let _ = writeln!(
             out,
-            "{effect:30} {place:8} {:10.1} {:8.1} {:6.2}{note}",
+            "{effect:30} {place:8} {:10.1} {:8.1} {:6.2} {smoothed:>9}{note}",
             row.with_reference,
             row.snr,
             row.share()

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::{
     parity::{
-        findings::{Findings, Name},
+        findings::{By, Findings, Name},
         flight::Flight,
         nulls::NULLS,
         text,
@@ -59,6 +59,8 @@ struct Visible {
     place: &'static str,
     with_reference: f64,
     by_parity: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    by_smoothing: Option<f64>,
     may_be_named: bool,
 }
 
@@ -81,7 +83,11 @@ impl Verdict {
             channels: flight.names(&name.channels),
             or_at: name.or_at.clone(),
             probability: rounded(name.probability),
-            by: if name.gain.is_some() { "evidence" } else { "codes" },
+            by: match name.by {
+                By::Codes => "codes",
+                By::Parity => "evidence",
+                By::Smoothing => "smoothing",
+            },
             parameters: (name.parameters.iter())
                 .map(|sized| {
                     let parameter = Parameter {
@@ -98,6 +104,7 @@ impl Verdict {
             place: row.place,
             with_reference: rounded(row.with_reference),
             by_parity: rounded(row.snr),
+            by_smoothing: row.smoothed.map(rounded),
             may_be_named: row.is_visible,
         });
         let alternative = |(effect, probability): &(&'static str, f64)| Alternative {

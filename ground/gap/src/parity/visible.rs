@@ -25,6 +25,8 @@ pub struct Row {
     pub with_reference: f64,
     /// By parity.
     pub snr: f64,
+    /// About the smoothed motion; none where that did not settle.
+    pub smoothed: Option<f64>,
     /// Whether it may be named.
     pub is_visible: bool,
 }
@@ -51,6 +53,7 @@ pub fn table(hypotheses: &[Hypothesis], seen: &[Seen]) -> Vec<Row> {
             place,
             with_reference: one.with_reference,
             snr: one.snr,
+            smoothed: None,
             is_visible: may_be_named(hypothesis, one.snr),
         };
         match rows.iter_mut().find(|row| (row.effect, row.place) == (effect, place)) {
@@ -60,6 +63,17 @@ pub fn table(hypotheses: &[Hypothesis], seen: &[Seen]) -> Vec<Row> {
         }
     }
     rows
+}
+
+/// Adds what is seen about the smoothed motion.
+pub fn add(rows: &mut [Row], smoothed: &[Row]) {
+    for row in rows {
+        let own = smoothed.iter().find(|own| (own.effect, own.place) == (row.effect, row.place));
+        if let Some(own) = own {
+            row.smoothed = Some(own.snr);
+            row.is_visible |= own.is_visible;
+        }
+    }
 }
 
 /// Whether a hypothesis of this ratio may be named at all.

@@ -168,23 +168,22 @@ impl Elimination for Smoothing {
         part
     }
 
-    fn imitated(&self, channel: usize, part: &DVector<f64>) -> DVector<f64> {
+    fn imitated(&self, part: &DVector<f64>) -> Vec<DVector<f64>> {
         let size = self.factor.size();
-        if !self.warm[channel].is_empty() {
-            let values = self.warm[channel].iter().map(|(row, share)| share * part[size + row]);
-            return DVector::from_iterator(self.warm[channel].len(), values);
-        }
-        let own = &self.rows[channel];
-        if own.first.is_empty() {
-            return DVector::zeros(0);
-        }
         let solved = self.correction(part);
-        let samples = own.first.iter().zip(own.slopes.chunks_exact(self.width));
-        let values = samples.map(|(first, slopes)| {
-            let about = &solved[UNKNOWNS * first..UNKNOWNS * first + self.width];
-            about.iter().zip(slopes).map(|(own, slope)| own * slope).sum()
-        });
-        DVector::from_iterator(own.first.len(), values)
+        let of_channel = |(own, warm): (&Rows, &Vec<(usize, f64)>)| {
+            if !warm.is_empty() {
+                let values = warm.iter().map(|(row, share)| share * part[size + row]);
+                return DVector::from_iterator(warm.len(), values);
+            }
+            let samples = own.first.iter().zip(own.slopes.chunks_exact(self.width));
+            let values = samples.map(|(first, slopes)| {
+                let about = &solved[UNKNOWNS * first..UNKNOWNS * first + self.width];
+                about.iter().zip(slopes).map(|(own, slope)| own * slope).sum()
+            });
+            DVector::from_iterator(own.first.len(), values)
+        };
+        self.rows.iter().zip(&self.warm).map(of_channel).collect()
     }
 
     fn free(&self, channel: usize) -> f64 {

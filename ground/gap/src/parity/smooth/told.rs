@@ -11,11 +11,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::Problem,
-    parity::smooth::{Smoothed, covariances, fit},
+    parity::smooth::covariances,
     parity::{
         codes::{self, Finding},
-        course::Course,
         flight::Flight,
+        followed::Followed,
         space::Space,
     },
 };
@@ -47,11 +47,16 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn of(flight: &Flight, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
-        let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
-        let coded: Vec<Finding> = codes::look(&log, &unit);
-        codes::taken_out(&mut log, &mut unit, &coded);
-        let (course, start) = Course::of(&log, &unit, &flight.environment);
-        let smoothed = Smoothed::of(&log, &unit, &flight.environment, (&course, &start), progress)?;
+        let coded: Vec<Finding> = codes::look(&flight.log, &flight.unit);
+        Self::along(&Followed::of(flight, &flight.log, &coded), progress)
+    }
+
+    /// Of a log whose motion is followed.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn along(followed: &Followed, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+        let smoothed = followed.smoothed(progress)?;
         let mut told = Self {
             attitudes: Vec::new(),
             rests: smoothed.rests.clone(),
@@ -60,11 +65,11 @@ impl Told {
         if !smoothed.is_settled() {
             return Ok(told);
         }
-        let twin = smoothed.twin(&log, &unit, &flight.environment)?;
-        let (fit, reference) = (fit(&log), Reference::default());
+        let (twin, fit, reference) = (followed.twin(smoothed)?, followed.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
-        let motion = smoothed.smoothing(&problem, &course, &start);
+        let motion = followed.motion(smoothed, &problem);
         let space = Space::new(&problem, &motion, Vec::new());
+        let log = &followed.log;
         let covariances = covariances(&space, &motion, &log.start_s);
         told.attitudes = (log.start_s.iter().zip(&covariances))
             .map(|(t_s, covariance)| Attitude {

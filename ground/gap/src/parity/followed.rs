@@ -1,0 +1,92 @@
+//! A log whose motion is followed: without what its codes tell, along its course, and along the smoothed motion.
+//!
+//! In: rows of a [`Flight`], those of the fit windows or the held-out ones, which have a motion each. Out: [`Followed`].
+
+use std::cell::OnceCell;
+
+use twin::{
+    environment::Environment,
+    predict::{Twin, UnitDescription},
+};
+
+use crate::{
+    input::{case::CaseError, log::Log, windows::Fit},
+    null::problem::Problem,
+    parity::{
+        codes::{self, Finding},
+        course::{Course, Start},
+        flight::Flight,
+        smooth::{self, Smoothed, smoothing::Smoothing},
+    },
+};
+
+/// A log and what its unit did meanwhile.
+pub struct Followed {
+    /// What is left of the log.
+    pub log: Log,
+    /// The unit, its noise with what codes lose.
+    pub unit: UnitDescription,
+    /// About which parity is linear.
+    pub course: Course,
+    smoothed: OnceCell<Smoothed>,
+    environment: Environment,
+    start: Start,
+}
+
+impl Followed {
+    /// Rows of a flight, in whose codes this was found.
+    pub fn of(flight: &Flight, log: &Log, coded: &[Finding]) -> Self {
+        let (mut log, mut unit) = (log.clone(), flight.unit.clone());
+        codes::taken_out(&mut log, &mut unit, coded);
+        let environment = flight.environment;
+        let (course, start) = Course::of(&log, &unit, &environment);
+        Self {
+            log,
+            unit,
+            course,
+            smoothed: OnceCell::new(),
+            environment,
+            start,
+        }
+    }
+
+    /// The motion smoothed over the whole log, made when first asked for. It may not have settled.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn smoothed(&self, progress: &dyn Fn(f64)) -> Result<&Smoothed, CaseError> {
+        if let Some(known) = self.smoothed.get() {
+            return Ok(known);
+        }
+        let course = (&self.course, &self.start);
+        let smoothed = Smoothed::of(&self.log, &self.unit, &self.environment, course, progress)?;
+        Ok(self.smoothed.get_or_init(|| smoothed))
+    }
+
+    /// The twin along the course.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn twin_of_course(&self) -> Result<Twin, CaseError> {
+        let (scene, starts_s) = (self.course.scene.clone(), self.log.start_s.clone());
+        Ok(Twin::new(self.unit.clone(), self.environment, scene, starts_s)?)
+    }
+
+    /// The twin along a smoothed motion of it.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn twin(&self, smoothed: &Smoothed) -> Result<Twin, CaseError> {
+        smoothed.twin(&self.log, &self.unit, &self.environment)
+    }
+
+    /// All of the log.
+    pub fn fit(&self) -> Fit {
+        smooth::fit(&self.log)
+    }
+
+    /// A smoothed motion of it, to be eliminated from a problem of [`Followed::twin`].
+    pub fn motion(&self, smoothed: &Smoothed, problem: &Problem) -> Smoothing {
+        smoothed.smoothing(problem, &self.course, &self.start)
+    }
+}

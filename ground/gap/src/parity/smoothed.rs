@@ -1,0 +1,166 @@
+//! The second look: effects sought about the smoothed motion.
+//!
+//! In: a [`Followed`] log, what parity names. Out: [`Second`]: what else the evidence asks for once the whole course of the motion is
+//! eliminated at once, by [`crate::parity::smooth::smoothing`] instead of packet by packet. A motion that is one course ties packets
+//! to each other, and the known field ties them to n; so effects that every packet alone takes for another motion are seen: what
+//! depends on a rate, a force or a temperature and is the same in all sensors of a kind.
+//!
+//! Library, columns, evidence and doubts are those of the first look ([`crate::parity::search`]). The exact nulls
+//! ([`crate::parity::nulls`]) are columns of no price before anything is sought: a prior of smoothness is not changed by a delay, but its
+//! linearisation is, and gives a common delay a ratio of 17 on a healthy log.
+//!
+//! What parity names stays in the model, its parameters free. A motion that did not settle is none to look about.
+//!
+//! The prior of the motion is a guess, and evidence does not know how good it is. So what this look alone names is believed only as
+//! far as two others keep what it promises ([`strengths`]): the held-out windows, smoothed with a motion of their own, must show
+//! it; and parity, where it shows it, must find it as strong, for parity needs no prior of smoothness. Where they do not, either
+//! that prior or something outside the library is to blame, which one log does not tell: nothing is said but that it may be.
+
+use nalgebra::{DMatrix, DVector};
+use twin::effect::{LIBRARY, Nature};
+
+use crate::{
+    holdout::strength::Promise,
+    input::{case::CaseError, reference::Reference},
+    library::hypotheses::Library,
+    null::problem::{Component, Problem},
+    parity::{
+        findings::{By, Name},
+        followed::Followed,
+        nulls::{self, NULLS},
+        search::{self, Chosen, First, residual_of},
+        space::{self, Projected, Space},
+        visible::{self, Row},
+    },
+};
+
+/// A cause with the covariance of its parameters.
+pub type Fitted = (Component, DMatrix<f64>);
+
+/// What the second look says.
+pub struct Second {
+    /// What can be seen.
+    pub visible: Vec<Row>,
+    /// What it names beside what parity does, likeliest first, its parameters fitted.
+    pub names: Vec<(Name, Fitted)>,
+    /// Other effects with their probabilities.
+    pub rivals: Vec<(&'static str, f64)>,
+    /// What is left with what parity names in the model, and with one after the other of its own names too.
+    pub left: Vec<Left>,
+}
+
+/// What a model leaves.
+pub struct Left {
+    /// \[sigma\] over degrees of freedom.
+    pub gap: f64,
+    /// By how many of its own sigmas each parameter of the calibration is off.
+    pub calibration: Vec<f64>,
+}
+
+impl Left {
+    /// Of a residual.
+    pub fn of(space: &Space, residual: &Projected) -> Self {
+        Self {
+            gap: space::gap(&space.kept(residual)),
+            calibration: space.calibration(residual),
+        }
+    }
+}
+
+impl Second {
+    /// Of a log in which parity names these; none where the motion did not settle.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn look(
+        followed: &Followed,
+        withheld: &[String],
+        named: &[Fitted],
+        progress: &dyn Fn(&'static str, f64),
+    ) -> Result<Option<Self>, CaseError> {
+        let smoothed = followed.smoothed(&|share| progress("motion", share))?;
+        if !smoothed.is_settled() {
+            return Ok(None);
+        }
+        let (twin, fit, reference) = (followed.twin(smoothed)?, followed.fit(), Reference::default());
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = followed.motion(smoothed, &problem);
+        let library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
+        let space = Space::new(&problem, &motion, nulls::columns(&library));
+        let prior = motion.prior();
+        let project = |model: &[Component]| space.project_residual(residual_of(&problem, model), &prior);
+        let mut model: Vec<Component> = named.iter().map(|(component, _)| component.clone()).collect();
+        let residual = project(&model);
+        let first = First::of(&space, &model);
+        let part = |from: f64, share: f64| progress("smoothed", from + (1.0 - from) * share);
+        let seen = search::look(&space, &library, &residual, &|share| part(0.4, 0.7 * share));
+        let chosen = search::choose(&space, &library, &residual, &seen, &first, &|share| {
+            part(0.8, share);
+        });
+        let said: Vec<&Chosen> = search::said(&chosen);
+        let mut left = vec![Left::of(&space, &residual)];
+        for one in &said {
+            model.push(library.hypotheses[one.hypothesis].component(&one.theta));
+            left.push(Left::of(&space, &project(&model)));
+        }
+        Ok(Some(Self {
+            visible: visible::table(&library.hypotheses, &seen),
+            rivals: search::rivals(&library, &chosen),
+            names: said.iter().map(|one| Name::of(&problem, &library, one, By::Smoothing)).collect(),
+            left,
+        }))
+    }
+}
+
+/// By what factor each cause is stronger in a space than it was fitted; none of one that makes nothing there. `prior` is what prior
+/// rows of the motion are off by.
+///
+/// With `d` what a cause adds, everything in the model, `r` what that leaves, and `s` the derivatives of `d` by its parameters, whose
+/// covariance is `C`, the factor is `1 + <d, r> / <d, d>` and its variance `(<d, d> + <s, d>' C <s, d>) / <d, d>^2`, as in
+/// [`crate::holdout::strength`], the motion marginalised.
+pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Option<Promise>> {
+    let model: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
+    let rest = space.project_residual(residual_of(space.problem, &model), prior);
+    let strength = |(at, (component, covariance)): (usize, &Fitted)| {
+        let added = space.project(vec![space.problem.contribution(&model, at)]).remove(0);
+        let energy = space.inner(&added, &added);
+        let is_sized = component.active.cause.effect.page().nature != Nature::Discrete;
+        let fitted = if is_sized {
+            let slopes = space.project(space.problem.slopes(&model, at));
+            let along = slopes.iter().map(|slope| space.inner(slope, &added));
+            let along = DVector::from_iterator(slopes.len(), along);
+            along.dot(&(covariance * &along)).max(0.0)
+        } else {
+            0.0
+        };
+        (energy > 0.0).then(|| Promise {
+            factor: 1.0 + space.inner(&added, &rest) / energy,
+            sigma: (energy + fitted).sqrt() / energy,
+        })
+    };
+    causes.iter().enumerate().map(strength).collect()
+}
+
+/// The same on the held-out windows, smoothed with a motion of their own; none of any where that did not settle.
+///
+/// # Errors
+/// When the unit's description names an effect there is not.
+pub fn promises(
+    held: &Followed,
+    causes: &[Fitted],
+    progress: &dyn Fn(f64),
+) -> Result<Vec<Option<Promise>>, CaseError> {
+    let smoothed = held.smoothed(progress)?;
+    if !smoothed.is_settled() {
+        return Ok(vec![None; causes.len()]);
+    }
+    let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
+    let problem = Problem::new(&twin, &fit, &reference);
+    let motion = held.motion(smoothed, &problem);
+    let is_null = |name: &str| NULLS.iter().any(|null| null.effects.contains(&name));
+    let others = LIBRARY.iter().map(|effect| effect.page().name);
+    let others: Vec<String> = others.filter(|name| !is_null(name)).map(str::to_owned).collect();
+    let nulls = nulls::columns(&Library::new(&problem, &others, &|_| ()));
+    let space = Space::new(&problem, &motion, nulls);
+    Ok(strengths(&space, &motion.prior(), causes))
+}
