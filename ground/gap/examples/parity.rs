@@ -18,7 +18,10 @@ fn main() {
                     let [usual, found] = name.snr.unwrap_or_default();
                     let gain = name.gain.unwrap_or_default();
                     let (effect, at, p) = (name.effect, &name.locality, name.probability);
-                    format!("{effect} by {:?} at {at} p {p:.2} ({gain:.1} nats, ratio {found:.1}, usual {usual:.1})", name.by)
+                    format!(
+                        "{effect} by {:?} at {at} p {p:.2} ({gain:.1} nats, ratio {found:.1}, usual {usual:.1})",
+                        name.by
+                    )
                 });
                 let others = findings.alternatives.iter().map(|(name, p)| format!("{name} {p:.2}"));
                 println!(

@@ -6,7 +6,13 @@ use clap::Parser;
 use gap::{
     command::{Arguments, run},
     input::case::Subject,
-    parity::{analysed, findings::Findings, flight::Flight, smooth::told::Told},
+    parity::{
+        analysed,
+        findings::{By, Findings},
+        flight::Flight,
+        smooth::told::Told,
+        visible::Row,
+    },
     probability::outcome::Outcome,
     thresholds::PARITY_SNR,
 };
@@ -25,6 +31,18 @@ const SECONDS: f64 = 120.0;
 
 /// A case of a unit along a motion, from `from_s` on, whose calibration is off by what its description allows.
 fn flown(name: &str, from_s: f64, seed: u64, active: &[Active], only: impl Fn(&str) -> bool) -> TempDir {
+    flown_in(name, from_s, seed, (active, active), 110.0, only)
+}
+
+/// The same with what acts in the fit windows, which end after so many seconds, and in the held-out ones.
+fn flown_in(
+    name: &str,
+    from_s: f64,
+    seed: u64,
+    (active, active_after): (&[Active], &[Active]),
+    fit_s: f64,
+    only: impl Fn(&str) -> bool,
+) -> TempDir {
     let world = motion::world_by_name(name).expect("a motion");
     let environment = world.environment;
     let mut unit = emems(thesis_slot_s);
@@ -45,7 +63,7 @@ fn flown(name: &str, from_s: f64, seed: u64, active: &[Active], only: impl Fn(&s
         }
     }
     let twin = Twin::new(real, environment, scene, starts_s.clone()).expect("a twin");
-    let readings = twin.predict(active);
+    let (readings, readings_after) = (twin.predict(active), twin.predict(active_after));
     let mut text = format!(
         "t_s,{}\n",
         unit.channels
@@ -55,7 +73,12 @@ fn flown(name: &str, from_s: f64, seed: u64, active: &[Active], only: impl Fn(&s
             .join(",")
     );
     for (row, start_s) in starts_s.iter().enumerate() {
-        let cells = unit.channels.iter().zip(&readings).map(|(channel, own)| {
+        let readings = if start_s - from_s < fit_s {
+            &readings
+        } else {
+            &readings_after
+        };
+        let cells = unit.channels.iter().zip(readings).map(|(channel, own)| {
             let value = own[row] + channel.noise_sigma * normal();
             format!("{:.9}", channel.logged(value))
         });
@@ -65,7 +88,7 @@ fn flown(name: &str, from_s: f64, seed: u64, active: &[Active], only: impl Fn(&s
     let case = format!(
         "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
          [motion_known]\nnone = true\n[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
-         [windows]\nfit = [[0.0, 110.0]]\nhold = [[110.0, 120.0]]\n",
+         [windows]\nfit = [[0.0, {fit_s:.1}]]\nhold = [[{fit_s:.1}, 120.0]]\n",
         environment.gravity,
         environment.latitude.to_degrees(),
         environment.field_n_ut.x,
@@ -102,7 +125,9 @@ fn check_healthy(name: &str, from_s: f64) {
     assert!(findings.none_of_these < 0.5, "{name}: gap {:?}", findings.gap);
     let (named, small): (Vec<_>, Vec<_>) = findings.visible.iter().partition(|row| row.is_visible);
     assert!(!named.is_empty() && !small.is_empty());
-    assert!(named.iter().all(|row| row.snr >= PARITY_SNR), "{name}: {named:?}");
+    let is_seen = |row: &&Row| row.snr.max(row.smoothed.unwrap_or(0.0)) >= PARITY_SNR;
+    assert!(named.iter().all(is_seen), "{name}: {named:?}");
+    assert!(named.iter().all(|row| row.smoothed.is_some()), "{name} did not settle");
 }
 
 #[test]
@@ -162,6 +187,44 @@ fn a_magnet_on_one_plate_is_named_sized_and_said_to_rest_on_parity() {
     assert!(screen.contains("ATTITUDE"), "{screen}");
     let rows = text("attitude.csv").lines().count();
     assert_eq!(rows, 1 + 550, "a line a packet of the fit windows");
+}
+
+/// What a force does to each gyro: four of a size that parity, of which gyros have one, does not see.
+fn felt() -> Active {
+    Active {
+        cause: Cause {
+            effect: by_name("gyro-g-sensitivity").expect("an effect"),
+            locality: Locality::All,
+            variant: 0.0,
+        },
+        theta: [3.0, -2.0, 2.5, -1.5, 3.0, 2.0, -2.5, 1.0, 3.0, 2.0, -3.0, -1.5]
+            .map(|k| 2e-4 * k)
+            .to_vec(),
+    }
+}
+
+#[test]
+fn what_no_packet_shows_alone_is_named_about_the_smoothed_motion_and_sized() {
+    let active = [felt()];
+    let findings = found(&flown_in("tumble", 20.0, 4, (&active, &active), 60.0, |_| true));
+    let [name] = findings.names.as_slice() else {
+        panic!("{:?} or {:?}", findings.names, findings.alternatives);
+    };
+    assert_eq!((name.effect, name.by), ("gyro-g-sensitivity", By::Smoothing));
+    for (own, truth) in name.parameters.iter().zip(&active[0].theta) {
+        let (value, sigma) = (own.value, own.sigma);
+        assert!((value - truth).abs() < 4.0 * sigma, "{value} +- {sigma}, truth {truth}");
+    }
+    let promise = name.promise.expect("the held-out windows are asked");
+    assert!((promise.factor - 1.0).abs() < 4.0 * promise.sigma, "{promise:?}");
+    assert_eq!(findings.outcome, Outcome::Named);
+}
+
+#[test]
+fn what_the_held_out_windows_do_not_keep_is_not_named_by_smoothing() {
+    let active = [felt()];
+    let findings = found(&flown_in("tumble", 20.0, 4, (&active, &[]), 60.0, |_| true));
+    assert!(findings.names.is_empty(), "{:?}", findings.names);
 }
 
 #[test]

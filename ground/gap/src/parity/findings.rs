@@ -31,7 +31,7 @@ use crate::{
         nulls,
         packet::Motion,
         search::{self, Chosen, First, residual_of},
-        smoothed::{Fitted, Second, promises, strengths},
+        smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
     },
@@ -170,7 +170,7 @@ impl Findings {
             return Err(empty(flight, free));
         }
         let library = Library::new(&problem, withheld, &|share| progress("effects", share));
-        let space = Space::new(&problem, &motion, nulls::columns(&library));
+        let space = Space::new(&problem, &motion, nulls::columns(&problem, &library));
         let residual = projected(&space, &[]);
         progress("visible", 0.0);
         let seen = search::look(&space, &library, &residual, &|share| progress("visible", share));
@@ -180,23 +180,16 @@ impl Findings {
         });
         let mut rivals = search::rivals(&library, &chosen);
         let by_parity = search::said(&chosen).into_iter();
-        let mut causes: Vec<(Name, Fitted)> = by_parity.map(|one| Name::of(&problem, &library, one, By::Parity)).collect();
+        let mut causes: Vec<(Name, Fitted)> = by_parity
+            .map(|one| Name::of(&problem, &library, one, By::Parity))
+            .collect();
+        let mut smoothed: Vec<Left> = Vec::new();
         let named: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
         if let Some(second) = Second::look(followed, withheld, &named, progress)? {
-            if std::env::var_os("HELD").is_some() {
-                for left in &second.left {
-                    let most = left.calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
-                    println!(
-                        "  smoothed gap {:.4} calibration {most:.2} of {} p {:.4}",
-                        left.gap,
-                        left.calibration.len(),
-                        erfc(most / 2f64.sqrt()) * left.calibration.len() as f64
-                    );
-                }
-            }
             visible::add(&mut visible, &second.visible);
             rivals.extend(second.rivals);
             causes.extend(second.names);
+            smoothed = second.left;
         }
         let broken = weigh(flight, coded, &space, &mut causes, progress)?;
         rivals.extend(causes.iter().map(|(name, _)| (name.effect, name.probability)));
@@ -208,9 +201,17 @@ impl Findings {
         });
         let model: Vec<Component> = causes.iter().map(|(_, (component, _))| component.clone()).collect();
         let kept = space.kept(&residual);
-        let left = projected(&space, &model);
-        let gap = [gap(&kept), gap(&space.kept(&left))];
-        let names: Vec<Name> = coded.iter().map(Name::by_codes).chain(causes.into_iter().map(|(name, _)| name)).collect();
+        let before = gap(&kept);
+        let left = Left::of(&space, &projected(&space, &model));
+        // About the smoothed motion only where a name rests on it: without one its prior may leave something by itself.
+        let by_smoothing = causes.iter().filter(|(name, _)| name.by == By::Smoothing).count();
+        let about = smoothed.get(by_smoothing).filter(|_| by_smoothing > 0);
+        let is_unexplained = [Some(&left), about].into_iter().flatten().any(is_unexplained);
+        let names: Vec<Name> = coded
+            .iter()
+            .map(Name::by_codes)
+            .chain(causes.into_iter().map(|(name, _)| name))
+            .collect();
         rivals.retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
         rivals.sort_by(|one, other| other.1.total_cmp(&one.1));
         let mut alternatives: Vec<(&'static str, f64)> = Vec::new();
@@ -219,7 +220,7 @@ impl Findings {
                 alternatives.push(rival);
             }
         }
-        let none_of_these = if is_unexplained(gap[1], &space.calibration(&left)) {
+        let none_of_these = if is_unexplained {
             1.0 - UNKNOWN_PRIOR
         } else {
             UNKNOWN_PRIOR.max(broken)
@@ -231,7 +232,7 @@ impl Findings {
                 .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
                 .collect(),
             outcome: Outcome::of(names.len(), none_of_these, none_of_these, false),
-            gap,
+            gap: [before, left.gap],
             visible,
             names,
             alternatives,
@@ -263,27 +264,28 @@ fn weigh(
     let by_parity = strengths(parity, &DVector::zeros(0), &fitted);
     let mut kept = 1.0;
     for ((name, _), (held, by_parity)) in causes.iter_mut().zip(held.into_iter().zip(by_parity)) {
-        if std::env::var_os("HELD").is_some() {
-            println!(
-                "  {} {:?} at {} p {:.3} gain {:.1?} held {:.3?} parity {:.3?}",
-                name.effect, name.by, name.locality, name.probability, name.gain, held, by_parity
-            );
-        }
         let believed = name.probability;
         name.promise = held;
-        match name.by {
-            By::Codes | By::Parity => {
-                name.probability *= held.map_or(1.0, |held| held.confidence());
-                kept *= 1.0 - (believed - name.probability);
-            }
-            By::Smoothing => {
-                let told = held.filter(|held| held.sigma <= STRENGTH_SHOWN);
-                name.probability *= told.map_or(UNTOLD, |held| held.confidence());
-                name.probability *= by_parity.map_or(1.0, |strength| strength.confidence());
-            }
+        name.probability *= confidence(name.by, held, by_parity);
+        if name.by == By::Parity {
+            kept *= 1.0 - (believed - name.probability);
         }
     }
     Ok(1.0 - kept)
+}
+
+/// How far a cause is believed that is as strong as this on the held-out windows and by parity. What parity names, the held-out
+/// windows may refute. What smoothing alone names, they must show as well, and parity may refute it too.
+fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 {
+    let of = |promise: Option<Promise>| promise.map(|promise| promise.confidence());
+    match by {
+        By::Codes => 1.0,
+        By::Parity => of(held).unwrap_or(1.0),
+        By::Smoothing => {
+            let shown = held.filter(|held| held.sigma <= STRENGTH_SHOWN);
+            of(shown).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0)
+        }
+    }
 }
 
 fn empty(flight: &Flight, free: [f64; 4]) -> CaseError {
@@ -312,10 +314,10 @@ fn projected(space: &Space, model: &[Component]) -> Projected {
 /// Whether something is there that nothing named explains: a gap too large, or a calibration that is off by more of its own sigmas
 /// than chance gives one log in twenty over all its parameters. A magnet beside one of forty channels is lost in the gap of
 /// the whole, and found in the calibration.
-fn is_unexplained(gap: f64, calibration: &[f64]) -> bool {
+fn is_unexplained(Left { gap, calibration }: &Left) -> bool {
     let most = calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
     // Of a standard normal: what is fitted is off by no more than what it is fitted to.
-    gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE
+    *gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE
 }
 
 /// Their places, each once.
@@ -394,10 +396,25 @@ mod tests {
     #[test]
     fn a_gap_and_a_calibration_beyond_chance_are_each_enough_to_be_unexplained() {
         // Of 400 parameters one is beyond 3.8 sigma in one log of twenty: 400 * erfc(3.8 / sqrt(2)) = 0.058, at 3.9 0.038.
-        let calibration = |most: f64| [vec![0.5; 399], vec![-most]].concat();
-        assert!(!is_unexplained(1.0, &calibration(3.8)));
-        assert!(is_unexplained(1.0, &calibration(3.9)));
-        assert!(is_unexplained(1.06, &calibration(1.0)));
-        assert!(!is_unexplained(1.04, &calibration(1.0)));
+        let left = |gap: f64, most: f64| Left {
+            gap,
+            calibration: [vec![0.5; 399], vec![-most]].concat(),
+        };
+        assert!(!is_unexplained(&left(1.0, 3.8)));
+        assert!(is_unexplained(&left(1.0, 3.9)));
+        assert!(is_unexplained(&left(1.06, 1.0)));
+        assert!(!is_unexplained(&left(1.04, 1.0)));
+    }
+
+    #[test]
+    fn what_smoothing_alone_names_must_be_shown_by_the_held_out_windows_and_not_refuted_by_parity() {
+        let strength = |factor: f64, sigma: f64| Some(Promise { factor, sigma });
+        let (kept, broken, not_shown) = (strength(1.05, 0.05), strength(0.1, 0.05), strength(0.1, 9.0));
+        let is_said = |by: By, held, by_parity| confidence(by, held, by_parity) >= SAID + 0.01;
+        assert!(is_said(By::Smoothing, kept, None) && is_said(By::Smoothing, kept, not_shown));
+        assert!(!is_said(By::Smoothing, None, kept) && !is_said(By::Smoothing, not_shown, kept));
+        assert!(!is_said(By::Smoothing, broken, kept) && !is_said(By::Smoothing, kept, broken));
+        assert!(is_said(By::Parity, None, None) && is_said(By::Parity, not_shown, None));
+        assert!(!is_said(By::Parity, broken, None));
     }
 }

@@ -6,10 +6,19 @@
 
 use twin::effect::Locality;
 
-use crate::{library::hypotheses::Hypothesis, library::hypotheses::Library, library::products::Entries};
+use crate::{
+    library::{
+        hypotheses::{Hypothesis, Library},
+        products::Entries,
+    },
+    null::problem::Problem,
+};
 
 /// [prior sigmas] how large they may be: as large as an effect may be before it stands for something else.
 const FREE: f64 = 20.0;
+
+/// Usual size of a scale, as the library has it.
+const SCALE: f64 = 0.01;
 
 /// Something that cannot be seen.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +66,7 @@ pub const NULLS: &[Null] = &[
             "accel-bias",
             "accel-scale",
             "accel-range",
+            "accel-high-pass",
             "hard-iron",
         ],
         settled_by: "rest in two opposite attitudes tells bias and scale of the accelerometers; a full turn of a table, \
@@ -87,7 +97,7 @@ pub fn of(hypothesis: &Hypothesis) -> Option<&'static Null> {
 }
 
 /// Columns of the nulls that hold for the unit as a whole, for a size that leaves them free.
-pub fn columns(library: &Library) -> Vec<Entries> {
+pub fn columns(problem: &Problem, library: &Library) -> Vec<Entries> {
     let is_whole = |hypothesis: &&Hypothesis| {
         // One that begins at some instant has a column for each.
         let variants = hypothesis.cause.effect.variants(&[0.0, 1.0]).len();
@@ -99,10 +109,46 @@ pub fn columns(library: &Library) -> Vec<Entries> {
         .collect();
     places.sort_unstable();
     places.dedup();
-    let free = |place: usize| -> Entries {
-        let size = FREE * library.prior_sigmas[place];
-        let column = library.products.column(place).iter();
+    let free = |place: &usize| -> Entries {
+        let size = FREE * library.prior_sigmas[*place];
+        let column = library.products.column(*place).iter();
         column.map(|(channel, values)| (*channel, values * size)).collect()
     };
-    places.into_iter().map(free).collect()
+    let scales = library
+        .hypotheses
+        .iter()
+        .filter_map(|hypothesis| scaled(problem, library, hypothesis));
+    places.iter().map(free).chain(scales).collect()
+}
+
+/// Two scales of all accelerometers together, which the library has no single place for: of what they read, and of their lever arms. A prior
+/// that has a motion without acceleration likelier than any is for a smaller one, and these two are how a motion gets smaller.
+fn scaled(problem: &Problem, library: &Library, hypothesis: &Hypothesis) -> Option<Entries> {
+    let unit = problem.twin.unit();
+    let cause = &hypothesis.cause;
+    if cause.locality != Locality::All {
+        return None;
+    }
+    // Of one parameter, by how much it changes in both.
+    let change = |index: usize| -> Option<f64> {
+        match hypothesis.effect() {
+            "accel-scale" => Some(1.0),
+            "lever-arm" => {
+                let channel = *cause.touched_by(index, unit).first()?;
+                Some(unit.channels[channel].lever_m[index % 3])
+            }
+            _ => None,
+        }
+    };
+    let mut sum: Entries = Vec::new();
+    for (index, place) in hypothesis.small().iter().enumerate() {
+        let change = FREE * SCALE * change(index)?;
+        for (channel, values) in library.products.column(*place) {
+            match sum.iter_mut().find(|(own, _)| own == channel) {
+                Some((_, sum)) => sum.axpy(change, values, 1.0),
+                None => sum.push((*channel, values * change)),
+            }
+        }
+    }
+    Some(sum)
 }

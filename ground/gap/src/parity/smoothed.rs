@@ -86,7 +86,7 @@ impl Second {
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
         let library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
-        let space = Space::new(&problem, &motion, nulls::columns(&library));
+        let space = Space::new(&problem, &motion, nulls::columns(&problem, &library));
         let prior = motion.prior();
         let project = |model: &[Component]| space.project_residual(residual_of(&problem, model), &prior);
         let mut model: Vec<Component> = named.iter().map(|(component, _)| component.clone()).collect();
@@ -106,7 +106,10 @@ impl Second {
         Ok(Some(Self {
             visible: visible::table(&library.hypotheses, &seen),
             rivals: search::rivals(&library, &chosen),
-            names: said.iter().map(|one| Name::of(&problem, &library, one, By::Smoothing)).collect(),
+            names: said
+                .iter()
+                .map(|one| Name::of(&problem, &library, one, By::Smoothing))
+                .collect(),
             left,
         }))
     }
@@ -145,11 +148,7 @@ pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<
 ///
 /// # Errors
 /// When the unit's description names an effect there is not.
-pub fn promises(
-    held: &Followed,
-    causes: &[Fitted],
-    progress: &dyn Fn(f64),
-) -> Result<Vec<Option<Promise>>, CaseError> {
+pub fn promises(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> Result<Vec<Option<Promise>>, CaseError> {
     let smoothed = held.smoothed(progress)?;
     if !smoothed.is_settled() {
         return Ok(vec![None; causes.len()]);
@@ -160,7 +159,7 @@ pub fn promises(
     let is_null = |name: &str| NULLS.iter().any(|null| null.effects.contains(&name));
     let others = LIBRARY.iter().map(|effect| effect.page().name);
     let others: Vec<String> = others.filter(|name| !is_null(name)).map(str::to_owned).collect();
-    let nulls = nulls::columns(&Library::new(&problem, &others, &|_| ()));
+    let nulls = nulls::columns(&problem, &Library::new(&problem, &others, &|_| ()));
     let space = Space::new(&problem, &motion, nulls);
     Ok(strengths(&space, &motion.prior(), causes))
 }

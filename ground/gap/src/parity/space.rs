@@ -379,7 +379,7 @@ mod tests {
     #[test]
     fn what_linearisation_leaves_of_a_null_is_no_evidence_once_its_columns_are_free() {
         tumbling(30, |space, library, _| {
-            let nulls = nulls::columns(library);
+            let nulls = nulls::columns(space.problem, library);
             let free = Space::new(space.problem, space.motion, nulls.clone());
             let most = |space: &Space| {
                 let kept = |null: &Entries| {

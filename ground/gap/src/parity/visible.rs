@@ -68,7 +68,9 @@ pub fn table(hypotheses: &[Hypothesis], seen: &[Seen]) -> Vec<Row> {
 /// Adds what is seen about the smoothed motion.
 pub fn add(rows: &mut [Row], smoothed: &[Row]) {
     for row in rows {
-        let own = smoothed.iter().find(|own| (own.effect, own.place) == (row.effect, row.place));
+        let own = smoothed
+            .iter()
+            .find(|own| (own.effect, own.place) == (row.effect, row.place));
         if let Some(own) = own {
             row.smoothed = Some(own.snr);
             row.is_visible |= own.is_visible;
