@@ -1,7 +1,7 @@
 //! A log without a reference motion: what the unit's own redundancy says.
 //!
-//! In: a case without `motion`, or one whose motion is not to be looked at. Out: the texts of an analysis, of which each says that
-//! it rests on parity alone. The steps, a file each:
+//! In: a case without `motion`, or one whose motion is not to be looked at. Out: the texts of an analysis, of which each says what it
+//! rests on. The steps, a file each:
 //!
 //! | step | file | gives |
 //! |---|---|---|
@@ -12,9 +12,10 @@
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
 //! | 6 | [`visible`], [`nulls`] | of each effect, what this log can show at all, before anything is sought |
 //! | 7 | [`search`] | which effects the evidence prefers among those that can be seen |
-//! | 8 | [`findings`] | which of them are said, and where the gap is |
-//! | 9 | [`crate::parity::smooth`] | the attitude along the whole log |
-//! | 10 | [`text`], [`verdict`], [`page`] | how it is told |
+//! | 8 | [`crate::parity::smooth`], [`followed`] | the motion along the whole log |
+//! | 9 | [`smoothed`] | which others it prefers about that motion, and what the held-out windows say |
+//! | 10 | [`findings`], [`name`] | which of them are said, and where the gap is |
+//! | 11 | [`text`], [`verdict`], [`page`] | how it is told |
 //!
 //! Per packet the channels are `y = h + A x + C beta + E theta + noise`. `x` is the deviation from the smoothed motion: rate,
 //! specific force, field and temperature, which are free, and the derivatives of rate and force, which are known about as well
@@ -23,13 +24,15 @@
 //! go through the same operator, so an effect that is another motion has no column left. No attitude is needed for
 //! this: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
 //!
-//! Columns are those of [`crate::library`], made about the smoothed motion. What the hold windows would say is not asked yet.
+//! Columns are those of [`crate::library`], made about the smoothed motion. The held-out windows have a motion of their own, and say
+//! whether what is named is as strong there.
 
 pub mod codes;
 pub mod course;
 pub mod findings;
 pub mod flight;
 pub mod followed;
+pub mod name;
 pub mod nulls;
 pub mod packet;
 pub mod page;
@@ -94,7 +97,7 @@ pub fn analysed(
         ("limits.txt", text::visibility(&findings)),
         (
             "shrink.txt",
-            "without a reference nothing is asked of the held-out windows yet\n".to_owned(),
+            "without a reference the gap of the held-out windows is not judged; they are asked how strong there what is named is\n".to_owned(),
         ),
     ];
     texts.extend(sections.map(|(name, text)| (name.to_owned(), text)));

@@ -303,12 +303,12 @@ thresholds! {
         smaller: "more channels are reported as left",
         Assumed("a fifth of a gap is help");
     // A log without a reference
-    /// Signal-to-noise ratio at usual size from which an effect may be named by parity.
+    /// Signal-to-noise ratio at usual size from which an effect may be named without a reference, by parity or about the smoothed motion.
     PARITY_SNR: f64 = 3.0, in "1",
         larger: "small effects of one plate are not named",
         smaller: "what the noise of a smoothed motion makes of columns gets names",
         Assumed("the design note's prototype gave columns of noise less; healthy logs of ten motions named nothing");
-    /// Gap by parity beyond which noise, calibration and what is named are not enough.
+    /// Gap without a reference beyond which noise, calibration and what is named are not enough.
     PARITY_GAP: f64 = 1.05, in "sigma",
         larger: "unknown effects are called clean",
         smaller: "motions too quick for the packets are called unknown effects",

@@ -6,13 +6,7 @@ use clap::Parser;
 use gap::{
     command::{Arguments, run},
     input::case::Subject,
-    parity::{
-        analysed,
-        findings::{By, Findings},
-        flight::Flight,
-        smooth::told::Told,
-        visible::Row,
-    },
+    parity::{analysed, findings::Findings, flight::Flight, name::By, smooth::told::Told, visible::Row},
     probability::outcome::Outcome,
     thresholds::PARITY_SNR,
 };

@@ -1,6 +1,7 @@
 //! What parity comes to: which effects are said, where the gap is, what is left.
 //!
-//! In: a [`Flight`]. Out: [`Findings`]. Everything that is said rests on the fit windows.
+//! In: a [`Flight`]. Out: [`Findings`]. Everything that is fitted rests on the fit windows; how far a name is believed, on the held-out
+//! windows too.
 //!
 //! The gap is the root mean square of what a packet keeps once motion and calibration are marginalised: over degrees of
 //! freedom, so that 1 is noise and calibration alone. Beyond [`PARITY_GAP`], or with a calibration that is off by more than chance,
@@ -14,75 +15,28 @@ use statrs::{
     distribution::{ChiSquared, ContinuousCDF},
     function::erf::erfc,
 };
-use twin::{
-    effect::{Parameter, by_name},
-    predict::Kind,
-};
+use twin::predict::Kind;
 
 use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
-    library::hypotheses::{Hypothesis, Library},
+    library::hypotheses::Library,
     null::problem::{Component, Problem},
     parity::{
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
+        name::{By, Name},
         nulls,
         packet::Motion,
-        search::{self, Chosen, First, residual_of},
+        search::{self, First, residual_of},
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
     },
-    probability::{cause::Sized, outcome::Outcome},
+    probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
 };
-
-/// Probability of a name that codes alone give: chance is ruled out, the library's other effects on codes are not.
-const BY_CODES: f64 = 0.99;
-
-/// What an effect is said by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum By {
-    /// Codes, without a model.
-    Codes,
-    /// Each packet by itself.
-    Parity,
-    /// All packets, about the smoothed motion.
-    Smoothing,
-}
-
-/// An effect that is said.
-#[derive(Clone, Debug)]
-pub struct Name {
-    /// In the library.
-    pub effect: &'static str,
-    /// By what.
-    pub by: By,
-    /// Where, in words.
-    pub locality: String,
-    /// Other places that the log does not tell from this one.
-    pub or_at: Vec<String>,
-    /// Channels it touches.
-    pub channels: Vec<usize>,
-    /// Against all others and nothing.
-    pub probability: f64,
-    /// \[nats\]; none of what codes say.
-    pub gain: Option<f64>,
-    /// Ratio by parity, at plausible size and at the size found; none of what codes say.
-    pub snr: Option<[f64; 2]>,
-    /// What the held-out windows say of its strength; none where they were not asked.
-    pub promise: Option<Promise>,
-    /// Its parameters.
-    pub parameters: Vec<Sized>,
-    /// What was seen, or which of what it may be.
-    pub which: Option<String>,
-    /// What it is.
-    pub physics: &'static str,
-    /// How to be sure.
-    pub confirm_by: &'static str,
-}
 
 /// A channel of the gap.
 #[derive(Clone, Debug)]
@@ -191,7 +145,7 @@ impl Findings {
             causes.extend(second.names);
             smoothed = second.left;
         }
-        let broken = weigh(flight, coded, &space, &mut causes, progress)?;
+        let doubts = weigh(flight, coded, &space, &mut causes, progress)?;
         rivals.extend(causes.iter().map(|(name, _)| (name.effect, name.probability)));
         let mut is_believed = true;
         causes.retain(|(name, _)| {
@@ -223,7 +177,7 @@ impl Findings {
         let none_of_these = if is_unexplained {
             1.0 - UNKNOWN_PRIOR
         } else {
-            UNKNOWN_PRIOR.max(broken)
+            UNKNOWN_PRIOR.max(doubts.broken)
         };
         Ok(Self {
             rows: problem.twin.starts_s().len(),
@@ -231,7 +185,7 @@ impl Findings {
             channels: (twin.unit().channels.iter().zip(&kept))
                 .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
                 .collect(),
-            outcome: Outcome::of(names.len(), none_of_these, none_of_these, false),
+            outcome: Outcome::of(names.len(), none_of_these.max(doubts.untold), none_of_these, false),
             gap: [before, left.gap],
             visible,
             names,
@@ -241,17 +195,25 @@ impl Findings {
     }
 }
 
-/// Believes causes as far as the held-out windows, and of those that smoothing alone names parity too, keep what they promise; the
-/// probability that one that parity names does not, and something else was taken for it.
+/// What is believed less.
+#[derive(Default)]
+struct Doubts {
+    /// Probability that the held-out windows refute one that parity names, and something else was taken for it.
+    broken: f64,
+    /// How far the first one that is not believed would be, if it is one that nobody refutes and no held-out window shows.
+    untold: f64,
+}
+
+/// Believes causes as far as the held-out windows, and of those that smoothing alone names parity too, keep what they promise.
 fn weigh(
     flight: &Flight,
     coded: &[Finding],
     parity: &Space,
     causes: &mut [(Name, Fitted)],
     progress: &dyn Fn(&'static str, f64),
-) -> Result<f64, CaseError> {
+) -> Result<Doubts, CaseError> {
     if causes.is_empty() {
-        return Ok(0.0);
+        return Ok(Doubts::default());
     }
     let fitted: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
     let held = match &flight.held {
@@ -262,7 +224,7 @@ fn weigh(
         None => vec![None; fitted.len()],
     };
     let by_parity = strengths(parity, &DVector::zeros(0), &fitted);
-    let mut kept = 1.0;
+    let (mut kept, mut first_untold) = (1.0, None);
     for ((name, _), (held, by_parity)) in causes.iter_mut().zip(held.into_iter().zip(by_parity)) {
         let believed = name.probability;
         name.promise = held;
@@ -270,8 +232,21 @@ fn weigh(
         if name.by == By::Parity {
             kept *= 1.0 - (believed - name.probability);
         }
+        if first_untold.is_none() && name.probability < SAID {
+            let is_shown = held.is_some_and(is_shown);
+            let untold = if is_shown { 0.0 } else { name.probability / UNTOLD };
+            first_untold = Some(untold);
+        }
     }
-    Ok(1.0 - kept)
+    Ok(Doubts {
+        broken: 1.0 - kept,
+        untold: first_untold.unwrap_or(0.0),
+    })
+}
+
+/// Whether a promise is known well enough to say anything.
+fn is_shown(promise: Promise) -> bool {
+    promise.sigma <= STRENGTH_SHOWN
 }
 
 /// How far a cause is believed that is as strong as this on the held-out windows and by parity. What parity names, the held-out
@@ -281,10 +256,7 @@ fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 
     match by {
         By::Codes => 1.0,
         By::Parity => of(held).unwrap_or(1.0),
-        By::Smoothing => {
-            let shown = held.filter(|held| held.sigma <= STRENGTH_SHOWN);
-            of(shown).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0)
-        }
+        By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0),
     }
 }
 
@@ -318,64 +290,6 @@ fn is_unexplained(Left { gap, calibration }: &Left) -> bool {
     let most = calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
     // Of a standard normal: what is fitted is off by no more than what it is fitted to.
     *gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE
-}
-
-/// Their places, each once.
-fn places<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> Vec<String> {
-    let mut places: Vec<String> = hypotheses
-        .map(|hypothesis| hypothesis.cause.locality.to_string())
-        .collect();
-    places.sort_unstable();
-    places.dedup();
-    places
-}
-
-impl Name {
-    fn by_codes(finding: &Finding) -> Self {
-        let page = by_name(finding.effect).map(|effect| effect.page());
-        Self {
-            effect: finding.effect,
-            by: By::Codes,
-            locality: String::new(),
-            or_at: Vec::new(),
-            channels: finding.channels.clone(),
-            probability: BY_CODES,
-            gain: None,
-            snr: None,
-            promise: None,
-            parameters: Vec::new(),
-            which: Some(finding.what.clone()),
-            physics: page.map_or("", |page| page.physics),
-            confirm_by: page.map_or("", |page| page.confirm_by),
-        }
-    }
-
-    /// Of an effect that a search chose, and as it was fitted.
-    pub fn of(problem: &Problem, library: &Library, chosen: &Chosen, by: By) -> (Self, Fitted) {
-        let hypothesis = &library.hypotheses[chosen.hypothesis];
-        let page = hypothesis.cause.effect.page();
-        let sized = |(index, parameter): (usize, &Parameter)| Sized {
-            parameter: parameter.clone(),
-            value: chosen.theta[index],
-            sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
-        };
-        let name = Self {
-            effect: hypothesis.effect(),
-            by,
-            locality: hypothesis.cause.locality.to_string(),
-            or_at: places(chosen.elsewhere.iter().map(|at| &library.hypotheses[*at])),
-            channels: hypothesis.cause.channels(problem.twin.unit()),
-            probability: chosen.probability,
-            gain: Some(chosen.gain),
-            snr: Some([chosen.snr, chosen.found_snr]),
-            promise: None,
-            parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
-            which: hypothesis.cause.effect.told(hypothesis.cause.variant),
-            physics: page.physics,
-            confirm_by: page.confirm_by,
-        };
-        (name, (hypothesis.component(&chosen.theta), chosen.covariance.clone()))
-    }
 }
 
 #[cfg(test)]

@@ -25,8 +25,8 @@ use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
     parity::{
-        findings::{By, Name},
         followed::Followed,
+        name::{By, Name},
         nulls::{self, NULLS},
         search::{self, Chosen, First, residual_of},
         space::{self, Projected, Space},

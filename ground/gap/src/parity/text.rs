@@ -6,8 +6,9 @@ use std::fmt::Write;
 
 use crate::{
     parity::{
-        findings::{By, Findings, Name, Place},
+        findings::{Findings, Place},
         flight::Flight,
+        name::{By, Name},
         nulls::NULLS,
         smooth::told::Told,
         visible::Row,
@@ -125,10 +126,13 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
         Outcome::Clean => {
             "NO EFFECT is needed for what parity shows; what it cannot show is listed under UNSEEN".to_owned()
         }
+        Outcome::Undecided => {
+            "UNDECIDED  the first under OR would explain this log about the smoothed motion, but no held-out window shows it".to_owned()
+        }
         Outcome::Named => format!("LEFT    {:.3} sigma once the causes are in", findings.gap[1]),
         _ => format!(
-            "LEFT    {:.3} sigma; not explained by what is named: the gap, or a calibration that is off by more than its sigmas \
-             allow. An effect outside the library, one of a kind that is listed under UNSEEN and is far above its usual size, \
+            "LEFT    {:.3} sigma; not explained by what is named: the gap, a calibration that is off by more than its sigmas \
+             allow, or an effect that explained it here and that the held-out windows refute. An effect outside the library, one of a kind that is listed under UNSEEN and is far above its usual size, \
              or a motion too quick for the packets",
             findings.gap[1]
         ),

@@ -1,7 +1,7 @@
 //! `verdict.json` of a log without a reference: `gap-verdict/2` with `"from": "parity"`.
 //!
-//! In: [`Findings`]. Out: the keys of the format that parity can fill. There is no `shrink`, for the held-out windows are not
-//! asked; `visible` and `not_visible` say what a silence means.
+//! In: [`Findings`]. Out: the keys of the format that parity can fill. There is no `shrink`, for the held-out windows are
+//! asked no more than how strong there a name is; `visible` and `not_visible` say what a silence means.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use crate::{
     parity::{
-        findings::{By, Findings, Name},
+        findings::Findings,
         flight::Flight,
+        name::{By, Name},
         nulls::NULLS,
         text,
     },

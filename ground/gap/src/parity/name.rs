@@ -1,0 +1,117 @@
+//! An effect that is said, by whatever says it.
+//!
+//! In: what codes say ([`crate::parity::codes`]), or what a search chose ([`crate::parity::search`]). Out: a [`Name`].
+
+use twin::effect::{Parameter, by_name};
+
+use crate::{
+    holdout::strength::Promise,
+    library::hypotheses::{Hypothesis, Library},
+    null::problem::Problem,
+    parity::{codes::Finding, search::Chosen, smoothed::Fitted},
+    probability::cause::Sized,
+};
+
+/// Probability of a name that codes alone give: chance is ruled out, the library's other effects on codes are not.
+const BY_CODES: f64 = 0.99;
+
+/// What an effect is said by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// Codes, without a model.
+    Codes,
+    /// Each packet by itself.
+    Parity,
+    /// All packets, about the smoothed motion.
+    Smoothing,
+}
+
+/// An effect that is said.
+#[derive(Clone, Debug)]
+pub struct Name {
+    /// In the library.
+    pub effect: &'static str,
+    /// By what.
+    pub by: By,
+    /// Where, in words.
+    pub locality: String,
+    /// Other places that the log does not tell from this one.
+    pub or_at: Vec<String>,
+    /// Channels it touches.
+    pub channels: Vec<usize>,
+    /// Against all others and nothing.
+    pub probability: f64,
+    /// \[nats\]; none of what codes say.
+    pub gain: Option<f64>,
+    /// Ratio by parity, at plausible size and at the size found; none of what codes say.
+    pub snr: Option<[f64; 2]>,
+    /// What the held-out windows say of its strength; none where they were not asked.
+    pub promise: Option<Promise>,
+    /// Its parameters.
+    pub parameters: Vec<Sized>,
+    /// What was seen, or which of what it may be.
+    pub which: Option<String>,
+    /// What it is.
+    pub physics: &'static str,
+    /// How to be sure.
+    pub confirm_by: &'static str,
+}
+
+/// Their places, each once.
+fn places<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> Vec<String> {
+    let mut places: Vec<String> = hypotheses
+        .map(|hypothesis| hypothesis.cause.locality.to_string())
+        .collect();
+    places.sort_unstable();
+    places.dedup();
+    places
+}
+
+impl Name {
+    /// Of what codes say.
+    pub fn by_codes(finding: &Finding) -> Self {
+        let page = by_name(finding.effect).map(|effect| effect.page());
+        Self {
+            effect: finding.effect,
+            by: By::Codes,
+            locality: String::new(),
+            or_at: Vec::new(),
+            channels: finding.channels.clone(),
+            probability: BY_CODES,
+            gain: None,
+            snr: None,
+            promise: None,
+            parameters: Vec::new(),
+            which: Some(finding.what.clone()),
+            physics: page.map_or("", |page| page.physics),
+            confirm_by: page.map_or("", |page| page.confirm_by),
+        }
+    }
+
+    /// Of an effect that a search chose, and as it was fitted.
+    pub fn of(problem: &Problem, library: &Library, chosen: &Chosen, by: By) -> (Self, Fitted) {
+        let hypothesis = &library.hypotheses[chosen.hypothesis];
+        let page = hypothesis.cause.effect.page();
+        let sized = |(index, parameter): (usize, &Parameter)| Sized {
+            parameter: parameter.clone(),
+            value: chosen.theta[index],
+            sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
+        };
+        let name = Self {
+            effect: hypothesis.effect(),
+            by,
+            locality: hypothesis.cause.locality.to_string(),
+            or_at: places(chosen.elsewhere.iter().map(|at| &library.hypotheses[*at])),
+            channels: hypothesis.cause.channels(problem.twin.unit()),
+            probability: chosen.probability,
+            gain: Some(chosen.gain),
+            snr: Some([chosen.snr, chosen.found_snr]),
+            promise: None,
+            parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
+            which: hypothesis.cause.effect.told(hypothesis.cause.variant),
+            physics: page.physics,
+            confirm_by: page.confirm_by,
+        };
+        (name, (hypothesis.component(&chosen.theta), chosen.covariance.clone()))
+    }
+}
