@@ -107,7 +107,11 @@ fn seen_as(
     residual: &Projected,
 ) -> Seen {
     let width = columns.len();
-    let information = DMatrix::from_fn(width, width, |row, column| space.inner(columns[row], columns[column]));
+    let mut information = DMatrix::zeros(width, width);
+    for row in 0..width {
+        (0..=row).for_each(|column| information[(row, column)] = space.inner(columns[row], columns[column]));
+    }
+    information.fill_upper_triangle_with_lower_triangle();
     let sigma = |index: usize| {
         hypothesis
             .small()
