@@ -147,6 +147,8 @@ fn a_boost_is_too_quick_for_the_packets_and_that_is_no_name_but_unknown() {
     let findings = found(&flown("rocket", 60.0, 3, &[], |_| true));
     assert!(findings.names.is_empty(), "{:?}", findings.names);
     assert_eq!(findings.outcome, Outcome::Unknown);
+    // Its motion does not settle, and nothing is looked for about one that does not.
+    assert!(findings.visible.iter().all(|row| row.smoothed.is_none()));
 }
 
 #[test]
