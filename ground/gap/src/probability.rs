@@ -1,8 +1,8 @@
 //! Step 7, how sure: from the odds of the evidence to the probability of a name.
 //!
 //! In: an explanation, what it leaves, and what the held-out windows say. Out: [`posterior::Believed`]: [`cause`]s with their
-//! [`contribution`]s and the [`regime`] in which they show, each believed less where something speaks against it ([`doubt`]),
-//! and what it all comes to ([`outcome`]).
+//! [`contribution`]s and the [`regime`] in which they show, each believed less where something speaks against it ([`doubt`])
+//! or it does not matter ([`importance`]), and what it all comes to ([`outcome`]).
 
 pub mod cause;
 pub mod contribution;

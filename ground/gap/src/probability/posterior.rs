@@ -73,10 +73,7 @@ impl Believed {
         let whole = explanation.energy(quiet);
         // What the effects on readings explain is no sign of another's either.
         let of_readings: f64 = causes.iter().take(imitated.len()).map(|cause| 2.0 * cause.gain).sum();
-        let of_scatter = scatter.map(|scatter| match scatter.effect.page().texture {
-            Texture::Louder | Texture::Walk => whole,
-            _ => whole - of_readings,
-        });
+        let of_scatter = scatter.map(|_| (whole - of_readings).max(0.0));
         let worth = beyond.into_iter().chain(std::iter::repeat(0.0));
         let explained = imitated.into_iter().zip(&causes).zip(worth);
         let explained = explained.map(|((whole, cause), nats)| whole.max(2.0 * cause.gain).max(2.0 * nats));
