@@ -53,7 +53,8 @@ impl Believed {
         contribution::settle(problem, library, &explanation.found, &mut causes);
         let mut imitated = contribution::imitated(problem, &explanation.model);
         imitated.truncate(causes.len());
-        let importance = Importance::of(subject, problem, explanation).filter(|_| !causes.is_empty());
+        let importance = (!causes.is_empty()).then(|| Importance::of(subject, problem, explanation));
+        let importance = importance.flatten();
         let beyond = beyond_reference(problem, &subject.slow, explanation, importance.as_ref(), &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
