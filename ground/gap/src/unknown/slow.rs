@@ -25,6 +25,7 @@ use super::{
     binned::{BINS, Binned},
     discrepancy::{Posterior, courses},
     remainder::Setting,
+    views::PLAIN,
 };
 use crate::{
     library::hypotheses::Library,
@@ -237,7 +238,18 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
     Seen {
         residuals,
         by_instant: at(&by_instant, 0.0),
-        reading: at(&predicted, own.bias),
+        reading: (rows.iter())
+            .map(|row| {
+                let row = *row as usize;
+                let reading = predicted[row] - own.bias;
+                // Where the reference sees little but its own errors, these are minus the residual: a factor of -1.
+                if reading.abs() > PLAIN * problem.instrument.fast_sigma(channel, row) {
+                    reading
+                } else {
+                    0.0
+                }
+            })
+            .collect(),
         feels: rows.iter().map(|row| feels[*row as usize]).collect(),
         binned,
     }

@@ -20,7 +20,7 @@ const QUANTITIES: usize = 10;
 
 /// [standard deviations of the reference's errors] to which what the unit does is rounded before residuals are sorted by it. At
 /// rest a reference sees nothing but its errors, and these are minus the residual: a factor of -1 in every sensor.
-const PLAIN: f64 = 10.0;
+pub(super) const PLAIN: f64 = 10.0;
 
 /// The views of every channel; `read` is what each sensor reads by itself at every row, by the model whose leftover is looked at.
 pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
