@@ -4,8 +4,9 @@
 //! [`crate::null::evidence`] work on. What the twin predicts is compared at the rows that are there and that the reference
 //! saw.
 //!
-//! A reference that is not exact (an optical system, a surveyed field) errs slowly: its error is alike over about
-//! [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its fast
+//! A reference that is not exact (an optical system, a surveyed field) errs slowly: for what stands in n its error is taken for alike over
+//! about [`REFERENCE_CORRELATION_S`], so a sample of it weighs as little as one a second would, however fast the log is. Its rate weighs as
+//! the spectrum of the stated error has it. Its fast
 //! errors are [`crate::input::reference`]'s and make some samples worth less than others. They are one vector that all sensors of a
 //! kind see, and each channel is fitted by itself: what `n` channels share, each takes for `n` times its energy, so that together
 //! they say no more of it than one.
