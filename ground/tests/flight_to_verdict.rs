@@ -115,6 +115,15 @@ fn an_undisturbed_flight_is_a_case_without_a_gap_whatever_recorded_it() {
     }
 }
 
+/// At rest a camera's rate is its noise, and the residual minus that: a factor of -1, of all gyros.
+#[test]
+fn a_table_that_rests_between_its_turns_has_no_factor_before_a_camera() {
+    let place = tempfile::tempdir().expect("a folder");
+    let (_, diagnosis) = diagnosed(&flown(place.path(), "--motion rotation-1 --reference optical"));
+    assert!(diagnosis.causes.is_empty(), "{:?}", diagnosis.causes);
+    assert!(!diagnosis.is_unexplained(), "{}", diagnosis.none_of_these);
+}
+
 #[test]
 fn what_was_done_to_the_unit_is_named_corrected_and_flown_as_a_twin() {
     let place = tempfile::tempdir().expect("a folder");
