@@ -90,11 +90,11 @@ pub(super) struct Correction {
     pub innovations: Innovations,
 }
 
-/// A scalar to be compared.
 /// \[1\] a scalar is taken to have at least this part of the variance that it sees: f32 keeps 24 bits of a variance, and of what 14 of
 /// them take off it ten stay right. Without it an exact scalar leaves correlations beyond one.
 const LEAST_NOISE: f32 = 1.0 / 16384.0;
 
+/// A scalar to be compared.
 pub(super) struct Scalar<'a> {
     pub quantity: Quantity,
     /// As the state has it.

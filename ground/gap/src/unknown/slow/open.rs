@@ -1,4 +1,5 @@
-//! What is open beside a slow course: calibration, reference, the field's gradient, the point whose position is told, and the effects' parameters.
+//! What is open beside a slow course: calibration, reference, the field's gradient, the point whose position is told, and the effects'
+//! parameters.
 //!
 //! In: the problem with its model, and what each channel has ([`Seen`]). Out: [`Open`], a column for each open parameter, averaged as the
 //! residual is and scaled to one prior sigma.
