@@ -105,7 +105,11 @@ impl<'a> Belief<'a> {
                 Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
                 None => self.trust(Some(cause.effect), &cause.channels, *explained),
             };
-            let is_no_chance = above_doubt(cause.gain);
+            let is_no_chance = match self.courses {
+                // Asked beyond what the reference may be off.
+                Some(_) if index < on_readings => 1.0,
+                _ => above_doubt(cause.gain),
+            };
             let is_no_remainder = if cause.gain < strongest {
                 cause.gain / (cause.gain + REMAINDER * strongest)
             } else {
@@ -117,8 +121,8 @@ impl<'a> Belief<'a> {
 }
 
 /// Believes causes less, which are the model's effects in their order, that may be an error of the reference or the field. Returns what each
-/// is worth \[nats\] beyond that, sample by sample or in means over short stretches, whichever shows more; none where the reference is
-/// exact.
+/// is worth \[nats\] beyond that: in means over short stretches, whose noise is as their neighbours differ, or, where those do not tell of it,
+/// sample by sample; none where the reference is exact.
 pub fn beyond_reference(
     problem: &Problem,
     errors: &SlowErrors,
@@ -135,8 +139,10 @@ pub fn beyond_reference(
         return Vec::new();
     };
     let weighed = causes.iter_mut().enumerate().map(|(index, cause)| {
-        let slow = importance.map_or(0.0, |importance| importance.worth[index]);
-        let nats = beyond.nats(&model.components, index).max(slow);
+        let nats = match importance {
+            Some(importance) if importance.is_seen[index] => importance.worth[index],
+            _ => beyond.nats(&model.components, index),
+        };
         cause.probability *= above_doubt(nats);
         nats
     });

@@ -19,9 +19,11 @@ mod variant;
 
 use nalgebra::{DMatrix, DVector};
 
-pub use self::chosen::{Chosen, Rival};
+pub use self::{
+    chosen::{Chosen, Rival},
+    columns::{always, timed},
+};
 use self::{
-    columns::always,
     intervals::{bounded, fitted, stretches, taken},
     rivals::compare,
     screen::{CANDIDATES, gains, is_physical, leading},
