@@ -6,6 +6,7 @@ mod written;
 use std::fmt::Write;
 
 use gap::{
+    diagnose::diagnose,
     input::case::Subject,
     library::hypotheses::Library,
     null::{interval::Interval, model::Model, problem::Problem},
@@ -13,6 +14,7 @@ use gap::{
 };
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use tempfile::TempDir;
 use written::written;
 
 /// \[s\] of the log, at [`RATE_HZ`].
@@ -38,9 +40,8 @@ fit = [[0.0, 200.0]]
 hold = [[200.0, 240.0]]
 "#;
 
-/// What is recognised, by name, with the field along x of b that it is \[uT\] and when it is on; the field along x of b has `error` \[uT\] of
-/// the time \[s\] more.
-fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, f64, Option<Interval>)> {
+/// The field along x of b has `error` \[uT\] of the time \[s\] more than it should.
+fn case(seed: u64, error: impl Fn(f64) -> f64) -> TempDir {
     let mut unit = "name = \"three magnetometers\"\n".to_owned();
     for (name, axis) in [
         ("mx", "1.0, 0.0, 0.0"),
@@ -53,7 +54,7 @@ fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, f64, Option<Interva
              noise_sigma = {NOISE_UT}\nbias_sigma = 0.6\nscale_sigma = 0.01\naxis_sigma_rad = 0.01\nrange = [-1200.0, 1200.0]\n"
         );
     }
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let turned = |t_s: f64| 1.5 * (0.4 * t_s).sin();
     let mut motion = "t_s,qw,qx,qy,qz\n".to_owned();
@@ -78,7 +79,12 @@ fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, f64, Option<Interva
             40.0 + NOISE_UT * normal()
         );
     }
-    let folder = written("passing", CASE, &unit, &motion, &measured);
+    written("passing", CASE, &unit, &motion, &measured)
+}
+
+/// What is recognised where nothing was found, by name, with the field along x of b that it is \[uT\] and when it is on.
+fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, f64, Option<Interval>)> {
+    let folder = case(3, error);
     let subject = Subject::open(folder.path()).expect("opens");
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let library = Library::new(&problem, &[], &|_| {});
@@ -115,4 +121,23 @@ fn a_magnet_that_is_brought_and_taken_away_is_found_with_its_time() {
 #[test]
 fn what_a_field_does_that_wanders_is_nothing() {
     assert!(seen(|_| 0.0).is_none());
+}
+
+/// Of three wandering fields.
+#[test]
+fn a_diagnosis_names_a_current_and_nothing_of_a_field_that_wanders() {
+    let names = |seed: u64, error: &dyn Fn(f64) -> f64| {
+        let folder = case(seed, error);
+        let diagnosis = diagnose(&Subject::open(folder.path()).expect("opens"), &[], &|_, _| {});
+        let names = diagnosis
+            .causes
+            .iter()
+            .map(|cause| (cause.effect, cause.probability >= 0.5));
+        (names.collect::<Vec<_>>(), diagnosis.none_of_these < 0.5)
+    };
+    for seed in [3, 4, 5] {
+        assert_eq!(names(seed, &|_| 0.0), (Vec::new(), true), "{seed}");
+    }
+    let current = |t_s: f64| if (t_s / 37.0).fract() < 0.4 { 1.0 } else { 0.0 };
+    assert_eq!(names(3, &current), (vec![("current-field", true)], true));
 }
