@@ -390,7 +390,7 @@ impl Estimator {
             return;
         }
         let (p, bias) = (covariance.attitude(), covariance.bias());
-        self.covariance_n = [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33];
+        self.covariance_n = [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33 + self.filter.doubt()];
         self.bias_sd = [bias.m11, bias.m22, bias.m33].map(|variance| ComplexField::sqrt(variance.max(0.0)));
         if self.filter.aligned {
             let sd = ComplexField::sqrt(bias.trace() / 3.0);

@@ -55,6 +55,7 @@ mod pending;
 mod propagate;
 mod rest;
 mod settle;
+mod spell;
 mod start;
 mod state;
 mod step;
@@ -81,6 +82,7 @@ use self::{
     passage::walks,
     pending::{Pace, Pending},
     rest::Contradicted,
+    spell::Spell,
     start::UNKNOWN,
     state::are_finite,
     window::Window,
@@ -129,10 +131,8 @@ pub struct Filter {
     silent_s: f32,
     /// \[s\] for how long each kind of measurement has been rejected without a break: velocity, field.
     rejected_s: [f32; 2],
-    /// \[s\] for how long the field has been disturbed, with breaks shorter than [`Params::recovery_s`].
-    disturbed_s: f32,
-    /// \[s\] for how long it has not been.
-    calm_s: f32,
+    /// The field is not the reference's.
+    spell: Spell,
     /// The window before was one of rest.
     rested: bool,
     /// Rest contradicts the bias without a break.
@@ -167,8 +167,7 @@ impl Filter {
             last_us: None,
             silent_s: 0.0,
             rejected_s: [0.0; 2],
-            disturbed_s: 0.0,
-            calm_s: 0.0,
+            spell: Spell::default(),
             rested: false,
             contradicted: None,
             going: None,
@@ -191,9 +190,17 @@ impl Filter {
         self.q_nb * from_rotation_vector(self.rate_b * self.params.delays.gyro_s)
     }
 
-    /// [rad^2] covariance of the attitude's error as a small rotation vector in n, as of the last window.
+    /// [rad^2] covariance of the attitude's error as a small rotation vector in n, as of the last window, with what the field
+    /// [contradicts](Filter::doubt).
     pub fn attitude_covariance_n(&self) -> Matrix3<f32> {
-        self.covariance().attitude()
+        let mut covariance_n = self.covariance().attitude();
+        covariance_n.m33 += self.doubt();
+        covariance_n
+    }
+
+    /// [rad^2] by how much the attitude about the vertical is in doubt beside its covariance, because the field contradicts it.
+    pub fn doubt(&self) -> f32 {
+        self.spell.doubt()
     }
 
     /// [rad/s] bias covariance in b.
@@ -313,7 +320,8 @@ impl Filter {
     /// The mean field of a window without the iron, as far as that is known.
     fn mean_field(&self, sums: &FieldSums) -> MeanField {
         let mut mean = sums.mean(&self.iron.iron_b);
-        mean.white += self.iron.variance(sums);
+        mean.iron = self.iron.variance(sums);
+        mean.white += mean.iron;
         mean
     }
 

@@ -11,7 +11,7 @@ use super::{
     Filter, Outcome, Quantity,
     innovation::{Correction, Noise, Scalar},
     pending::Pending,
-    square,
+    spell::Shown,
     state::{DRIVEN, GYRO_MATRIX, Row, State, VELOCITY, dot},
 };
 use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
@@ -83,35 +83,53 @@ impl Filter {
         self.measured.velocity_accepted = Some(accepted);
     }
 
-    /// Third. The mean field against the reference, across it: east and in the meridian. Where the field is too disturbed
-    /// its rejection says nothing of the attitude. Iron that goes round shows neither in the norm nor in the dip twice in a turn, when
-    /// it turns the heading most: so the field is disturbed until it has been calm for as long as an attitude is not given up.
+    /// Third. The mean field against the reference, across it: east and in the meridian. In a [`spell`](super::spell) it is used for
+    /// what it is, and says that the attitude is another only when it has contradicted it for longer than it stood by it.
     pub(super) fn compare_field(&mut self) {
         self.measured.field_accepted = None;
         let Some(compared) = &self.measured.compared else {
             return;
         };
-        let disturbed = compared.disturbance > square(self.params.field_gate);
-        let duration_s = self.measured.means.duration_s;
-        self.calm_s = if disturbed { 0.0 } else { self.calm_s + duration_s };
-        let disturbed = disturbed || (self.disturbed_s > 0.0 && self.calm_s < self.params.recovery_s);
-        self.disturbed_s = if disturbed { self.disturbed_s + duration_s } else { 0.0 };
-        self.correction.usable = !disturbed || self.disturbed_s > self.params.coast_s;
+        let (params, duration_s) = (&self.params, self.measured.means.duration_s);
         let mut accepted = true;
         for scalar in &compared.scalars {
             let row = self.pending.passage.mean_row(&scalar.row_n);
             let column = State::combined(&self.measured.seen, &scalar.row_n);
-            let scalar = Scalar {
+            let mut compared_with = Scalar {
                 quantity: scalar.quantity,
                 predicted: 0.0,
                 measured: scalar.residual,
                 row: Row::Of(&row),
                 noise: scalar.noise,
             };
-            accepted &= compare(&mut self.pending, &mut self.correction, &scalar, &column);
+            let Some((before, own)) = self.pending.next(&column, &compared_with.row) else {
+                continue;
+            };
+            let looked = self.correction.look(&compared_with, before, own);
+            if scalar.quantity == Quantity::FieldEast {
+                self.correction.usable = self.spell.go_on(
+                    params,
+                    &Shown {
+                        duration_s,
+                        disturbance: compared.disturbance,
+                        residual: looked.residual,
+                        of_state: looked.of_state,
+                        of_reference: compared.of_reference,
+                        horizontal: compared.horizontal,
+                    },
+                );
+            }
+            if self.spell.lasts() && self.correction.usable {
+                compared_with.noise = self.spell.noise(duration_s).and_white(scalar.noise.alone);
+            }
+            let is_accepted = self.correction.judge(&compared_with, &looked, own);
+            if is_accepted {
+                self.pending.keep();
+            }
+            accepted &= is_accepted;
         }
         self.correction.usable = true;
-        self.measured.field_accepted = (!disturbed).then_some(accepted);
+        self.measured.field_accepted = self.spell.judge(accepted, duration_s);
     }
 }
 
@@ -120,7 +138,8 @@ pub(super) fn compare(pending: &mut Pending, correction: &mut Correction, scalar
     let Some((before, own)) = pending.next(start, &scalar.row) else {
         return true;
     };
-    let accepted = correction.compare(scalar, before, own);
+    let looked = correction.look(scalar, before, own);
+    let accepted = correction.judge(scalar, &looked, own);
     if accepted {
         pending.keep();
     }

@@ -57,6 +57,10 @@ pub struct Compared {
     pub scalars: [Scalar; 2],
     /// \[1\] square of what norm and dip show of a disturbance.
     pub disturbance: f32,
+    /// \[1\] horizontal part of the reference.
+    pub horizontal: f32,
+    /// \[1\] variance of the field east by the reference and the samples, without any disturbance or iron.
+    pub of_reference: f32,
 }
 
 impl Reference {
@@ -126,7 +130,8 @@ impl Reference {
         }
         let (sin, cos) = sin_cos(self.dip);
         let disturbance = self.deviation(norm, dip);
-        let seen = square(params.disturbance) * disturbance + mean.unrest(params) / square(self.norm_ut);
+        let unrest = mean.unrest(params) / square(self.norm_ut);
+        let seen = square(params.disturbance) * disturbance + unrest;
         let noise = |sd: f32| Noise::lasting(square(sd), params.field_lasts_s, duration_s).and_white(seen);
         Some(Compared {
             scalars: [
@@ -144,6 +149,8 @@ impl Reference {
                 },
             ],
             disturbance,
+            horizontal: cos,
+            of_reference: square(params.heading_sd * cos) + (mean.unrest(params) - mean.iron) / square(self.norm_ut),
         })
     }
 

@@ -29,6 +29,8 @@ pub struct MeanField {
     /// [uT^2] variance of a component by what moved or turned within the window, were all of it noise, and by what is not
     /// known of the iron.
     pub white: f32,
+    /// [uT^2] of it, by what is not known of the iron.
+    pub iron: f32,
 }
 
 impl FieldSums {
@@ -73,6 +75,7 @@ impl FieldSums {
             mag_n,
             spread,
             white: (spread + noise) / self.count,
+            iron: 0.0,
         }
     }
 }

@@ -106,6 +106,15 @@ pub(super) struct Scalar<'a> {
     pub noise: Noise,
 }
 
+/// A scalar after those of its window before it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Looked {
+    /// Measured less predicted.
+    pub residual: f32,
+    /// `h P h'`.
+    pub of_state: f32,
+}
+
 impl Correction {
     /// Of another window.
     pub fn begin(&mut self, gate: f32) {
@@ -115,18 +124,12 @@ impl Correction {
         self.innovations.clear();
     }
 
-    /// Compares a scalar. Whether it was accepted. The column of `own` is `P h'` of the covariance at the end of the window
-    /// before any of its scalars, and becomes that after the ones `before`, `P h' - sum k (p h')`; the covariance itself has
-    /// their updates later.
-    pub fn compare(&mut self, scalar: &Scalar, before: &[Seen], own: &mut Seen) -> bool {
-        let Scalar {
-            quantity,
-            predicted,
-            measured,
-            row,
-            noise,
-        } = *scalar;
-        let residual = measured - predicted - row.of(&self.error);
+    /// Residual of a scalar, and the variance that the state gives it. The column of `own` is `P h'` of the covariance at the end
+    /// of the window before any of its scalars, and becomes that after the ones `before`, `P h' - sum k (p h')`; the covariance
+    /// itself has their updates later.
+    pub fn look(&self, scalar: &Scalar, before: &[Seen], own: &mut Seen) -> Looked {
+        let row = scalar.row;
+        let residual = scalar.measured - scalar.predicted - row.of(&self.error);
         let part = |seen: &Seen| -(row.of(&seen.column) / seen.variance);
         let (twos, last) = before.as_chunks::<2>();
         for [one, other] in twos {
@@ -136,7 +139,22 @@ impl Correction {
         for seen in last {
             own.column.add(&seen.column, part(seen));
         }
-        let of_state = row.of(&own.column);
+        Looked {
+            residual,
+            of_state: row.of(&own.column),
+        }
+    }
+
+    /// Judges a scalar by what it was [seen](Self::look) to be. Whether it was accepted.
+    pub fn judge(&mut self, scalar: &Scalar, looked: &Looked, own: &mut Seen) -> bool {
+        let Scalar {
+            quantity,
+            predicted,
+            measured,
+            noise,
+            ..
+        } = *scalar;
+        let Looked { residual, of_state } = *looked;
         own.variance = of_state + at_least(of_state * LEAST_NOISE, noise.lasting);
         let variance = of_state + noise.alone;
         let test_ratio = residual * residual / (self.gate * self.gate * variance);
@@ -183,7 +201,8 @@ mod tests {
                     column: covariance.of_driver(0),
                     variance: 0.0,
                 };
-                correction.compare(&scalar, &[], &mut own);
+                let looked = correction.look(&scalar, &[], &mut own);
+                correction.judge(&scalar, &looked, &mut own);
                 covariance.update(&own, &Seen::NOTHING);
             }
             let known = covariance.bias()[(0, 0)];

@@ -6,7 +6,7 @@
 
 use nalgebra::{SMatrix, UnitQuaternion, Vector2, Vector3};
 
-use super::{Covariance, Filter, pending::Pending, state::GYRO_MATRIX, window::Window};
+use super::{Covariance, Filter, pending::Pending, spell::Spell, state::GYRO_MATRIX, window::Window};
 
 /// Attitude and bias, and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl Filter {
         self.last_us = Some(at_us);
         self.silent_s = 0.0;
         self.rejected_s = [0.0; 2];
-        self.disturbed_s = 0.0;
+        self.spell = Spell::default();
         self.contradicted = None;
         self.rested = false;
         self.going = None;

@@ -52,10 +52,10 @@ pub struct Params {
     pub field_lasts_s: f32,
     /// \[1\] how far a disturbance is believed to reach across the field, in parts of what norm and dip show of it.
     pub disturbance: f32,
-    /// \[1\] a field whose norm and dip are off by more (in parts of the norm, and radians) is not used. Small: coasts on
-    /// the gyros often; large: follows iron.
+    /// \[1\] a field whose norm and dip are off by more (in parts of the norm, and radians) is disturbed, and not used while the
+    /// attitude is known better. Small: coasts on the gyros often; large: follows iron.
     pub field_gate: f32,
-    /// \[s\] but for no longer than this without a break: after it the field is used with its variance, for what it is.
+    /// \[s\] after so long what neither force nor field tells is what the gyros say of their bias at rest.
     pub coast_s: f32,
     /// \[1\] how much of the field's spread within a window adds to its uncertainty.
     pub field_spread: f32,

@@ -79,6 +79,8 @@ impl Filter {
         self.covariance.forget_velocity(velocity_sd);
         self.turn(&found.q_nb);
         self.velocity_n = Vector2::zeros();
+        let contradicted = self.rejected_s[1] >= self.params.recovery_s;
+        self.spell.have_other_attitude(contradicted);
         self.rejected_s = [0.0; 2];
         self.aligned = true;
         true

@@ -124,6 +124,7 @@ fn biased(step: &mut Step) {
 }
 
 mod correction;
+mod disturbed;
 mod force;
 mod gyros;
 mod hostile;

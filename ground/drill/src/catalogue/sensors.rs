@@ -258,6 +258,7 @@ pub(super) const ROWS: [Row; 23] = [
             "src/kalman/tests/iron.rs: a_magnetic_step_turns_the_heading_by_less_than_two_degrees",
             "src/kalman/tests/iron.rs: iron_that_goes_round_turns_the_heading_by_less_than_two_degrees",
             "src/kalman/tests/iron.rs: a_magnet_on_its_way_past_is_no_iron_of_the_unit",
+            "src/kalman/tests/disturbed.rs: a_disturbance_of_any_length_leaves_the_heading_right_or_said_to_be_wrong",
         ],
         "",
     ),
