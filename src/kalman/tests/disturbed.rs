@@ -105,7 +105,7 @@ impl Moves {
             Moves::Rests => Vector3::zeros(),
             Moves::Yaws => Vector3::new(0.0, 0.0, 0.3),
             Moves::Tumbles => Vector3::new(1.5 * sin, 1.5 * cos, 1.0),
-            Moves::Handled if second / 5 % 4 == 0 => Vector3::new(0.5 * sin, 0.5 * cos, 0.3),
+            Moves::Handled if (second / 5).is_multiple_of(4) => Vector3::new(0.5 * sin, 0.5 * cos, 0.3),
             Moves::Handled => Vector3::zeros(),
         }
     }
