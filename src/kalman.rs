@@ -48,6 +48,7 @@ mod joseph;
 mod kept;
 mod known;
 mod measured;
+mod nose;
 mod params;
 mod passage;
 mod path;
@@ -70,6 +71,7 @@ pub use self::{
     iron::HardIron,
     kept::{KEPT_BYTES, Outage},
     known::Known,
+    nose::Nose,
     params::{Delays, Params, Rest},
     state::STATES,
     step::{Outcome, Refusal, Sampled, Step},

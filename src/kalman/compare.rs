@@ -33,9 +33,19 @@ impl Filter {
     /// window was gathered in, before any correction of them.
     pub(super) fn correct(&mut self, outcome: &mut Outcome) {
         outcome.aligned = self.recover();
-        let error = &self.correction.error;
-        let driven = if outcome.aligned { [0.0; DRIVEN] } else { error.driven };
-        let [north, east, down, to_north, to_east] = driven;
+        if outcome.aligned {
+            self.correction.error.driven = [0.0; DRIVEN];
+        }
+        // There is room for all.
+        let _ = outcome.innovations.extend_from_slice(&self.correction.innovations);
+        let error = self.correction.error;
+        self.correct_by(&error);
+    }
+
+    /// The state without an error as it is at the end of the latest window.
+    #[inline(never)]
+    pub(super) fn correct_by(&mut self, error: &State) {
+        let [north, east, down, to_north, to_east] = error.driven;
         let mut rotation_n = Vector3::new(north, east, down);
         if self.window.duration_s > 0.0 {
             rotation_n += Vector3::from(self.window.drive.each_ref().map(|drive| dot(drive, &error.drivers)));
@@ -44,8 +54,6 @@ impl Filter {
         self.bias_b += Vector3::from_row_slice(bias);
         self.gyro_matrix += Matrix3::from_row_slice(matrix);
         self.velocity_n += Vector2::new(to_north, to_east);
-        // There is room for all.
-        let _ = outcome.innovations.extend_from_slice(&self.correction.innovations);
         self.turn(&from_rotation_vector(rotation_n));
         if !self.is_finite() {
             self.begin_anew();

@@ -174,6 +174,7 @@ impl Covariance {
     }
 
     /// After a scalar, or after one and then another: Joseph's form.
+    #[inline(never)]
     pub(super) fn update(&mut self, first: &Seen, second: &Seen) {
         let ([k, u], [k_2, u_2]) = (first.pulls(), second.pulls());
         let driven = interleaved(&k.driven, &u.driven, &k_2.driven, &u_2.driven);

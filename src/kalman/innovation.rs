@@ -24,6 +24,8 @@ pub enum Quantity {
     FieldEast,
     /// \[1\] field across itself in the meridian, north and up, in parts of the reference's norm.
     FieldMeridian,
+    /// \[1\] the nose across the direction it is known to have.
+    Nose,
 }
 
 /// What became of one scalar.

@@ -129,6 +129,7 @@ mod force;
 mod gyros;
 mod hostile;
 mod iron;
+mod nose;
 mod recovery;
 
 #[test]
