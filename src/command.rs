@@ -17,7 +17,7 @@
 
 use heapless::Vec;
 
-use crate::packet::hex_value;
+use crate::{packet::hex_value, rail::Rail};
 
 /// Letters of a word.
 pub const WORD_BYTES: usize = 4;
@@ -26,7 +26,7 @@ pub const WORD_BYTES: usize = 4;
 pub const HALF_WORD_TIMEOUT_US: u64 = 2_000_000;
 
 /// Digits after [`Command::DumpRange`]'s word, six for the first record, six for how many; and after
-/// [`Command::SetWord`]'s, four for the place, eight for the bytes.
+/// [`Command::SetWord`]'s, four for the place, eight for the bytes; after [`Command::Rail`]'s those of a [`Rail`].
 const DIGITS: usize = 12;
 
 /// A word as it stands on the line.
@@ -66,10 +66,12 @@ pub enum Command {
     LoadSet,
     /// Forget the calibration set that is kept, and use the one compiled in.
     ForgetSet,
-    /// Confirm [`Command::LoadSet`] or [`Command::ForgetSet`].
+    /// Confirm [`Command::LoadSet`], [`Command::ForgetSet`] or [`Command::Rail`].
     ConfirmSet,
     /// Read the calibration set in use.
     ReadSet,
+    /// The unit lies on this launch rail, or on none.
+    Rail(Rail),
     /// Stop the running task.
     Stop,
     /// Record packets.
@@ -105,7 +107,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 21] = [
+pub const COMMANDS: [Entry; 22] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(
@@ -136,8 +138,17 @@ pub const COMMANDS: [Entry; 21] = [
         Command::ForgetSet,
         "WAIT: forget the calibration kept (then G_CK)",
     ),
-    entry(b"G_CK", Command::ConfirmSet, "WAIT: confirm G_CL or G_CX, within 10 s"),
+    entry(
+        b"G_CK",
+        Command::ConfirmSet,
+        "WAIT: confirm G_CL, G_CX or G_RA, within 10 s",
+    ),
     entry(b"G_CR", Command::ReadSet, "WAIT: read the calibration in use"),
+    entry(
+        b"G_RA",
+        RAIL,
+        "WAIT: rail, G_RAaaaaeeeesstt (hex 0.01 deg azimuth, elevation, 0.1 deg sigmas; then G_CK)",
+    ),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task (send twice)"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets (send twice)"),
     entry(b"G_ST", Command::Status, "status"),
@@ -154,8 +165,19 @@ const SET_WORD: Command = Command::SetWord {
     bytes: [0; 4],
 };
 
-fn takes_digits(command: Command) -> bool {
-    matches!(command, Command::DumpRange { .. } | Command::SetWord { .. })
+const RAIL: Command = Command::Rail(Rail {
+    azimuth: 0,
+    elevation: 0,
+    azimuth_sd: 0,
+    elevation_sd: 0,
+});
+
+/// Whether a command's word has twelve digits behind it.
+pub fn takes_digits(command: Command) -> bool {
+    matches!(
+        command,
+        Command::DumpRange { .. } | Command::SetWord { .. } | Command::Rail(_)
+    )
 }
 
 /// The word of a command.
@@ -278,6 +300,13 @@ impl Parser {
                 place: number(0, 4) as u16,
                 bytes: number(4, 8).to_be_bytes(),
             }
+        } else if self.word() == *word_of(RAIL) {
+            Command::Rail(Rail {
+                azimuth: number(0, 4) as u16,
+                elevation: number(4, 4) as u16,
+                azimuth_sd: number(8, 2) as u8,
+                elevation_sd: number(10, 2) as u8,
+            })
         } else {
             Command::DumpRange {
                 first: number(0, 6),

@@ -40,7 +40,7 @@ use crate::{
     faults::{Monitor, SensorHealth, Vectors},
     flight_log::record,
     increments::{Force, Increments},
-    kalman::{self, Filter, Outage, Outcome, Step, seconds},
+    kalman::{self, Filter, Nose, Outage, Outcome, Step, seconds},
     redundancy::Known,
     sample::{Kind, Sample},
     spin, triad,
@@ -130,6 +130,8 @@ pub struct Estimator {
     white: [f32; 2],
     /// The step before completed a window of the filter.
     closed: bool,
+    /// An attitude was found that no rail was held against.
+    found: bool,
     /// What TRIAD knows.
     axes_n: Option<Matrix3<f32>>,
     last_us: Option<u64>,
@@ -152,6 +154,7 @@ impl Estimator {
             boost: Boost::WAITING,
             closed: false,
             white: sampled::whites(&set),
+            found: false,
             axes_n: axes_n(site),
             last_us: None,
             settlements: None,
@@ -172,6 +175,7 @@ impl Estimator {
         self.averager = Averager::EMPTY;
         self.boost = Boost::WAITING;
         self.closed = false;
+        self.found = false;
         self.white = sampled::whites(set);
         self.axes_n = axes_n(site);
         self.last_us = None;
@@ -194,6 +198,7 @@ impl Estimator {
             boost,
             white,
             closed,
+            found,
             axes_n,
             last_us,
             settlements,
@@ -208,6 +213,7 @@ impl Estimator {
         let sum = B::ram_sum(boost, sum);
         let sum = B::ram_sum(white, sum);
         let sum = B::ram_sum(closed, sum);
+        let sum = B::ram_sum(found, sum);
         let sum = B::ram_sum(axes_n, sum);
         let sum = B::ram_sum(last_us, sum);
         let sum = B::ram_sum(settlements, sum);
@@ -300,6 +306,14 @@ impl Estimator {
         self.averager.take(counter, force, &self.set);
     }
 
+    /// Takes the direction of the nose as it is known from outside, if that is new, or if an attitude was found since. `None` if it did not;
+    /// by which angle \[rad\] they contradict each other, if they do.
+    pub fn know_nose(&mut self, nose: &Nose, is_new: bool) -> Option<Result<(), f32>> {
+        let is_due = self.filter.may_know_nose() && !self.boost.is_on() && (is_new || self.found);
+        self.found &= !is_due;
+        is_due.then(|| self.filter.know_nose(nose))
+    }
+
     /// Takes a cycle.
     pub fn step(&mut self, sample: &Sample, increments: &Increments) -> Estimate {
         self.take(sample, increments, &mut Outcome::default())
@@ -373,6 +387,7 @@ impl Estimator {
             lift_off: reading.lift_off,
         };
         self.filter.take(&step, outcome);
+        self.found |= outcome.aligned;
         self.look_at_the_covariance();
         if !(closes || closed || sample.reading.lift_off) {
             self.learn_on_pad(sample, &measured, increments, &vectors);

@@ -41,6 +41,7 @@ pub mod mode;
 pub mod nand;
 pub mod packet;
 pub mod quest;
+pub mod rail;
 pub mod redundancy;
 pub mod resume;
 pub mod retained;

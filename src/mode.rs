@@ -8,14 +8,14 @@
 //! withdraws them.
 //!
 //! The same holds for the calibration set: G_CL (use and keep the one sent) and G_CX (forget the one kept) are armed, and
-//! take effect with the different G_CK.
+//! take effect with the different G_CK. So is and does G_RA, the launch rail.
 //!
 //! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
 //!
 //! After power-on the mode is WAIT until the log was heard. What it says of the time before is taken once, and not after
 //! a command or lift-off, which know better; so a log that is mounted again later changes nothing.
 
-use crate::{command::Command, flight_log::Resumed, resume::Resume};
+use crate::{command::Command, flight_log::Resumed, rail::Rail, resume::Resume};
 
 /// \[us\] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -55,6 +55,8 @@ pub enum Cause {
     EraseArmed,
     /// G_CA: nothing changes, but the log was erased.
     Erased,
+    /// G_RA: nothing changes, but the launch rail did.
+    Rail,
 }
 
 impl Cause {
@@ -66,6 +68,7 @@ impl Cause {
             Cause::Log => "log, as before the power cut",
             Cause::EraseArmed => "an erase of the log armed",
             Cause::Erased => "the log erased",
+            Cause::Rail => "the launch rail set",
         }
     }
 }
@@ -116,6 +119,8 @@ pub enum Action {
     SelfTest,
     /// Take, use or read a calibration set.
     Calibration(Command),
+    /// Lie on this launch rail.
+    Rail(Rail),
 }
 
 /// Why a command was refused.
@@ -288,10 +293,11 @@ impl State {
             Command::SetWord { .. } | Command::ReadSet => {
                 self.only_in(Mode::Wait, |_| Verdict::Done(Action::Calibration(command)))
             }
-            Command::LoadSet | Command::ForgetSet => {
+            Command::LoadSet | Command::ForgetSet | Command::Rail(_) => {
                 self.only_in(Mode::Wait, |state| state.confirm(command, Command::ConfirmSet, now_us))
             }
             Command::ConfirmSet => self.only_in(Mode::Wait, |_| match armed {
+                Some(Command::Rail(rail)) => Verdict::Done(Action::Rail(rail)),
                 Some(armed) => Verdict::Done(Action::Calibration(armed)),
                 None => Verdict::Refused(Refusal::NothingToConfirm),
             }),

@@ -11,7 +11,7 @@
 //! | 4.. | the content |
 //! | then 4 | CRC-32 (ISO-HDLC) of the part's address, the layout's number, the length and the content |
 //!
-//! The parts, by address: [`STATE`], [`STARTS`], [`PULSE`], [`CRASH`], [`ATTITUDE`], [`SET`]. A firmware with another
+//! The parts, by address: [`STATE`], [`STARTS`], [`PULSE`], [`CRASH`], [`ATTITUDE`], [`SET`], [`RAIL`]. A firmware with another
 //! layout has another number and finds nothing, as after a power cut.
 
 use crc::Digest;
@@ -53,7 +53,10 @@ pub const ATTITUDE: Place = CRASH.before(1536);
 /// The calibration set in use: [`crate::calibration::Set::encode`]; empty for the one compiled in.
 pub const SET: Place = ATTITUDE.before(1280);
 
-const _: () = assert!(SET.at + 2 * SET.room <= RETAINED_BYTES);
+/// The launch rail: [`crate::rail::Rail::bytes`].
+pub const RAIL: Place = SET.before(16);
+
+const _: () = assert!(RAIL.at + 2 * RAIL.room <= RETAINED_BYTES);
 
 impl Place {
     /// The part behind this one, with so many bytes a copy.

@@ -18,6 +18,7 @@ mod gyros;
 mod image;
 mod inputs;
 mod plates;
+mod rail;
 mod record;
 mod self_test;
 mod shared;
@@ -124,6 +125,7 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
     };
     let shared = Shared::new(settings, start);
     calibration::recall(&shared, &memory);
+    rail::recall(&shared, &memory);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();

@@ -14,6 +14,7 @@ pub mod source;
 mod taught;
 mod transit;
 pub mod watch;
+mod words;
 
 use std::{io, path::PathBuf, thread, time::Duration};
 
@@ -161,16 +162,17 @@ pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed,
         through.finish();
         Ok(remarks)
     };
+    let words = words::before(arguments, &source);
     let (seen, remarks) = if arguments.console {
         // With an input that ends, a flight whose length was asked for goes on to its end.
         let options = console::Options {
             listen: arguments.duration,
             ..console::Options::default()
         };
-        beside_the_console(arguments, source.site, folder, progress, interrupt, options, flight)?
+        beside_the_console(words, source.site, folder, progress, interrupt, options, flight)?
     } else {
         let digest = Digest::at(&source.site);
-        let mut watch = Watch::new(folder, digest, progress, None, arguments.derived, interrupt.clone());
+        let mut watch = Watch::new(folder, digest, progress, None, words, interrupt.clone());
         let remarks = flight(&mut watch)?;
         (watch.finish()?, remarks)
     };
@@ -239,7 +241,7 @@ fn written(
 
 /// Flies in a thread of its own while the user has the terminal; ends when both do.
 fn beside_the_console(
-    arguments: &Arguments,
+    words: Vec<u8>,
     site: Site,
     folder: Folder,
     progress: Progress,
@@ -250,14 +252,7 @@ fn beside_the_console(
     let (line, unit) = line::channel("the flying unit");
     let kept = folder.path().join("umbilical.txt");
     let digest = Digest::at(&site);
-    let mut watch = Watch::new(
-        folder,
-        digest,
-        progress,
-        Some(unit),
-        arguments.derived,
-        interrupt.clone(),
-    );
+    let mut watch = Watch::new(folder, digest, progress, Some(unit), words, interrupt.clone());
     let flying = thread::Builder::new()
         .name("flight".into())
         .spawn(move || -> Result<_, FlyError> {

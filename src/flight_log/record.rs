@@ -300,6 +300,7 @@ pub fn encode_change(key: Key, change: &Change) -> RecordBytes {
         Cause::Log => 3,
         Cause::EraseArmed => 4,
         Cause::Erased => 5,
+        Cause::Rail => 6,
     };
     put(&mut bytes, at::RECORDING, &[change.recording.into()]);
     put(&mut bytes, at::CAUSE, &[cause]);
@@ -393,6 +394,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
                 3 => Cause::Log,
                 4 => Cause::EraseArmed,
                 5 => Cause::Erased,
+                6 => Cause::Rail,
                 _ => Cause::Command,
             },
         }),

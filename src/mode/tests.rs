@@ -35,6 +35,7 @@ fn after(mut state: State, bytes: &[u8]) -> (State, bool, bool) {
             erased |= verdict == Verdict::Done(Action::Erase);
             let set = |command| verdict == Verdict::Done(Action::Calibration(command));
             calibrated |= set(Command::LoadSet) || set(Command::ForgetSet);
+            calibrated |= matches!(verdict, Verdict::Done(Action::Rail(_)));
         }
     }
     (state, erased, calibrated)
@@ -45,14 +46,16 @@ fn deeds() -> Vec<Vec<u8>> {
     let once = COMMANDS.iter().map(|entry| match entry.command {
         Command::DumpRange { .. } => b"G_LR000000000010".to_vec(),
         Command::SetWord { .. } => b"G_CW00040000A040".to_vec(),
+        Command::Rail(_) => b"G_RA1B5821340503".to_vec(),
         _ => entry.word.to_vec(),
     });
-    let confirmed: [&[u8]; 8] = [
+    let confirmed: [&[u8]; 9] = [
         b"G_MVG_MV",
         b"G_MEG_ME",
         b"G_MAG_CA",
         b"G_CLG_CK",
         b"G_CXG_CK",
+        b"G_RA1B5821340503G_CK",
         b"G_MGG_MG",
         b"G_MTG_MT",
         b"G_MtG_Mt",
@@ -61,7 +64,7 @@ fn deeds() -> Vec<Vec<u8>> {
 }
 
 /// Checks the `garbled` forms of every deed, and of every two deeds in a row: none erases unless G_CA was sent, none
-/// changes the calibration set unless G_CK was sent, none leads to a mode whose word was not sent.
+/// changes the calibration set or the rail unless G_CK was sent, none leads to a mode whose word was not sent.
 fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
     let says = |sent: &[u8], word: &[u8]| sent.windows(word.len()).any(|letters| letters == word);
     for state in [WAITING, FLYING] {
@@ -196,6 +199,7 @@ fn a_task_of_the_other_mode_is_refused() {
         Command::ForgetSet,
         Command::ConfirmSet,
         Command::ReadSet,
+        Command::Rail(Rail::default()),
     ] {
         assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
     }

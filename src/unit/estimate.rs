@@ -20,6 +20,7 @@ use embassy_futures::{
 
 use super::{
     clock::{never, now},
+    rail,
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -97,6 +98,9 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estim
             estimate_us,
             estimate,
         ));
+        if state.mode == Mode::Wait {
+            know_rail(shared, estimator);
+        }
         keep(estimator, memory, &mut kept);
         left = estimator.ram_sum::<B>(&kept);
     }
@@ -130,6 +134,17 @@ fn mend_set(shared: &Shared, estimator: &mut Estimator) {
     if estimator.mend_set(&mut set, shared.set_sum.get()) {
         shared.calibration.set(set);
         shared.say(format_args!("a flipped bit of the calibration was put right"));
+    }
+}
+
+/// Has the attitude know the launch rail: a rail that is new, or an attitude that is.
+#[inline(never)]
+fn know_rail(shared: &Shared, estimator: &mut Estimator) {
+    let rail = shared.rail.get();
+    if !rail.is_none()
+        && let Some(met) = estimator.know_nose(&rail.nose(), shared.rail_is_new.get())
+    {
+        rail::met(shared, met);
     }
 }
 

@@ -26,6 +26,7 @@ use crate::{
     increments::{Force, Increments, Integrator},
     mode::{Cause, Change, Copies, State, Task},
     packet::PACKET_BYTES,
+    rail::Rail,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
 };
@@ -172,6 +173,10 @@ pub struct Shared {
     pub set_sum: Cell<u32>,
     /// Changes of mode that are not in the log yet.
     changes: Cell<Deque<Change, CHANGES>>,
+    /// The launch rail.
+    pub rail: Cell<Rail>,
+    /// The attitude has not been held against it.
+    pub rail_is_new: Cell<bool>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
     pub force: Signal<NoopRawMutex, (u16, Force)>,
     cycles: Cycles,
@@ -218,6 +223,8 @@ impl Shared {
             attitude_found: Cell::default(),
             fed_us: Cell::default(),
             changes: Cell::default(),
+            rail: Cell::default(),
+            rail_is_new: Cell::default(),
             force: Signal::new(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),

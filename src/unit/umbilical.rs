@@ -8,6 +8,7 @@ use embedded_io_async::Read;
 use super::{
     calibration,
     clock::{never, now},
+    rail,
     shared::Shared,
     telemetry::Out,
     vote::{Voter, Votes},
@@ -147,7 +148,11 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         shared.note(Cause::EraseArmed);
     }
     match verdict {
-        Verdict::Confirm(with) => shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with)))),
+        Verdict::Confirm(with) => shared.say(format_args!(
+            "{word}{}: send {} within 10 s",
+            Armed(command),
+            Printable(word_of(with))
+        )),
         Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
         Verdict::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
         Verdict::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
@@ -167,6 +172,7 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
             ));
         }
         Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, memory, arriving, command).await,
+        Verdict::Done(Action::Rail(rail)) => rail::set(shared, memory, rail),
         Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
@@ -267,6 +273,18 @@ impl core::fmt::Display for At<'_> {
         match self.0.cause {
             CrashCause::Panic => write!(f, "{}", self.0.at),
             _ => write!(f, "{:08X}", self.0.at),
+        }
+    }
+}
+
+/// The rail that a word arms, nothing of any other one.
+struct Armed(Command);
+
+impl core::fmt::Display for Armed {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.0 {
+            Command::Rail(rail) => write!(f, ": {rail}"),
+            _ => Ok(()),
         }
     }
 }

@@ -218,6 +218,7 @@ fn starts_or_stops(command: Command) -> bool {
         | LoadSet
         | ForgetSet
         | ConfirmSet
+        | Rail(_)
         | ReadSet => false,
     }
 }

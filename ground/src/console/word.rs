@@ -4,7 +4,7 @@
 //! over in silence (`help`, `g_st`, a slip) is answered here, because nothing else would. `!` before a line sends it whatever
 //! it is.
 
-use emems::command::{COMMANDS, Command, Heard, Parser, WORD_BYTES};
+use emems::command::{COMMANDS, Heard, Parser, WORD_BYTES, takes_digits};
 
 use super::input;
 
@@ -75,7 +75,7 @@ fn unknown(line: &str) -> String {
     if let Some(word) = words().find(|word| line.starts_with(word)) {
         let taking = COMMANDS.iter().find(|entry| input::word(entry) == word);
         return match taking.map(|entry| entry.command) {
-            Some(Command::DumpRange { .. } | Command::SetWord { .. }) => {
+            Some(command) if takes_digits(command) => {
                 format!("{word} takes twelve hexadecimal digits")
             }
             _ => format!("what follows {word} is no word"),

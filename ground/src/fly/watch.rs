@@ -5,7 +5,6 @@
 
 use std::time::Duration;
 
-use emems::command::{Command, word_of};
 use twin::{
     part::Nanos,
     run::{Bench, Flow},
@@ -19,7 +18,7 @@ use crate::{
     record::Record,
 };
 
-/// \[ns\] when derived frames are asked for: the unit has long booted.
+/// \[ns\] when the words before a flight are said: the unit has long booted.
 const ASK_AT: Nanos = 300_000_000;
 
 /// What is left of a watched flight.
@@ -40,7 +39,7 @@ pub struct Watch {
     digest: Digest,
     progress: Progress,
     console: Option<UnitEnd>,
-    ask_derived: bool,
+    words: Vec<u8>,
     interrupt: Interrupt,
     packets: u64,
     flown: Nanos,
@@ -49,13 +48,13 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Before take-off. With a console, the umbilical is the console's to keep.
+    /// Before take-off, with what is said to the unit once it listens. With a console, the umbilical is the console's to keep.
     pub fn new(
         folder: Folder,
         digest: Digest,
         progress: Progress,
         console: Option<UnitEnd>,
-        ask_derived: bool,
+        words: Vec<u8>,
         interrupt: Interrupt,
     ) -> Self {
         Watch {
@@ -63,7 +62,7 @@ impl Watch {
             digest,
             progress,
             console,
-            ask_derived,
+            words,
             interrupt,
             packets: 0,
             flown: 0,
@@ -133,9 +132,8 @@ impl Bench for Watch {
 
     fn commands(&mut self, now: Nanos) -> Vec<u8> {
         let mut commands = Vec::new();
-        if self.ask_derived && now >= ASK_AT {
-            self.ask_derived = false;
-            commands.extend(word_of(Command::DerivedOn));
+        if now >= ASK_AT {
+            commands.append(&mut self.words);
         }
         if let Some(console) = &self.console {
             commands.extend(console.commands());
@@ -165,7 +163,7 @@ mod tests {
 
     const MILLISECOND: Nanos = 1_000_000;
 
-    fn watch(place: &std::path::Path, console: Option<UnitEnd>, ask_derived: bool) -> Watch {
+    fn watch(place: &std::path::Path, console: Option<UnitEnd>, words: &[u8]) -> Watch {
         let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
         let progress = Progress::start(Duration::from_secs(60), false, true);
         Watch::new(
@@ -173,7 +171,7 @@ mod tests {
             Digest::default(),
             progress,
             console,
-            ask_derived,
+            words.to_vec(),
             Interrupt::default(),
         )
     }
@@ -181,7 +179,7 @@ mod tests {
     #[test]
     fn packets_are_timed_by_their_last_byte() {
         let place = tempfile::tempdir().expect("temporary folder");
-        let mut watch = watch(place.path(), None, false);
+        let mut watch = watch(place.path(), None, b"");
         for (counter, at) in [(0, 14 * MILLISECOND), (1, 214 * MILLISECOND + 50_000)] {
             let packet = encode(&Reading::unread(counter));
             watch.telemetry(at - 1, &packet[..155]);
@@ -197,9 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn derived_frames_are_asked_for_once_and_not_before_the_unit_listens() {
+    fn words_are_said_once_and_not_before_the_unit_listens() {
         let place = tempfile::tempdir().expect("temporary folder");
-        let mut watch = watch(place.path(), None, true);
+        let mut watch = watch(place.path(), None, b"G_DL");
         assert_eq!(watch.commands(MILLISECOND), b"");
         assert_eq!(watch.commands(ASK_AT), b"G_DL");
         assert_eq!(watch.commands(ASK_AT + MILLISECOND), b"");
@@ -209,7 +207,7 @@ mod tests {
     fn a_console_hears_the_umbilical_speaks_and_ends_the_flight_when_closed() {
         let place = tempfile::tempdir().expect("temporary folder");
         let (mut line, unit) = line::channel("flying");
-        let mut watch = watch(place.path(), Some(unit), false);
+        let mut watch = watch(place.path(), Some(unit), b"");
         watch.umbilical(7 * MILLISECOND, b">up\n");
         let heard = line::Line::hear(&mut line, Duration::ZERO);
         assert!(matches!(heard, line::Heard::Bytes { bytes, .. } if bytes == b">up\n"));
@@ -223,7 +221,7 @@ mod tests {
     #[test]
     fn a_folder_that_cannot_be_written_stops_the_flight_and_is_named() {
         let place = tempfile::tempdir().expect("temporary folder");
-        let mut watch = watch(place.path(), None, false);
+        let mut watch = watch(place.path(), None, b"");
         std::fs::write(watch.folder.path().join("packets.txt"), "not ours").expect("write");
         watch.telemetry(MILLISECOND, b"@");
         assert_eq!(watch.advanced(MILLISECOND), Flow::Stop);

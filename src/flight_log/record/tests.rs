@@ -142,6 +142,7 @@ fn a_change_of_mode_says_what_it_was_given() {
         (Mode::Flight, true, Cause::LiftOff),
         (Mode::Wait, false, Cause::Command),
         (Mode::Flight, false, Cause::Log),
+        (Mode::Wait, false, Cause::Rail),
     ] {
         let change = Change {
             at_us: 5_000_000_000,

@@ -1,0 +1,100 @@
+//! A launch rail told over the umbilical: taken, contradicted, kept, and only where it may be.
+
+use emems::{derived::Derived, estimate::Site, unit::Settings};
+use host_tests::{Flight, Flown, MS, S, world};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+use twin::{
+    motion::{Motion as _, SoundingRocket},
+    plant::Plant,
+    run::Fault,
+};
+
+/// Of the rocket's rail, azimuth 70 and elevation 85 deg, with sigmas of 0.5 and 0.3 deg.
+const RAIL: &[u8] = b"G_RA1B5821340503G_CK";
+/// Wrong by 30 deg of azimuth.
+const WRONG: &[u8] = b"G_RA271021340503G_CK";
+
+fn on_pad() -> Flight {
+    let flight = Flight {
+        plant: Plant::new(world("rocket"), 7),
+        ..Flight::ideal(world("rocket"))
+    };
+    // As at the launch site.
+    let settings = Settings {
+        site: Site::ALCANTARA,
+        ..flight.settings
+    };
+    Flight { settings, ..flight }.say(MS, b"G_DL")
+}
+
+/// \[deg\] error of the nose's direction and what the frame says of the whole attitude, in the last frame.
+fn last(flown: &Flown) -> [f64; 2] {
+    let frame: &Derived = flown.derived.last().expect("a frame");
+    let [w, x, y, z] = frame.estimate.q_nb.expect("an attitude").map(f64::from);
+    let q_nb = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+    let truth = SoundingRocket::new(30.0, 9.78).at(15.0).attitude.q_nb;
+    let [nn, ne, nd, ee, ed, dd] = frame.estimate.covariance_n.map(f64::from);
+    let covariance_n = Matrix3::new(nn, ne, nd, ne, ee, ed, nd, ed, dd);
+    let error_n = (truth * q_nb.inverse()).scaled_axis();
+    let off = error_n.norm().to_degrees();
+    [off, covariance_n.trace().sqrt().to_degrees()]
+}
+
+#[test]
+fn a_rail_is_taken_once_the_second_word_confirms_it() {
+    let flown = on_pad().say(5 * S, RAIL).fly(15 * S);
+    let said = "azimuth 70.00 elevation 85.00 sigma 0.5 0.3 deg";
+    assert!(
+        flown.replied(&format!("G_RA: {said}: send G_CK within 10 s")),
+        "{:?}",
+        flown.replies()
+    );
+    assert!(flown.replied(&format!("G_RA ok: {said}")), "{:?}", flown.replies());
+    assert!(flown.replied("rail taken"), "{:?}", flown.replies());
+    let [off, said] = last(&flown);
+    assert!(off < 3.0 * said, "{off} {said}");
+    let armed = on_pad().say(5 * S, b"G_RA1B5821340503").fly(15 * S);
+    assert!(
+        !armed.replied("rail taken") && !armed.replied("G_RA ok"),
+        "{:?}",
+        armed.replies()
+    );
+}
+
+#[test]
+fn a_rail_that_contradicts_the_attitude_is_said_to_and_not_used() {
+    let flown = on_pad().say(5 * S, WRONG).fly(15 * S);
+    // A chord of 30 deg about the vertical at 85 deg: 2.6 deg.
+    assert!(
+        flown.replied("rail CONTRADICTS the attitude by 3 deg, not used"),
+        "{:?}",
+        flown.replies()
+    );
+    assert!(!flown.replied("rail taken"));
+    let without = on_pad().fly(15 * S);
+    assert_eq!(last(&flown), last(&without));
+    let [off, said] = last(&flown);
+    assert!(off < 3.0 * said, "{off} {said}");
+}
+
+#[test]
+fn a_rail_lasts_over_a_reset_and_a_wrong_number_changes_nothing() {
+    let flown = on_pad().say(5 * S, RAIL).fault(10 * S, Fault::Reset).fly(15 * S);
+    let taken = flown
+        .replies()
+        .iter()
+        .filter(|line| line.contains("rail taken"))
+        .count();
+    assert_eq!(taken, 2, "{:?}", flown.replies());
+    for (word, why) in [
+        (b"G_RA8CA021340503G_CK", "azimuth is not below 360 deg"),
+        (b"G_RA1B5823290503G_CK", "elevation is above 90 deg"),
+        (b"G_RA1B5821340003G_CK", "a sigma is zero"),
+    ] {
+        let flown = on_pad().say(5 * S, word).fly(9 * S);
+        assert!(flown.replied(&format!("G_RA no: {why}")), "{:?}", flown.replies());
+        assert!(!flown.replied("rail taken"));
+    }
+    let flying = on_pad().say(4 * S, b"G_MVG_MV").say(6 * S, RAIL).fly(9 * S);
+    assert!(flying.replied("G_RA no: only in WAIT"), "{:?}", flying.replies());
+}
