@@ -116,6 +116,7 @@ mod tests {
             let line = match word {
                 "G_LR" => "G_LR00000A0000FF".to_string(),
                 "G_CW" => "G_CW0001DEADBEEF".to_string(),
+                "G_RA" => "G_RA1B5821340503".to_string(),
                 word => word.to_string(),
             };
             assert_eq!(typed(&line), Typed::Send(line.clone()), "{word}");
