@@ -29,7 +29,7 @@ use crate::{
         name::{By, Name},
         nulls,
         packet::Motion,
-        search::{self, First, residual_of},
+        search::{self, First, Offered, residual_of},
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
@@ -124,12 +124,16 @@ impl Findings {
             return Err(empty(flight, free));
         }
         let library = Library::new(&problem, withheld, &|share| progress("effects", share));
-        let space = Space::new(&problem, &motion, nulls::columns(&problem, &library));
+        let offered = Offered::of(&problem, &library);
+        let nulls = nulls::columns(&problem, &library);
+        let (space, opened) = Space::among(&problem, &motion, nulls, &offered.columns());
         let residual = projected(&space, &[]);
         progress("visible", 0.0);
-        let seen = search::look(&space, &library, &residual, &|share| progress("visible", share));
+        let seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
+            progress("visible", share);
+        });
         let mut visible = visible::table(&library.hypotheses, &seen);
-        let chosen = search::choose(&space, &library, &residual, &seen, &First::default(), &|share| {
+        let chosen = search::choose(&space, &library, &residual, &seen, First::default(), &|share| {
             progress("search", share);
         });
         let mut rivals = search::rivals(&library, &chosen);

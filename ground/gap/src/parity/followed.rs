@@ -4,6 +4,7 @@
 
 use std::cell::OnceCell;
 
+use nalgebra::DMatrix;
 use twin::{
     environment::Environment,
     predict::{Twin, UnitDescription},
@@ -17,6 +18,7 @@ use crate::{
         course::{Course, Start},
         flight::Flight,
         smooth::{self, Smoothed, smoothing::Smoothing},
+        space::Space,
     },
 };
 
@@ -29,6 +31,8 @@ pub struct Followed {
     /// About which parity is linear.
     pub course: Course,
     smoothed: OnceCell<Smoothed>,
+    motion: OnceCell<Smoothing>,
+    calibrated: OnceCell<DMatrix<f64>>,
     environment: Environment,
     start: Start,
 }
@@ -45,6 +49,8 @@ impl Followed {
             unit,
             course,
             smoothed: OnceCell::new(),
+            motion: OnceCell::new(),
+            calibrated: OnceCell::new(),
             environment,
             start,
         }
@@ -85,8 +91,22 @@ impl Followed {
         smooth::fit(&self.log)
     }
 
-    /// A smoothed motion of it, to be eliminated from a problem of [`Followed::twin`].
-    pub fn motion(&self, smoothed: &Smoothed, problem: &Problem) -> Smoothing {
-        smoothed.smoothing(problem, &self.course, &self.start)
+    /// Its smoothed motion, to be eliminated from a problem of [`Followed::twin`], made when first asked for.
+    pub fn motion(&self, smoothed: &Smoothed, problem: &Problem) -> &Smoothing {
+        self.motion
+            .get_or_init(|| smoothed.smoothing(problem, &self.course, &self.start))
+    }
+
+    /// Keeps [`Space::calibrated`] of a space about its smoothed motion.
+    pub fn remember(&self, calibrated: &DMatrix<f64>) {
+        self.calibrated.get_or_init(|| calibrated.clone());
+    }
+
+    /// A space about its smoothed motion, without nulls.
+    pub fn space<'a>(&self, problem: &'a Problem<'a>, motion: &'a Smoothing) -> Space<'a> {
+        match self.calibrated.get() {
+            Some(known) => Space::known(problem, motion, known.clone()),
+            None => Space::new(problem, motion, Vec::new()),
+        }
     }
 }

@@ -15,7 +15,7 @@
 //! `dw`, `df`, `dm`, `dT` are free; `dw'` and the jerk `j` have prior rows. `[A; P]` is factored by QR with column pivoting,
 //! and columns that nothing sees are left out of it, so that a packet with lost samples eliminates no more than it must.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use twin::predict::{Feel, Kind};
 
 use crate::{
@@ -94,28 +94,32 @@ impl Motion {
 
 impl Elimination for Motion {
     /// `Q'[u; 0]`, packet by packet.
-    fn part(&self, column: &Entries) -> DVector<f64> {
-        let mut part = DVector::zeros(UNKNOWNS * self.packets);
-        for (channel, values) in column {
-            let samples = self.packet[*channel]
-                .iter()
-                .zip(self.rows[*channel].chunks_exact(UNKNOWNS));
-            for ((packet, row), value) in samples.zip(values.iter()) {
-                let own = &mut part.as_mut_slice()[UNKNOWNS * packet..UNKNOWNS * (packet + 1)];
-                own.iter_mut().zip(row).for_each(|(sum, q)| *sum += q * value);
+    fn parts(&self, columns: &[&Entries]) -> DMatrix<f64> {
+        let mut parts = DMatrix::zeros(UNKNOWNS * self.packets, columns.len());
+        for (at, column) in columns.iter().enumerate() {
+            let mut part = parts.column_mut(at);
+            let (own, _) = part.as_mut_slice().as_chunks_mut::<UNKNOWNS>();
+            for (channel, values) in *column {
+                let rows = self.rows[*channel].as_chunks::<UNKNOWNS>().0;
+                for ((packet, row), value) in self.packet[*channel].iter().zip(rows).zip(values.iter()) {
+                    own[*packet].iter_mut().zip(row).for_each(|(sum, q)| *sum += q * value);
+                }
             }
         }
-        part
+        parts
     }
 
-    fn imitated(&self, part: &DVector<f64>) -> Vec<DVector<f64>> {
+    fn imitated(&self, parts: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let of_channel = |(packets, rows): (&Vec<usize>, &Vec<f64>)| {
-            let samples = packets.iter().zip(rows.chunks_exact(UNKNOWNS));
-            let values = samples.map(|(packet, row)| {
-                let own = &part.as_slice()[UNKNOWNS * packet..UNKNOWNS * (packet + 1)];
-                own.iter().zip(row).map(|(part, q)| part * q).sum()
-            });
-            DVector::from_iterator(packets.len(), values)
+            let rows = rows.as_chunks::<UNKNOWNS>().0;
+            let mut imitated = DMatrix::zeros(packets.len(), parts.ncols());
+            for (mut imitated, part) in imitated.column_iter_mut().zip(parts.column_iter()) {
+                let own = part.as_slice().as_chunks::<UNKNOWNS>().0;
+                for ((value, packet), row) in imitated.iter_mut().zip(packets).zip(rows) {
+                    *value = own[*packet].iter().zip(row).map(|(part, q)| part * q).sum();
+                }
+            }
+            imitated
         };
         self.packet.iter().zip(&self.rows).map(of_channel).collect()
     }

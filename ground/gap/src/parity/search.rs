@@ -6,7 +6,7 @@
 //! The evidence is that of [`crate::null::evidence`], with its sizes; an effect without parameters has `<d, r> - <d, d> / 2`, `d`
 //! being what it does to the readings.
 
-use std::iter::once;
+use std::{iter::once, ops::Range};
 
 use nalgebra::{DMatrix, DVector};
 use twin::effect::Nature;
@@ -21,7 +21,7 @@ use crate::{
         problem::{Component, Problem},
     },
     parity::{
-        space::{Projected, Space},
+        space::{Opened, Projected, Space, dot},
         visible::may_be_named,
     },
     search::odds::{itself, oversize},
@@ -86,111 +86,120 @@ pub fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
     problem.residuals(model).into_iter().enumerate().collect()
 }
 
-/// Every hypothesis, alone. `progress` is told how far it is.
-pub fn look(space: &Space, library: &Library, residual: &Projected, progress: &dyn Fn(f64)) -> Vec<Seen> {
-    let all: Vec<usize> = (0..library.hypotheses.len()).collect();
-    let mut seen = Vec::new();
-    each(space, library, &all, &mut |at, columns| {
-        let hypothesis = &library.hypotheses[at];
-        seen.push(seen_as(space, library, hypothesis, at, columns, residual));
-        progress((at + 1) as f64 / library.hypotheses.len() as f64);
-    });
-    seen
+/// The columns of a library, and which of them are each hypothesis': of one that is there or not, what it does on the whole.
+pub struct Offered {
+    columns: Vec<Entries>,
+    sets: Vec<Vec<usize>>,
 }
 
-fn seen_as(
+impl Offered {
+    /// Of a problem's library.
+    pub fn of(problem: &Problem, library: &Library) -> Self {
+        let own = 0..library.products.len();
+        let mut offered = Self {
+            columns: own.map(|place| library.products.column(place).clone()).collect(),
+            sets: Vec::new(),
+        };
+        for hypothesis in &library.hypotheses {
+            if hypothesis.small().is_empty() {
+                offered.sets.push(vec![offered.columns.len()]);
+                offered.columns.push(on_the_whole(problem, hypothesis));
+            } else {
+                offered.sets.push(hypothesis.small().to_vec());
+            }
+        }
+        offered
+    }
+
+    /// All columns.
+    pub fn columns(&self) -> Vec<&Entries> {
+        self.columns.iter().collect()
+    }
+}
+
+/// Every hypothesis, alone. `progress` is told how far it is.
+pub fn look(
     space: &Space,
     library: &Library,
-    hypothesis: &Hypothesis,
-    at: usize,
-    columns: &[&Projected],
+    (offered, opened): (&Offered, &Opened),
     residual: &Projected,
-) -> Seen {
-    let width = columns.len();
-    let mut information = DMatrix::zeros(width, width);
-    for row in 0..width {
-        (0..=row).for_each(|column| information[(row, column)] = space.inner(columns[row], columns[column]));
-    }
-    information.fill_upper_triangle_with_lower_triangle();
-    let sigma = |index: usize| {
-        hypothesis
-            .small()
-            .get(index)
-            .map_or(1.0, |place| library.prior_sigmas[*place])
-    };
-    let ratio = |own: &dyn Fn(usize) -> f64| {
-        (0..width)
-            .map(|index| sigma(index).powi(2) * own(index))
-            .sum::<f64>()
-            .max(0.0)
-            .sqrt()
-    };
-    let alone = |index: usize| match hypothesis.small().get(index) {
-        Some(place) => library.products.product(*place, *place),
-        None => columns[index]
-            .column
-            .iter()
-            .map(|(_, values)| values.norm_squared())
-            .sum(),
-    };
-    Seen {
-        hypothesis: at,
-        score: DVector::from_fn(width, |row, _| space.inner(columns[row], residual)),
-        with_reference: ratio(&alone),
-        snr: ratio(&|index| information[(index, index)]),
-        information,
-    }
+    progress: &dyn Fn(f64),
+) -> Vec<Seen> {
+    let rest = space.rest(residual);
+    let all = space.within(&offered.columns(), opened, &offered.sets, progress);
+    (all.into_iter().zip(&offered.sets).enumerate())
+        .map(|(at, (information, set))| {
+            let columns: Vec<&Entries> = set.iter().map(|place| &offered.columns[*place]).collect();
+            Seen::of(library, at, &columns, information, &rest)
+        })
+        .collect()
 }
 
-/// Gives every hypothesis its projected columns, an effect at a time: they are too many to be kept.
-fn each(space: &Space, library: &Library, wanted: &[usize], with: &mut dyn FnMut(usize, &[&Projected])) {
-    let mut wanted = wanted.iter().copied().peekable();
-    while let Some(first) = wanted.peek().copied() {
-        let effect = library.hypotheses[first].effect();
-        let mut own = Vec::new();
-        while let Some(next) = wanted.next_if(|at| library.hypotheses[*at].effect() == effect) {
-            own.push(next);
-        }
-        let mut places: Vec<usize> = own
-            .iter()
-            .flat_map(|at| library.hypotheses[*at].small().to_vec())
-            .collect();
-        places.sort_unstable();
-        places.dedup();
-        let projected = space.project(
-            places
-                .iter()
-                .map(|place| library.products.column(*place).clone())
-                .collect(),
-        );
-        for at in own {
-            let hypothesis = &library.hypotheses[at];
-            if hypothesis.small().is_empty() {
-                let whole = space.project(vec![on_the_whole(space, hypothesis)]);
-                with(at, &whole.iter().collect::<Vec<_>>());
-                continue;
-            }
-            let find = |place: &usize| places.binary_search(place).ok().map(|at| &projected[at]);
-            let columns: Vec<&Projected> = hypothesis.small().iter().filter_map(find).collect();
-            with(at, &columns);
+impl Seen {
+    /// Of a hypothesis with these columns, and of what motion and calibration leave of the residual.
+    fn of(library: &Library, at: usize, columns: &[&Entries], information: DMatrix<f64>, rest: &Entries) -> Self {
+        let hypothesis = &library.hypotheses[at];
+        let width = columns.len();
+        let sigma = |index: usize| {
+            hypothesis
+                .small()
+                .get(index)
+                .map_or(1.0, |place| library.prior_sigmas[*place])
+        };
+        let ratio = |own: &dyn Fn(usize) -> f64| {
+            (0..width)
+                .map(|index| sigma(index).powi(2) * own(index))
+                .sum::<f64>()
+                .max(0.0)
+                .sqrt()
+        };
+        let alone = |index: usize| match hypothesis.small().get(index) {
+            Some(place) => library.products.product(*place, *place),
+            None => dot(columns[index], columns[index]),
+        };
+        Self {
+            hypothesis: at,
+            score: DVector::from_fn(width, |row, _| dot(columns[row], rest)),
+            with_reference: ratio(&alone),
+            snr: ratio(&|index| information[(index, index)]),
+            information,
         }
     }
 }
 
 /// What an effect that is there or not does to the readings.
-fn on_the_whole(space: &Space, hypothesis: &Hypothesis) -> Entries {
+fn on_the_whole(problem: &Problem, hypothesis: &Hypothesis) -> Entries {
     let model = [Component {
         active: hypothesis.active(&DVector::zeros(hypothesis.parameters.len())),
         span: None,
     }];
-    space.problem.contribution(&model, 0)
+    problem.contribution(&model, 0)
 }
 
 /// Effects that are in the residual's model before anything is sought: their slopes there, free in every fit.
 #[derive(Default)]
 pub struct First {
     effects: Vec<&'static str>,
-    taken: Vec<(Vec<Projected>, Vec<f64>)>,
+    taken: Vec<Taken>,
+}
+
+/// An effect whose parameters are free in every fit.
+struct Taken {
+    columns: Vec<Entries>,
+    /// What motion and calibration leave of each.
+    rests: Vec<Entries>,
+    sigmas: Vec<f64>,
+}
+
+impl Taken {
+    fn of(space: &Space, columns: Vec<Entries>, sigmas: Vec<f64>) -> Self {
+        let rest = |column: &Entries| space.rest(&space.project(column.clone()));
+        Self {
+            rests: columns.iter().map(rest).collect(),
+            columns,
+            sigmas,
+        }
+    }
 }
 
 impl First {
@@ -200,10 +209,10 @@ impl First {
         let slopes = |(at, component): (usize, &Component)| {
             let cause = &component.active.cause;
             if cause.effect.page().nature == Nature::Discrete {
-                return (Vec::new(), Vec::new());
+                return Taken::of(space, Vec::new(), Vec::new());
             }
             let sigmas = cause.parameters(unit).iter().map(|own| own.prior_sigma).collect();
-            (space.project(space.problem.slopes(model, at)), sigmas)
+            Taken::of(space, space.problem.slopes(model, at), sigmas)
         };
         Self {
             effects: model.iter().map(|own| own.active.cause.effect.page().name).collect(),
@@ -218,43 +227,34 @@ pub fn choose(
     library: &Library,
     residual: &Projected,
     seen: &[Seen],
-    first: &First,
+    first: First,
     progress: &dyn Fn(f64),
 ) -> Vec<Chosen> {
-    let eligible: Vec<usize> = (seen.iter())
+    let eligible: Vec<&Seen> = (seen.iter())
         .filter(|one| may_be_named(&library.hypotheses[one.hypothesis], one.snr))
-        .map(|one| one.hypothesis)
         .collect();
+    let rest = space.rest(residual);
     let mut chosen: Vec<Chosen> = Vec::new();
-    let mut taken = first.taken.clone();
-    while first.effects.len() + chosen.len() < MOST_CAUSES {
+    let First { effects, mut taken } = first;
+    while effects.len() + chosen.len() < MOST_CAUSES {
         progress(chosen.len() as f64 / MOST_CAUSES as f64);
-        let mut fits: Vec<(usize, Fit)> = Vec::new();
-        if chosen.is_empty() && taken.is_empty() {
-            for one in seen.iter().filter(|one| eligible.contains(&one.hypothesis)) {
-                fits.extend(fit_alone(library, one).map(|fit| (one.hypothesis, fit)));
-            }
+        let fit = |one: &&Seen, fit: Option<Fit>| fit.map(|fit| (one.hypothesis, fit));
+        let fits: Vec<(usize, Fit)> = if chosen.is_empty() && taken.is_empty() {
+            let alone = |one: &&Seen| fit(one, fit_alone(library, one));
+            eligible.iter().filter_map(alone).collect()
         } else {
-            let is_other = |at: &usize| {
+            let is_other = |one: &&&Seen| {
                 let mut known = chosen.iter().map(|own| library.hypotheses[own.hypothesis].effect());
-                let effect = library.hypotheses[*at].effect();
-                known.all(|own| own != effect) && !first.effects.contains(&effect)
+                let effect = library.hypotheses[one.hypothesis].effect();
+                known.all(|own| own != effect) && !effects.contains(&effect) && !library.is_discrete(one.hypothesis)
             };
-            let others: Vec<usize> = eligible
-                .iter()
-                .copied()
-                .filter(is_other)
-                .filter(|at| !library.is_discrete(*at))
-                .collect();
-            each(space, library, &others, &mut |at, columns| {
-                let sigmas: Vec<f64> = library.hypotheses[at]
-                    .small()
-                    .iter()
-                    .map(|place| library.prior_sigmas[*place])
-                    .collect();
-                fits.extend(fit_beside(space, &taken, columns, sigmas, residual).map(|fit| (at, fit)));
-            });
-        }
+            let others: Vec<&Seen> = eligible.iter().filter(is_other).copied().collect();
+            let Some(beside) = Beside::of(&taken, &rest) else {
+                break;
+            };
+            let beside = |one: &&Seen| fit(one, beside.fit(library, one));
+            others.iter().filter_map(beside).collect()
+        };
         let Some(next) = likeliest(library, seen, &fits) else {
             break;
         };
@@ -263,18 +263,10 @@ pub fn choose(
             chosen.push(next);
             break;
         }
-        let hypothesis = &library.hypotheses[next.hypothesis];
-        let columns = hypothesis
-            .small()
-            .iter()
-            .map(|place| library.products.column(*place).clone())
-            .collect();
-        let sigmas = hypothesis
-            .small()
-            .iter()
-            .map(|place| library.prior_sigmas[*place])
-            .collect();
-        taken.push((space.project(columns), sigmas));
+        let places = library.hypotheses[next.hypothesis].small().iter();
+        let columns = places.clone().map(|place| library.products.column(*place).clone());
+        let sigmas = places.map(|place| library.prior_sigmas[*place]);
+        taken.push(Taken::of(space, columns.collect(), sigmas.collect()));
         chosen.push(next);
     }
     chosen
@@ -319,49 +311,75 @@ fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
     })
 }
 
-/// Beside effects that were taken, whose parameters are free in the same fit.
-fn fit_beside(
-    space: &Space,
-    taken: &[(Vec<Projected>, Vec<f64>)],
-    columns: &[&Projected],
-    sigmas: Vec<f64>,
-    residual: &Projected,
-) -> Option<Fit> {
-    let mut all: Vec<&Projected> = taken.iter().flat_map(|(columns, _)| columns).collect();
-    let mut all_sigmas: Vec<f64> = taken.iter().flat_map(|(_, sigmas)| sigmas.clone()).collect();
-    let mut parts = Vec::new();
-    let mut from = 0;
-    for (columns, _) in taken {
-        parts.push(from..from + columns.len());
-        from += columns.len();
-    }
-    let screen = |all: &[&Projected], sigmas: Vec<f64>| {
-        let mut screen = Screen::zeros(sigmas);
-        for (row, one) in all.iter().enumerate() {
-            screen.score[row] = space.inner(one, residual);
-            for (column, other) in all.iter().enumerate() {
-                screen.information[(row, column)] = space.inner(one, other);
+/// Effects that were taken, whose parameters are free in the fit of another.
+struct Beside<'a> {
+    columns: Vec<&'a Entries>,
+    rests: Vec<&'a Entries>,
+    parts: Vec<Range<usize>>,
+    screen: Screen,
+    /// \[nats\] of theirs alone.
+    log_evidence: f64,
+}
+
+impl<'a> Beside<'a> {
+    fn of(taken: &'a [Taken], rest: &Entries) -> Option<Self> {
+        let columns: Vec<&Entries> = taken.iter().flat_map(|one| &one.columns).collect();
+        let rests: Vec<&Entries> = taken.iter().flat_map(|one| &one.rests).collect();
+        let mut parts = Vec::new();
+        let mut from = 0;
+        for one in taken {
+            parts.push(from..from + one.columns.len());
+            from += one.columns.len();
+        }
+        let mut screen = Screen::zeros(taken.iter().flat_map(|one| one.sigmas.clone()).collect());
+        for (row, column) in columns.iter().enumerate() {
+            screen.score[row] = dot(column, rest);
+            for (other, rest) in rests.iter().enumerate() {
+                screen.information[(row, other)] = dot(column, rest);
             }
         }
-        screen
-    };
-    let before = screen(&all, all_sigmas.clone()).of_any_size(parts.clone())?;
-    all.extend(columns);
-    all_sigmas.extend(sigmas);
-    parts.push(from..all.len());
-    let mut both = screen(&all, all_sigmas);
-    let gain = both.of_any_size(parts.clone())? - before;
-    both.settle(parts);
-    let estimate = both.estimate(&(0..all.len()).collect::<Vec<_>>())?;
-    let width = all.len() - from;
-    let theta = estimate.parameters.rows(from, width).into_owned();
-    let own = both.information.view((from, from), (width, width));
-    Some(Fit {
-        gain,
-        energy: theta.dot(&(own * &theta)),
-        covariance: estimate.covariance.view((from, from), (width, width)).into_owned(),
-        theta,
-    })
+        Some(Self {
+            log_evidence: screen.of_any_size(parts.clone())?,
+            columns,
+            rests,
+            parts,
+            screen,
+        })
+    }
+
+    fn fit(&self, library: &Library, seen: &Seen) -> Option<Fit> {
+        let places = library.hypotheses[seen.hypothesis].small();
+        let (from, width) = (self.columns.len(), places.len());
+        let sigmas = places.iter().map(|place| library.prior_sigmas[*place]);
+        let mut both = Screen::zeros(self.screen.prior_sigmas.iter().copied().chain(sigmas).collect());
+        both.score.rows_mut(0, from).copy_from(&self.screen.score);
+        both.score.rows_mut(from, width).copy_from(&seen.score);
+        both.information
+            .view_mut((0, 0), (from, from))
+            .copy_from(&self.screen.information);
+        both.information
+            .view_mut((from, from), (width, width))
+            .copy_from(&seen.information);
+        for (row, place) in places.iter().enumerate() {
+            for (column, rest) in self.rests.iter().enumerate() {
+                let product = dot(library.products.column(*place), rest);
+                both.information[(from + row, column)] = product;
+                both.information[(column, from + row)] = product;
+            }
+        }
+        let mut parts = self.parts.clone();
+        parts.push(from..from + width);
+        let gain = both.of_any_size(parts.clone())? - self.log_evidence;
+        both.settle(parts);
+        let estimate = both.estimate(&(0..from + width).collect::<Vec<_>>())?;
+        let theta = estimate.parameters.rows(from, width).into_owned();
+        Some(Fit {
+            gain,
+            energy: theta.dot(&(&seen.information * &theta)),
+            covariance: estimate.covariance.view((from, from), (width, width)).into_owned(),
+            theta,
+        })
+    }
 }
 
 /// The likeliest, if it is likelier than nothing by the margin of a name.

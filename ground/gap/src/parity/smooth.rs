@@ -8,7 +8,7 @@
 //! | 1 | [`trajectory`] | where it begins: rates, turned slowly towards gravity and field |
 //! | 2 | [`rests`] | when the unit stands still |
 //! | 3 | [`rows`], [`basis`] | how a turn and an acceleration change each sample |
-//! | 4 | [`smoothing`], [`banded`] | the normal matrix of the motion, its factor, its covariance |
+//! | 4 | [`prior`], [`smoothing`], [`banded`] | the normal matrix of the motion, its factor, its covariance |
 //! | 5 | this one | Gauss and Newton's steps with the calibration beside, until no attitude turns any more |
 //!
 //! A step that does not make the energy of residuals and prior smaller is halved. Within [`LINEAR_RAD`] one factor serves several
@@ -22,6 +22,7 @@
 
 pub mod banded;
 pub mod basis;
+pub mod prior;
 pub mod rests;
 pub mod rows;
 pub mod smoothing;
@@ -193,7 +194,7 @@ impl Smoothed {
     /// What the log leaves along the trajectory, with the calibration as a problem has it.
     fn at(&self, problem: &Problem, log: &Log, course: (&Course, &Start)) -> Result<At, CaseError> {
         let twin = self.twin(log, problem.twin.unit(), problem.twin.environment())?;
-        let prior = smoothing::off(&log.start_s, &self.trajectory, course, &self.knots, &self.still());
+        let prior = prior::off(&log.start_s, &self.trajectory, course, &self.knots, &self.still());
         let mut cost: f64 = prior.iter().map(|off| off * off).sum();
         let mut residuals = Entries::new();
         let mut memory = Memory::default();
@@ -242,9 +243,9 @@ pub fn fit(log: &Log) -> Fit {
 /// Covariance of the attitude at instants \[s\]: of a turn in b \[rad2\], noise and calibration together.
 pub fn covariances(space: &Space, motion: &Smoothing, instants_s: &[f64]) -> Vec<Matrix3<f64>> {
     let parts = space.open_parts();
-    let mut moved = DMatrix::zeros(parts.len(), 3 * instants_s.len());
-    for (at, part) in parts.iter().enumerate() {
-        let turned = motion.correction(part);
+    let mut moved = DMatrix::zeros(parts.ncols(), 3 * instants_s.len());
+    for (at, part) in parts.column_iter().enumerate() {
+        let turned = motion.correction(&part.into_owned());
         for (instant, t_s) in instants_s.iter().enumerate() {
             let (first, weights) = motion.turn_rows(*t_s);
             for axis in 0..3 {

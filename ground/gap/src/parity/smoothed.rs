@@ -28,8 +28,8 @@ use crate::{
         followed::Followed,
         name::{By, Name},
         nulls::{self, NULLS},
-        search::{self, Chosen, First, residual_of},
-        space::{self, Projected, Space},
+        search::{self, Chosen, First, Offered, residual_of},
+        space::{self, Projected, Space, dot},
         visible::{self, Row},
     },
 };
@@ -86,15 +86,20 @@ impl Second {
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
         let library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
-        let space = Space::new(&problem, &motion, nulls::columns(&problem, &library));
+        let offered = Offered::of(&problem, &library);
+        let nulls = nulls::columns(&problem, &library);
+        let (space, opened) = Space::among(&problem, motion, nulls, &offered.columns());
+        followed.remember(space.calibrated());
         let prior = motion.prior();
         let project = |model: &[Component]| space.project_residual(residual_of(&problem, model), &prior);
         let mut model: Vec<Component> = named.iter().map(|(component, _)| component.clone()).collect();
         let residual = project(&model);
         let first = First::of(&space, &model);
         let part = |from: f64, share: f64| progress("smoothed", from + (1.0 - from) * share);
-        let seen = search::look(&space, &library, &residual, &|share| part(0.4, 0.7 * share));
-        let chosen = search::choose(&space, &library, &residual, &seen, &first, &|share| {
+        let seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
+            part(0.4, 0.7 * share)
+        });
+        let chosen = search::choose(&space, &library, &residual, &seen, first, &|share| {
             part(0.8, share);
         });
         let said: Vec<&Chosen> = search::said(&chosen);
@@ -123,21 +128,22 @@ impl Second {
 /// [`crate::holdout::strength`], the motion marginalised.
 pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Option<Promise>> {
     let model: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
-    let rest = space.project_residual(residual_of(space.problem, &model), prior);
+    let rest = space.rest(&space.project_residual(residual_of(space.problem, &model), prior));
     let strength = |(at, (component, covariance)): (usize, &Fitted)| {
-        let added = space.project(vec![space.problem.contribution(&model, at)]).remove(0);
-        let energy = space.inner(&added, &added);
+        let added = space.problem.contribution(&model, at);
+        let own_rest = space.rest(&space.project(added.clone()));
+        let energy = dot(&added, &own_rest);
         let is_sized = component.active.cause.effect.page().nature != Nature::Discrete;
         let fitted = if is_sized {
-            let slopes = space.project(space.problem.slopes(&model, at));
-            let along = slopes.iter().map(|slope| space.inner(slope, &added));
+            let slopes = space.problem.slopes(&model, at);
+            let along = slopes.iter().map(|slope| dot(slope, &own_rest));
             let along = DVector::from_iterator(slopes.len(), along);
             along.dot(&(covariance * &along)).max(0.0)
         } else {
             0.0
         };
         (energy > 0.0).then(|| Promise {
-            factor: 1.0 + space.inner(&added, &rest) / energy,
+            factor: 1.0 + dot(&added, &rest) / energy,
             sigma: (energy + fitted).sqrt() / energy,
         })
     };
@@ -160,6 +166,6 @@ pub fn promises(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> R
     let others = LIBRARY.iter().map(|effect| effect.page().name);
     let others: Vec<String> = others.filter(|name| !is_null(name)).map(str::to_owned).collect();
     let nulls = nulls::columns(&problem, &Library::new(&problem, &others, &|_| ()));
-    let space = Space::new(&problem, &motion, nulls);
+    let space = Space::new(&problem, motion, nulls);
     Ok(strengths(&space, &motion.prior(), causes))
 }

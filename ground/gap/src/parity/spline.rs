@@ -60,7 +60,7 @@ impl<const N: usize> Spline<N> {
                 add(N * (knot - 1) + axis, &row, 0.0);
             }
         }
-        normal.factor().solve(&mut solution);
+        normal.factor().solve(solution.as_chunks_mut::<1>().0);
         for (knot, coefficient) in spline.coefficients.iter_mut().enumerate() {
             *coefficient = SVector::from_fn(|axis, _| solution[N * knot + axis]);
         }

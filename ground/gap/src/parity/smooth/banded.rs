@@ -2,10 +2,17 @@
 //!
 //! In: rows of a design, added one by one. Out: [`Factor`] `L` of `N = L L'` (Golub and Van Loan, Matrix Computations, 4.3.5), which solves
 //! either triangle, and the entries of `N^-1` within the band (Takahashi, Fagan and Chen 1973). Time and memory are linear in
-//! the size.
+//! the size. Right-hand sides are solved [`LANES`] at a time, side by side in a [`Panel`]: then a row of the factor is read once for
+//! all of them, and no sum waits for the one before.
 
 /// Share of the largest diagonal that is added to all: a direction that no row sees stays at nothing.
 const RIDGE: f64 = 1e-12;
+
+/// Right-hand sides that are solved together: their sums fill the vector registers of every processor with 128 bits.
+pub const LANES: usize = 8;
+
+/// Right-hand sides side by side, row by row.
+pub type Panel<const N: usize = LANES> = [[f64; N]];
 
 /// A matrix that is filled.
 #[derive(Clone, Debug)]
@@ -71,8 +78,16 @@ impl Banded {
     }
 }
 
+/// In four sums, of which none waits for the one before.
 fn dot(one: &[f64], other: &[f64]) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
+    let (ones, rest) = one.as_chunks::<4>();
+    let (others, other_rest) = other.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (one, other) in ones.iter().zip(others) {
+        (0..4).for_each(|at| sums[at] += one[at] * other[at]);
+    }
+    let last: f64 = rest.iter().zip(other_rest).map(|(one, other)| one * other).sum();
+    sums.iter().sum::<f64>() + last
 }
 
 impl Factor {
@@ -82,32 +97,45 @@ impl Factor {
     }
 
     /// The row's entries left of the diagonal, and the diagonal.
+    #[inline]
     fn row(&self, row: usize) -> (&[f64], f64) {
         let end = (row + 1) * self.width - 1;
         (&self.rows[end - row.min(self.width - 1)..end], self.rows[end])
     }
 
     /// `L^-1 right`, in place.
-    pub fn forward(&self, right: &mut [f64]) {
+    pub fn forward<const N: usize>(&self, right: &mut Panel<N>) {
         for row in 0..self.size() {
             let (left, diagonal) = self.row(row);
-            right[row] = (right[row] - dot(left, &right[row - left.len()..row])) / diagonal;
+            let (before, own) = right.split_at_mut(row);
+            let mut rest = own[0];
+            for (factor, known) in left.iter().zip(&before[row - left.len()..]) {
+                rest.iter_mut()
+                    .zip(known)
+                    .for_each(|(rest, known)| *rest -= factor * known);
+            }
+            own[0] = rest.map(|rest| rest / diagonal);
         }
     }
 
     /// `L^-T right`, in place.
-    pub fn backward(&self, right: &mut [f64]) {
+    pub fn backward<const N: usize>(&self, right: &mut Panel<N>) {
         for row in (0..self.size()).rev() {
             let (left, diagonal) = self.row(row);
-            right[row] /= diagonal;
-            let value = right[row];
-            let above = &mut right[row - left.len()..row];
-            above.iter_mut().zip(left).for_each(|(sum, own)| *sum -= own * value);
+            let (before, own) = right.split_at_mut(row);
+            let value = own[0].map(|rest| rest / diagonal);
+            own[0] = value;
+            for (factor, above) in left.iter().zip(&mut before[row - left.len()..]) {
+                above
+                    .iter_mut()
+                    .zip(&value)
+                    .for_each(|(above, value)| *above -= factor * value);
+            }
         }
     }
 
     /// `N^-1 right`, in place.
-    pub fn solve(&self, right: &mut [f64]) {
+    pub fn solve<const N: usize>(&self, right: &mut Panel<N>) {
         self.forward(right);
         self.backward(right);
     }
@@ -195,9 +223,22 @@ mod tests {
         let (dense, banded) = matrices();
         let right = DVector::from_fn(9, |row, _| (row as f64).cos());
         let mut solved: Vec<f64> = right.iter().copied().collect();
-        banded.factor().solve(&mut solved);
+        banded.factor().solve(solved.as_chunks_mut::<1>().0);
         let truth = dense.cholesky().expect("positive").solve(&right);
         assert!((DVector::from_vec(solved) - truth).norm() < 1e-8);
+    }
+
+    #[test]
+    fn right_hand_sides_that_are_solved_together_are_as_they_are_alone() {
+        let factor = matrices().1.factor();
+        let right = |row: usize, lane: usize| (row as f64 + 0.3 * lane as f64).cos();
+        let mut together: Vec<[f64; LANES]> = (0..9).map(|row| std::array::from_fn(|lane| right(row, lane))).collect();
+        factor.solve(&mut together);
+        for lane in 0..LANES {
+            let mut alone: Vec<[f64; 1]> = (0..9).map(|row| [right(row, lane)]).collect();
+            factor.solve(&mut alone);
+            assert!((0..9).all(|row| together[row][lane] == alone[row][0]), "{lane}");
+        }
     }
 
     #[test]

@@ -19,11 +19,17 @@ use twin::predict::{Channel, Feel, Kind, UnitDescription};
 
 use crate::{
     null::problem::Problem,
-    parity::smooth::basis::{Knots, SUPPORT},
+    parity::smooth::{
+        banded::Panel,
+        basis::{Knots, SUPPORT},
+    },
 };
 
 /// Unknowns a knot: a turn, a force.
 pub const UNKNOWNS: usize = 6;
+
+/// Of these, the turn's, which stand first: all that gyros and magnetometers see.
+const TURN: usize = 3;
 
 /// Points and weights of the mean over an exponential past (Abramowitz and Stegun, table 25.9).
 const LAGUERRE: [(f64, f64); 3] = [
@@ -37,13 +43,22 @@ const LAGUERRE: [(f64, f64); 3] = [
 pub struct Rows {
     /// The first knot of each.
     pub first: Vec<usize>,
-    /// Derivatives of each by the unknowns from there on, as many a sample as [`width`] says.
+    /// Knots that each depends on.
+    pub knots: usize,
+    /// Unknowns of a knot that count: its turn, or all.
+    pub unknowns: usize,
+    /// Derivatives of each by these unknowns, knot by knot.
     pub slopes: Vec<f64>,
 }
 
 /// Unknowns that a sample may depend on.
 pub fn width(problem: &Problem, knots: &Knots) -> usize {
-    UNKNOWNS * (SUPPORT + (past_s(problem.twin.unit()) / knots.step_s).ceil() as usize)
+    UNKNOWNS * reached(past_s(problem.twin.unit()), knots)
+}
+
+/// Knots that a sample depends on that looks so far back \[s\].
+fn reached(past_s: f64, knots: &Knots) -> usize {
+    SUPPORT + (past_s / knots.step_s).ceil() as usize
 }
 
 /// \[s\] that the slowest low-pass of a unit looks back.
@@ -55,10 +70,18 @@ pub fn past_s(unit: &UnitDescription) -> f64 {
 
 impl Rows {
     /// Of a channel.
-    pub fn of(problem: &Problem, channel: usize, knots: &Knots, feel: &dyn Fn(f64) -> Feel, width: usize) -> Self {
+    pub fn along(problem: &Problem, channel: usize, knots: &Knots, feel: &dyn Fn(f64) -> Feel) -> Self {
         let own = &problem.twin.unit().channels[channel];
         let frame = &problem.frames[channel];
-        let mut rows = Self::default();
+        let mut rows = Self {
+            knots: reached(LAGUERRE[2].0 * own.tau_s(), knots),
+            unknowns: if own.sensor == Kind::Accelerometer {
+                UNKNOWNS
+            } else {
+                TURN
+            },
+            ..Self::default()
+        };
         if own.sensor == Kind::Thermometer {
             return rows;
         }
@@ -68,19 +91,18 @@ impl Rows {
             let t_s = problem.twin.starts_s()[*row as usize] + own.slot_s;
             let earliest_s = t_s - tau_s * points[points.len() - 1].0;
             let first = knots.weights(earliest_s, 0).0;
-            let mut slopes = vec![0.0; width];
+            let mut slopes = vec![0.0; rows.width()];
             for (past, share) in points {
                 let at_s = t_s - tau_s * past;
                 let by = changes(own, &feel(at_s));
                 for (order, [turn, force]) in by.iter().enumerate() {
                     let (knot, weights) = knots.weights(at_s, order);
                     for (at, weight) in weights.iter().enumerate() {
-                        let from = UNKNOWNS * (knot + at - first);
+                        let from = rows.unknowns * (knot + at - first);
                         let scale = share * weight / frame.weights[sample];
-                        for axis in 0..3 {
-                            slopes[from + axis] += scale * turn[axis];
-                            slopes[from + 3 + axis] += scale * force[axis];
-                        }
+                        let own = &mut slopes[from..from + rows.unknowns];
+                        let by = turn.iter().chain(force);
+                        own.iter_mut().zip(by).for_each(|(own, by)| *own += scale * by);
                     }
                 }
             }
@@ -88,6 +110,34 @@ impl Rows {
             rows.slopes.extend(slopes);
         }
         rows
+    }
+
+    /// Derivatives a sample.
+    pub fn width(&self) -> usize {
+        self.knots * self.unknowns
+    }
+
+    /// Those of a sample by all unknowns of its knots, in the room that is given.
+    pub fn whole<'a>(&self, sample: usize, room: &'a mut [f64]) -> &'a [f64] {
+        let whole = &mut room[..UNKNOWNS * self.knots];
+        whole.fill(0.0);
+        let own = self.slopes[self.width() * sample..].chunks_exact(self.unknowns);
+        for (whole, own) in whole.chunks_exact_mut(UNKNOWNS).zip(own) {
+            whole[..self.unknowns].copy_from_slice(own);
+        }
+        whole
+    }
+
+    /// What a sample changes by with unknowns of these sizes, of which the first is that of its first knot.
+    pub fn of<const N: usize>(&self, sample: usize, sizes: &Panel<N>) -> [f64; N] {
+        let mut sums = [0.0; N];
+        let own = &self.slopes[self.width() * sample..self.width() * (sample + 1)];
+        for (own, sizes) in own.chunks_exact(self.unknowns).zip(sizes.chunks_exact(UNKNOWNS)) {
+            for (slope, size) in own.iter().zip(sizes) {
+                sums.iter_mut().zip(size).for_each(|(sum, size)| *sum += slope * size);
+            }
+        }
+        sums
     }
 }
 

@@ -16,7 +16,6 @@ use crate::{
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
-        space::Space,
     },
 };
 
@@ -68,9 +67,9 @@ impl Told {
         let (twin, fit, reference) = (followed.twin(smoothed)?, followed.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
-        let space = Space::new(&problem, &motion, Vec::new());
+        let space = followed.space(&problem, motion);
         let log = &followed.log;
-        let covariances = covariances(&space, &motion, &log.start_s);
+        let covariances = covariances(&space, motion, &log.start_s);
         told.attitudes = (log.start_s.iter().zip(&covariances))
             .map(|(t_s, covariance)| Attitude {
                 t_s: *t_s,
