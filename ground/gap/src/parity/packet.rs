@@ -109,19 +109,16 @@ impl Elimination for Motion {
         parts
     }
 
-    fn imitated(&self, parts: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
-        let of_channel = |(packets, rows): (&Vec<usize>, &Vec<f64>)| {
+    fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
+        for ((packets, rows), from) in self.packet.iter().zip(&self.rows).zip(from) {
             let rows = rows.as_chunks::<UNKNOWNS>().0;
-            let mut imitated = DMatrix::zeros(packets.len(), parts.ncols());
-            for (mut imitated, part) in imitated.column_iter_mut().zip(parts.column_iter()) {
+            for (mut from, part) in from.column_iter_mut().zip(parts.column_iter()) {
                 let own = part.as_slice().as_chunks::<UNKNOWNS>().0;
-                for ((value, packet), row) in imitated.iter_mut().zip(packets).zip(rows) {
-                    *value = own[*packet].iter().zip(row).map(|(part, q)| part * q).sum();
+                for ((value, packet), row) in from.iter_mut().zip(packets).zip(rows) {
+                    *value -= own[*packet].iter().zip(row).map(|(part, q)| part * q).sum::<f64>();
                 }
             }
-            imitated
-        };
-        self.packet.iter().zip(&self.rows).map(of_channel).collect()
+        }
     }
 
     fn free(&self, channel: usize) -> f64 {

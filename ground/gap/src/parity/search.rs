@@ -9,7 +9,7 @@
 use std::{iter::once, ops::Range};
 
 use nalgebra::{DMatrix, DVector};
-use twin::effect::Nature;
+use twin::{effect::Nature, predict::Memory};
 
 use crate::{
     library::{
@@ -100,10 +100,11 @@ impl Offered {
             columns: own.map(|place| library.products.column(place).clone()).collect(),
             sets: Vec::new(),
         };
+        let mut memory = Memory::default();
         for hypothesis in &library.hypotheses {
             if hypothesis.small().is_empty() {
                 offered.sets.push(vec![offered.columns.len()]);
-                offered.columns.push(on_the_whole(problem, hypothesis));
+                offered.columns.push(on_the_whole(problem, hypothesis, &mut memory));
             } else {
                 offered.sets.push(hypothesis.small().to_vec());
             }
@@ -167,13 +168,20 @@ impl Seen {
     }
 }
 
-/// What an effect that is there or not does to the readings.
-fn on_the_whole(problem: &Problem, hypothesis: &Hypothesis) -> Entries {
-    let model = [Component {
-        active: hypothesis.active(&DVector::zeros(hypothesis.parameters.len())),
-        span: None,
-    }];
-    problem.contribution(&model, 0)
+/// What an effect that is there or not does to the readings, in units of noise.
+fn on_the_whole(problem: &Problem, hypothesis: &Hypothesis, memory: &mut Memory) -> Entries {
+    let twin = problem.twin;
+    let model = [hypothesis.active(&DVector::zeros(hypothesis.parameters.len()))];
+    let mut on = |channel: usize| {
+        let frame = &problem.frames[channel];
+        let without = twin.channel_with(channel, &[], memory).into_owned();
+        let with = twin.channel_with(channel, &model, memory);
+        let rows = frame.series.rows.iter().zip(frame.weights.iter());
+        let values = rows.map(|(row, weight)| (with[*row as usize] - without[*row as usize]) / weight);
+        (channel, DVector::from_iterator(frame.weights.len(), values))
+    };
+    let touched = hypothesis.cause.channels(twin.unit());
+    touched.into_iter().map(&mut on).collect()
 }
 
 /// Effects that are in the residual's model before anything is sought: their slopes there, free in every fit.

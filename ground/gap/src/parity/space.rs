@@ -25,8 +25,8 @@ pub trait Elimination {
     /// `Q'u` of columns, `Q` being orthonormal: what the motion can imitate of each, a column each.
     fn parts(&self, columns: &[&Entries]) -> DMatrix<f64>;
 
-    /// What [`Elimination::parts`] are in the samples of each channel, `Q` times them.
-    fn imitated(&self, parts: &DMatrix<f64>) -> Vec<DMatrix<f64>>;
+    /// Takes what such parts are in the samples of each channel, `Q` times them, from samples, a column each.
+    fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]);
 
     /// Degrees of freedom that the motion leaves a channel.
     fn free(&self, channel: usize) -> f64;
@@ -119,20 +119,26 @@ impl<'a> Space<'a> {
         self.motion.parts(&[column]).column(0).into_owned()
     }
 
-    /// `Q` times a part, in the samples of each channel.
-    fn imitated(&self, part: &DVector<f64>) -> Vec<DVector<f64>> {
-        let imitated = self.motion.imitated(&DMatrix::from_columns(std::slice::from_ref(part)));
-        imitated.iter().map(|values| values.column(0).into_owned()).collect()
+    /// Columns without what the motion imitates of them, of which these are the parts: in all samples of each channel, a column each.
+    fn apart(&self, columns: &[&Entries], parts: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        let frames = self.problem.frames.iter();
+        let mut apart: Vec<DMatrix<f64>> = frames
+            .map(|frame| DMatrix::zeros(frame.weights.len(), columns.len()))
+            .collect();
+        for (at, column) in columns.iter().enumerate() {
+            for (channel, values) in *column {
+                apart[*channel].set_column(at, values);
+            }
+        }
+        self.motion.take(parts, &mut apart);
+        apart
     }
 
-    /// A column without what the motion imitates of it.
-    fn apart(&self, column: &Entries, part: &DVector<f64>) -> Entries {
-        let mut apart = self.imitated(part);
-        apart.iter_mut().for_each(|values| values.neg_mut());
-        for (channel, values) in column {
-            apart[*channel] += values;
-        }
-        apart.into_iter().enumerate().collect()
+    /// The same of one.
+    fn one_apart(&self, column: &Entries, part: &DVector<f64>) -> Entries {
+        let apart = self.apart(&[column], &DMatrix::from_columns(std::slice::from_ref(part)));
+        let values = apart.iter().map(|values| values.column(0).into_owned());
+        values.enumerate().collect()
     }
 
     /// `C'u`.
@@ -159,7 +165,7 @@ impl<'a> Space<'a> {
         motion.rows_mut(0, prior.len()).add_assign(prior);
         let open = match &self.factor {
             Some(factor) => {
-                let mut open = self.plain(&self.apart(&residual, &motion));
+                let mut open = self.plain(&self.one_apart(&residual, &motion));
                 factor.l_dirty().solve_lower_triangular_mut(&mut open);
                 open
             }
@@ -175,7 +181,7 @@ impl<'a> Space<'a> {
     /// What motion and calibration leave of a column or a residual: `<u, v> = u'rest(v)` for every column `u`.
     pub fn rest(&self, projected: &Projected) -> Entries {
         let left = self.left(projected).0;
-        self.apart(&left, &projected.with_prior(self.part(&left)))
+        self.one_apart(&left, &projected.with_prior(self.part(&left)))
     }
 
     /// By how many of its own sigmas each parameter of the calibration is off, channel by channel, as this residual has it.
@@ -244,13 +250,11 @@ impl<'a> Space<'a> {
     pub fn kept(&self, residual: &Projected) -> Vec<(f64, f64)> {
         let (left, price) = self.left(residual);
         let part = residual.with_prior(self.part(&left));
-        let mut kept = vec![(0.0, 0.0); self.problem.frames.len()];
-        let imitated = self.imitated(&part);
-        for (channel, values) in &left {
-            let energy = values.dot(values) - values.dot(&imitated[*channel]) + price[*channel];
-            kept[*channel] = (energy, self.motion.free(*channel));
-        }
-        kept
+        let apart = self.one_apart(&left, &part);
+        let energies = left.iter().zip(&apart).zip(price);
+        energies
+            .map(|(((channel, values), (_, apart)), price)| (values.dot(apart) + price, self.motion.free(*channel)))
+            .collect()
     }
 }
 

@@ -8,8 +8,9 @@
 /// Share of the largest diagonal that is added to all: a direction that no row sees stays at nothing.
 const RIDGE: f64 = 1e-12;
 
-/// Right-hand sides that are solved together: their sums fill the vector registers of every processor with 128 bits.
-pub const LANES: usize = 8;
+/// Right-hand sides that are solved together: their sums fill half of the vector registers of a processor that has no longer ones than
+/// 128 bits.
+pub const LANES: usize = 16;
 
 /// Right-hand sides side by side, row by row.
 pub type Panel<const N: usize = LANES> = [[f64; N]];
@@ -96,17 +97,16 @@ impl Factor {
         self.rows.len() / self.width
     }
 
-    /// The row's entries left of the diagonal, and the diagonal.
-    #[inline]
-    fn row(&self, row: usize) -> (&[f64], f64) {
-        let end = (row + 1) * self.width - 1;
-        (&self.rows[end - row.min(self.width - 1)..end], self.rows[end])
+    /// Of each row the entries left of the diagonal, and the diagonal.
+    fn rows(&self) -> impl DoubleEndedIterator<Item = (usize, &[f64], f64)> + ExactSizeIterator {
+        let last = self.width - 1;
+        let rows = self.rows.chunks_exact(self.width).enumerate();
+        rows.map(move |(row, own)| (row, &own[last - row.min(last)..last], own[last]))
     }
 
     /// `L^-1 right`, in place.
     pub fn forward<const N: usize>(&self, right: &mut Panel<N>) {
-        for row in 0..self.size() {
-            let (left, diagonal) = self.row(row);
+        for (row, left, diagonal) in self.rows() {
             let (before, own) = right.split_at_mut(row);
             let mut rest = own[0];
             for (factor, known) in left.iter().zip(&before[row - left.len()..]) {
@@ -120,8 +120,7 @@ impl Factor {
 
     /// `L^-T right`, in place.
     pub fn backward<const N: usize>(&self, right: &mut Panel<N>) {
-        for row in (0..self.size()).rev() {
-            let (left, diagonal) = self.row(row);
+        for (row, left, diagonal) in self.rows().rev() {
             let (before, own) = right.split_at_mut(row);
             let value = own[0].map(|rest| rest / diagonal);
             own[0] = value;
@@ -150,7 +149,7 @@ impl Factor {
         // Z = N^-1 fulfils L'Z = L^-1, whose upper triangle is nothing but 1 / l_jj on the diagonal.
         let mut column = vec![0.0; width];
         for j in (0..size).rev() {
-            let diagonal = self.row(j).1;
+            let diagonal = self.rows[(j + 1) * width - 1];
             let last = (j + width).min(size);
             // Below the diagonal of column j of L.
             for k in j + 1..last {

@@ -174,12 +174,8 @@ impl Elimination for Smoothing {
         parts
     }
 
-    fn imitated(&self, parts: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+    fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
         let size = self.factor.size();
-        let samples = |(own, warm): (&Rows, &Vec<(usize, f64)>)| own.first.len().max(warm.len());
-        let mut imitated: Vec<DMatrix<f64>> = (self.rows.iter().zip(&self.warm))
-            .map(|own| DMatrix::zeros(samples(own), parts.ncols()))
-            .collect();
         let mut panel = vec![[0.0; LANES]; size];
         for block in 0..parts.ncols().div_ceil(LANES) {
             let lanes = LANES * block..parts.ncols().min(LANES * (block + 1));
@@ -191,22 +187,16 @@ impl Elimination for Smoothing {
                     .for_each(|(row, own)| row[lane] = *own);
             }
             self.factor.backward(&mut panel);
-            for ((own, warm), imitated) in self.rows.iter().zip(&self.warm).zip(&mut imitated) {
+            for ((own, warm), from) in self.rows.iter().zip(&self.warm).zip(&mut *from) {
                 for (sample, (row, share)) in warm.iter().enumerate() {
-                    lanes
-                        .clone()
-                        .for_each(|at| imitated[(sample, at)] = share * parts[(size + row, at)]);
+                    (lanes.clone()).for_each(|at| from[(sample, at)] -= share * parts[(size + row, at)]);
                 }
                 for (sample, first) in own.first.iter().enumerate() {
                     let values = own.of(sample, &panel[UNKNOWNS * first..]);
-                    lanes
-                        .clone()
-                        .zip(values)
-                        .for_each(|(at, value)| imitated[(sample, at)] = value);
+                    (lanes.clone().zip(values)).for_each(|(at, value)| from[(sample, at)] -= value);
                 }
             }
         }
-        imitated
     }
 
     fn free(&self, channel: usize) -> f64 {

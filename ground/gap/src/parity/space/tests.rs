@@ -12,14 +12,23 @@ use crate::{
     input::{log::Series, reference::Reference, windows::Fit},
     library::hypotheses::Library,
     parity::{
-        course::Course,
+        course::{Course, Start},
         nulls,
         packet::{Motion, slopes_of},
+        smooth::{banded::LANES, basis::Knots, smoothing::Smoothing, trajectory::Trajectory},
     },
 };
 
 /// A unit that turns about all axes, in so many packets, without noise; what is asked of its space and its library.
 fn tumbling<T>(packets: usize, ask: impl FnOnce(&Space, &Library, &Course) -> T) -> T {
+    posed(packets, |problem, library, course| {
+        let motion = Motion::of(problem, course);
+        ask(&Space::new(problem, &motion, Vec::new()), library, course)
+    })
+}
+
+/// The same, asked of the problem alone.
+fn posed<T>(packets: usize, ask: impl FnOnce(&Problem, &Library, &Course) -> T) -> T {
     let environment = Environment::laboratory();
     let scene = Scene::new(&Tumble::new(), &environment, 14.0, 80.0, 0.01);
     let starts_s: Vec<f64> = (0..packets).map(|row| 15.0 + 0.2 * row as f64).collect();
@@ -38,7 +47,6 @@ fn tumbling<T>(packets: usize, ask: impl FnOnce(&Space, &Library, &Course) -> T)
     };
     let reference = Reference::default();
     let problem = Problem::new(&twin, &fit, &reference);
-    let motion = Motion::of(&problem, &course);
     let only = [
         "hard-iron",
         "accel-scale",
@@ -54,7 +62,7 @@ fn tumbling<T>(packets: usize, ask: impl FnOnce(&Space, &Library, &Course) -> T)
         .map(str::to_owned)
         .collect();
     let library = Library::new(&problem, &withheld, &|_| ());
-    ask(&Space::new(&problem, &motion, Vec::new()), &library, &course)
+    ask(&problem, &library, &course)
 }
 
 /// `<u, u>`.
@@ -137,6 +145,59 @@ fn an_inner_product_is_that_of_the_dense_marginal_covariance() {
             if one > 0 && other > 0 {
                 let found = within[1][(2 - one, 2 - other)];
                 assert!(is_it(found), "{one} {other} in another set: {found} {expected}");
+            }
+        }
+    });
+}
+
+/// Both ways to eliminate a motion, and columns that touch one channel, a plate and all.
+fn eliminated(check: impl Fn(&str, &Problem, &dyn Elimination, &[&Entries])) {
+    posed(30, |problem, library, course| {
+        let columns: Vec<&Entries> = (0..library.products.len())
+            .map(|place| library.products.column(place))
+            .collect();
+        // More than are solved together, and no multiple.
+        assert!(columns.len() > LANES && !columns.len().is_multiple_of(LANES));
+        check("packet by packet", problem, &Motion::of(problem, course), &columns);
+        let span_s = (14.5, 21.5);
+        let (knots, start) = (Knots::over(span_s, 0.1), Start::at_will(span_s, 0.2, 30));
+        let trajectory = Trajectory::of(&start, &knots, &course.scene, problem.twin.environment());
+        let smoothing = Smoothing::of(problem, &trajectory, (course, &start), knots, &[]);
+        check("smoothed", problem, &smoothing, &columns);
+    });
+}
+
+#[test]
+fn parts_of_many_columns_are_those_of_each_alone() {
+    eliminated(|which, _, motion, columns| {
+        let together = motion.parts(columns);
+        for (at, column) in columns.iter().enumerate() {
+            let alone = motion.parts(&[column]);
+            let off = (together.column(at) - alone.column(0)).amax();
+            assert!(off < 1e-9 * alone.amax().max(1.0), "{which} {at}: {off}");
+        }
+    });
+}
+
+#[test]
+fn what_is_taken_from_a_column_is_what_its_part_says() {
+    eliminated(|which, problem, motion, columns| {
+        let space = Space::known(problem, motion, DMatrix::zeros(0, 0));
+        let parts = motion.parts(columns);
+        let apart = space.apart(columns, &parts);
+        for (one, u) in columns.iter().enumerate() {
+            for other in 0..columns.len() {
+                // u'(v - Q Q'v) = u'v - (Q'u)'(Q'v)
+                let own = u
+                    .iter()
+                    .map(|(channel, values)| values.dot(&apart[*channel].column(other)));
+                let taken: f64 = dot(u, columns[other]) - own.sum::<f64>();
+                let said = parts.column(one).dot(&parts.column(other));
+                let scale = parts.column(one).norm() * parts.column(other).norm();
+                assert!(
+                    (taken - said).abs() < 1e-9 * scale.max(1.0),
+                    "{which} {one} {other}: {taken} {said}"
+                );
             }
         }
     });

@@ -15,6 +15,9 @@ use crate::{
 /// Columns of calibration and nulls whose samples in all channels are held at once: 30 MiB for five minutes of packets.
 const BLOCK: usize = 64;
 
+/// The same where nothing else is asked for: what a processor's cache holds.
+const LEAST: usize = 16;
+
 /// Columns whose parts in the motion are held at once, unless one set has more: 20 MiB for five minutes of packets.
 const HELD: usize = 128;
 
@@ -82,7 +85,9 @@ impl Space<'_> {
         let size = calibration + self.nulls.len();
         let mut inner = DMatrix::identity(size, size);
         let mut open = DMatrix::zeros(size, columns.len());
-        self.each_apart(&mut |from, apart| {
+        // Every block goes through all columns that are asked for.
+        let block = if columns.is_empty() { LEAST } else { BLOCK };
+        self.each_apart(block, &mut |from, apart| {
             let mut known = 0;
             for ((frame, touching), apart) in frames.iter().zip(&touching).zip(apart) {
                 let apart = apart.transpose();
@@ -111,21 +116,12 @@ impl Space<'_> {
         (inner, open)
     }
 
-    /// Gives calibration and nulls without what the motion imitates of them, a block of columns at a time: the first of them, and the
-    /// samples of each channel.
-    fn each_apart(&self, with: &mut dyn FnMut(usize, &[DMatrix<f64>])) {
-        for (block, columns) in self.columns().chunks(BLOCK).enumerate() {
-            let mut apart = self
-                .motion
-                .imitated(&self.motion.parts(&columns.iter().collect::<Vec<_>>()));
-            apart.iter_mut().for_each(|values| values.neg_mut());
-            for (at, column) in columns.iter().enumerate() {
-                for (channel, values) in column {
-                    let mut own = apart[*channel].column_mut(at);
-                    own += values;
-                }
-            }
-            with(BLOCK * block, &apart);
+    /// Gives calibration and nulls without what the motion imitates of them, so many columns at a time: the first of them, and the samples
+    /// of each channel.
+    fn each_apart(&self, block: usize, with: &mut dyn FnMut(usize, &[DMatrix<f64>])) {
+        for (at, columns) in self.columns().chunks(block).enumerate() {
+            let columns: Vec<&Entries> = columns.iter().collect();
+            with(block * at, &self.apart(&columns, &self.motion.parts(&columns)));
         }
     }
 }
