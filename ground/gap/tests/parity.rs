@@ -130,6 +130,33 @@ fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
     check_healthy("tumble", 20.0);
 }
 
+/// Takes the windows out of a case.
+fn without_windows(folder: &TempDir) {
+    let file = folder.path().join("case.toml");
+    let text = fs::read_to_string(&file).expect("a case");
+    let (before, _) = text.split_once("[windows]").expect("has windows");
+    fs::write(&file, before).expect("writes");
+}
+
+#[test]
+fn a_log_without_windows_is_parted_in_the_middle_and_a_healthy_one_is_given_no_name() {
+    let folder = flown("tumble", 20.0, 3, &[], |_| true);
+    without_windows(&folder);
+    let flight = Flight::open(folder.path()).expect("opens");
+    let held = flight.held.as_ref().expect("is judged");
+    assert_eq!((flight.log.start_s.len(), held.start_s.len()), (300, 300));
+    assert!(flight.log.start_s[299] < held.start_s[0]);
+    let findings = Findings::of(&flight, &[], &|_, _| ()).expect("has redundancy");
+    assert!(findings.names.is_empty(), "{:?}", findings.names);
+    assert!(
+        findings.visible.iter().all(|row| row.smoothed.is_some()),
+        "did not settle"
+    );
+    let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is analysed");
+    let (_, screen) = texts.iter().find(|(name, _)| name == "all.txt").expect("a screen");
+    assert!(screen.contains("WINDOWS"), "{screen}");
+}
+
 #[test]
 fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
     for (name, from_s) in [

@@ -121,8 +121,8 @@ pub struct CaseFile {
     /// What is too small to care about.
     #[serde(default)]
     pub matters: Matters,
-    /// What is fitted and what only judges.
-    pub windows: WindowPairs,
+    /// What is fitted and what only judges; a log without a reference is parted by itself where nobody says it.
+    pub windows: Option<WindowPairs>,
 }
 
 /// `[motion_known]`.
@@ -211,7 +211,7 @@ pub struct Opened {
     pub file: PathBuf,
     /// What it says.
     pub text: CaseFile,
-    /// Its windows, checked.
+    /// Its windows, checked; empty where it says none.
     pub windows: Windows,
 }
 
@@ -245,11 +245,15 @@ impl Opened {
             let problem = "says that no motion is known, and motion names one; keep one of the two";
             return Err(CaseError::key(&file, "motion_known.none", problem));
         }
-        let windows = Windows::new(
-            spans(&file, "windows.fit", &text.windows.fit)?,
-            spans(&file, "windows.hold", &text.windows.hold)?,
-        )
-        .map_err(|problem| CaseError::key(&file, "windows", problem.to_string()))?;
+        let (fit, hold) = match &text.windows {
+            Some(pairs) => (
+                spans(&file, "windows.fit", &pairs.fit)?,
+                spans(&file, "windows.hold", &pairs.hold)?,
+            ),
+            None => (Vec::new(), Vec::new()),
+        };
+        let windows =
+            Windows::new(fit, hold).map_err(|problem| CaseError::key(&file, "windows", problem.to_string()))?;
         Ok(Opened { file, text, windows })
     }
 

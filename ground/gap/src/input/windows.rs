@@ -66,6 +66,18 @@ impl Windows {
         Ok(Windows { fit, hold })
     }
 
+    /// All is fitted, and nothing judges.
+    pub fn all() -> Self {
+        let all = Span {
+            from: f64::NEG_INFINITY,
+            to: f64::INFINITY,
+        };
+        Windows {
+            fit: vec![all],
+            hold: Vec::new(),
+        }
+    }
+
     /// Those that are fitted.
     pub fn fit(&self) -> &[Span] {
         &self.fit

@@ -2,6 +2,9 @@
 //!
 //! In: the folder of a case. Out: [`Flight`]. A `motion` that is there is not opened.
 //!
+//! A log whose file has no `[windows]` is parted in the middle: the motion of each half is smoothed by itself, and a smoother does not
+//! bridge the minutes that windows which take turns leave out.
+//!
 //! Refuses, naming file and key, what any case is refused for, and tables, which are nothing but commanded motion.
 
 use std::path::Path;
@@ -11,7 +14,7 @@ use twin::{environment::Environment, predict::UnitDescription};
 use crate::input::{
     case::{CaseError, Kind, Opened, columns_of, environment_of},
     log::{Log, Series},
-    windows::Span,
+    windows::{Span, Windows},
 };
 
 /// Rows that are kept at most: 20 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
@@ -34,6 +37,8 @@ pub struct Flight {
     pub held: Option<Log>,
     /// One row in so many was kept.
     pub thinned: usize,
+    /// How it was parted where its file does not say it.
+    pub windows: Option<Windows>,
 }
 
 impl Flight {
@@ -50,19 +55,22 @@ impl Flight {
         let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
         let environment = environment_of(&opened, &unit)?;
         let log = opened.log(&columns_of(&unit), unit.cycle_s)?;
-        let rows = rows(&log, opened.windows.fit());
+        let parted = opened.text.windows.is_none().then(|| halves(&log));
+        let windows = parted.as_ref().unwrap_or(&opened.windows);
+        let rows = rows(&log, windows.fit());
         if rows.len() < LEAST_ROWS {
             let problem = format!("hold {} rows of the log; at least {LEAST_ROWS} are needed", rows.len());
             return Err(CaseError::key(&opened.file, "windows.fit", problem));
         }
         let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
         let rows: Vec<usize> = rows.into_iter().step_by(thinned).collect();
-        let held = self::rows(&log, opened.windows.hold());
+        let held = self::rows(&log, windows.hold());
         let every = held.len().div_ceil(MOST_ROWS).max(1);
         let held: Vec<usize> = held.into_iter().step_by(every).collect();
         Ok(Flight {
             log: only(&log, &rows),
             held: (held.len() >= LEAST_ROWS).then(|| only(&log, &held)),
+            windows: parted,
             opened,
             unit,
             environment,
@@ -75,6 +83,26 @@ impl Flight {
         let name = |index: &usize| self.unit.channels.get(*index).map(|channel| channel.name.clone());
         channels.iter().filter_map(name).collect()
     }
+}
+
+/// The first half of a log to be fitted, the second to judge; one that is too short for two is fitted as a whole.
+fn halves(log: &Log) -> Windows {
+    let rows = log.start_s.len();
+    let middle = log.start_s.get(rows / 2).filter(|_| rows >= 2 * LEAST_ROWS);
+    let halved = middle.and_then(|middle| {
+        let (first, last) = (log.start_s[0], log.start_s[rows - 1]);
+        // A row belongs to a window when it begins before the window's end.
+        let fit = Span {
+            from: first,
+            to: *middle,
+        };
+        let hold = Span {
+            from: *middle,
+            to: last + (last - first) / rows as f64,
+        };
+        Windows::new(vec![fit], vec![hold]).ok()
+    });
+    halved.unwrap_or_else(Windows::all)
 }
 
 /// Rows of a log that begin in these windows.

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use crate::{
+    input::windows::Span,
     parity::{
         findings::{Findings, Place},
         flight::Flight,
@@ -39,6 +40,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
          thermometers {thermometers:.1}",
         findings.rows
     );
+    out += &parted(flight);
     out += &seen_and_not(findings);
     let _ = writeln!(
         out,
@@ -50,6 +52,28 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     let _ = writeln!(out, "{}", told.line());
     let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
     wrapped(&out)
+}
+
+/// How the log was parted where its file does not say it, in a line.
+fn parted(flight: &Flight) -> String {
+    let Some(windows) = &flight.windows else {
+        return String::new();
+    };
+    if windows.hold().is_empty() {
+        return "WINDOWS none in case.toml, and the log is too short to be parted: nothing judges what is named\n"
+            .to_owned();
+    }
+    let spans = |spans: &[Span]| {
+        let spans: Vec<String> = (spans.iter())
+            .map(|span| format!("{:.1} to {:.1}", span.from, span.to))
+            .collect();
+        spans.join(", ")
+    };
+    format!(
+        "WINDOWS none in case.toml; parted in the middle: fitted {} s, held out {} s\n",
+        spans(windows.fit()),
+        spans(windows.hold())
+    )
 }
 
 /// Which effects can be named from this log and which cannot, in two lines.

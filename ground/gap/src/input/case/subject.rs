@@ -82,6 +82,11 @@ impl Subject {
             let problem = "is absent, and this compares with a reference; what the unit's redundancy says without one: ground gap CASE";
             return Err(CaseError::key(&opened.file, "motion", problem));
         }
+        if opened.text.windows.is_none() {
+            let problem =
+                "is absent; say which seconds are fitted and which only judge: fit = [[from, to]], hold = [[from, to]]";
+            return Err(CaseError::key(&opened.file, "windows", problem));
+        }
         let mut unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
         believed(&mut unit);
         if opened.text.kind == super::Kind::Table {

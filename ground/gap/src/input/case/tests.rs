@@ -121,6 +121,8 @@ fn windows_that_overlap_or_hold_nothing_are_refused() {
         Some(&CASE.replace("[[3.0, 6.0]]", "[]")),
         &["windows.hold", "empty"],
     );
+    let without = CASE.split("[windows]").next().unwrap_or_default();
+    check("case.toml", Some(without), &["windows", "absent"]);
     check(
         "case.toml",
         Some(&CASE.replace("[[3.0, 6.0]]", "[[30.0, 60.0]]")),
