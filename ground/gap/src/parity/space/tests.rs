@@ -186,12 +186,12 @@ fn what_is_taken_from_a_column_is_what_its_part_says() {
         let parts = motion.parts(columns);
         let apart = space.apart(columns, &parts);
         for (one, u) in columns.iter().enumerate() {
-            for other in 0..columns.len() {
+            for (other, v) in columns.iter().enumerate() {
                 // u'(v - Q Q'v) = u'v - (Q'u)'(Q'v)
                 let own = u
                     .iter()
                     .map(|(channel, values)| values.dot(&apart[*channel].column(other)));
-                let taken: f64 = dot(u, columns[other]) - own.sum::<f64>();
+                let taken: f64 = dot(u, v) - own.sum::<f64>();
                 let said = parts.column(one).dot(&parts.column(other));
                 let scale = parts.column(one).norm() * parts.column(other).norm();
                 assert!(
