@@ -57,6 +57,8 @@ pub enum Cause {
     Erased,
     /// G_RA: nothing changes, but the launch rail did.
     Rail,
+    /// Nothing changes, but the attitude took this rail after the latest cycle that had begun by then.
+    RailTaken(Rail),
 }
 
 impl Cause {
@@ -69,6 +71,7 @@ impl Cause {
             Cause::EraseArmed => "an erase of the log armed",
             Cause::Erased => "the log erased",
             Cause::Rail => "the launch rail set",
+            Cause::RailTaken(_) => "the launch rail taken",
         }
     }
 }

@@ -243,20 +243,31 @@ pub fn read_all(chip: &mut Cells, wrong: &mut u64) -> BTreeMap<Key, u32> {
 const LOGGED_BLOCKS: u16 = 150;
 
 /// Packets of a flight on its chip, by key, as far as [`LOGGED_BLOCKS`].
-pub fn logged(mut chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
+pub fn logged(chip: Cells) -> Vec<(Key, [u8; PACKET_BYTES])> {
+    let packets = contents(chip).into_iter();
+    packets
+        .filter_map(|(key, content)| match content {
+            Content::Packet(entry) => Some((key, entry.packet)),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Everything of a flight on its chip, by key, as far as [`LOGGED_BLOCKS`].
+pub fn contents(mut chip: Cells) -> BTreeMap<Key, Content> {
     let mut found = BTreeMap::new();
     for block in LOG_START..LOG_START + LOGGED_BLOCKS {
         for page in 0..PAGES_PER_BLOCK {
             let mut bytes = chip.read(PageAddress { block, page });
             let whole = page::correct(&mut bytes);
             for half in (0..2).filter(|half| whole[*half].is_ok()) {
-                if let Ok((key, Content::Packet(entry))) = record::decode(page::record(&bytes, half)) {
-                    found.insert(key, entry.packet);
+                if let Ok((key, content)) = record::decode(page::record(&bytes, half)) {
+                    found.insert(key, content);
                 }
             }
         }
     }
-    found.into_iter().collect()
+    found
 }
 
 /// Runs `flights` on all cores, each with its number, and adds up.

@@ -1,7 +1,15 @@
 //! A launch rail told over the umbilical: taken, contradicted, kept, and only where it may be.
 
-use emems::{derived::Derived, estimate::Site, unit::Settings};
-use host_tests::{Flight, Flown, MS, S, world};
+use emems::{
+    derived::{self, Derived},
+    estimate::{Estimator, Site},
+    flight_log::record::Content,
+    mode::Cause,
+    rail::Rail,
+    sample::Sample,
+    unit::Settings,
+};
+use host_tests::{Flight, Flown, MS, S, recorder::contents, world};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 use twin::{
     motion::{Motion as _, SoundingRocket},
@@ -97,4 +105,61 @@ fn a_rail_lasts_over_a_reset_and_a_wrong_number_changes_nothing() {
     }
     let flying = on_pad().say(4 * S, b"G_MVG_MV").say(6 * S, RAIL).fly(9 * S);
     assert!(flying.replied("G_RA no: only in WAIT"), "{:?}", flying.replies());
+}
+
+/// Cycles whose frame is not, bit for bit, what the estimation makes of it with rails taken at these times \[us\].
+fn differing(flown: &Flown, settings: &Settings, rails: &[(u64, Rail)]) -> Vec<u16> {
+    let mut estimator = Estimator::of(settings);
+    let (mut differing, mut rails) = (Vec::new(), rails.iter().peekable());
+    for (number, frame) in flown.derived.iter().enumerate() {
+        let packet = flown.packets.iter().find(|(_, packet)| packet.counter == frame.counter);
+        let sample = Sample {
+            reading: packet.expect("its packet").1,
+            start_us: frame.start_us,
+            slots_us: frame.slots_us,
+        };
+        let again = Derived {
+            estimate: estimator.step(&sample, &frame.increments),
+            ..*frame
+        };
+        if derived::encode(frame) != derived::encode(&again) {
+            differing.push(frame.counter);
+        }
+        let next_us = flown.derived.get(number + 1).map_or(u64::MAX, |next| next.start_us);
+        while let Some((_, rail)) = rails.next_if(|(at_us, _)| (frame.start_us..next_us).contains(at_us)) {
+            assert_eq!(estimator.know_nose(&rail.nose(), true), Some(Ok(())), "{rail}");
+        }
+    }
+    assert_eq!(rails.next(), None, "a rail outside of the flight");
+    differing
+}
+
+#[test]
+fn a_flight_replays_bit_for_bit_with_the_rails_of_its_log() {
+    let flight = on_pad()
+        .say(5 * S, RAIL)
+        // Another sigma: taken again.
+        .say(8 * S, b"G_RA1B5821340803G_CK")
+        .say(11 * S, WRONG)
+        .say(14 * S, b"G_MVG_MV")
+        .say(15 * S, b"G_MGG_MG");
+    let settings = flight.settings;
+    let mut flown = flight.fly(20 * S);
+    let chip = flown.nand.take().expect("a chip");
+    let rails: Vec<(u64, Rail)> = contents(chip)
+        .into_values()
+        .filter_map(|content| match content {
+            Content::Change(change) => Some(change),
+            _ => None,
+        })
+        .filter_map(|change| match change.cause {
+            Cause::RailTaken(rail) => Some((change.at_us, rail)),
+            _ => None,
+        })
+        .collect();
+    let azimuth_sds: Vec<u8> = rails.iter().map(|(_, rail)| rail.azimuth_sd).collect();
+    assert_eq!(azimuth_sds, [5, 8], "{:?}", flown.replies());
+    assert_eq!(differing(&flown, &settings, &rails), []);
+    assert!(differing(&flown, &settings, &[]).len() > 10);
+    assert!(!differing(&flown, &settings, &rails[..1]).is_empty());
 }

@@ -24,7 +24,9 @@
 //! tail of the source file's name.
 //!
 //! A change of mode (type 3): `14-15` flags (1 FLIGHT from then on), `16-23` \[us\] when, `24` recording from then on, `25` cause
-//! (1 command, 2 lift-off, 3 log; without a change 4 an erase was armed, 5 the log was erased), the rest zero.
+//! (1 command, 2 lift-off, 3 log; without a change 4 an erase was armed, 5 the log was erased, 6 the launch rail
+//! was set, 7 the attitude took it), `26-31` with cause 7 the rail ([`Rail::bytes`], big endian), the rest zero. It was taken after the
+//! latest cycle that had begun by then, and before the next: whoever replays the cycles takes it there.
 //!
 //! The key is never used twice, so a record that turns up again is the same record. Refuses what the checksum does not
 //! fit, a newer version by its number, and a type it does not know.
@@ -40,6 +42,7 @@ use crate::{
     faults::SensorHealth,
     mode::{Cause, Change, Mode},
     packet::PACKET_BYTES,
+    rail::Rail,
     sample::{NO_SLOT, SENSOR_COUNT},
 };
 
@@ -94,6 +97,7 @@ mod at {
     pub const PLACE: usize = 236;
     pub const RECORDING: usize = 24;
     pub const CAUSE: usize = 25;
+    pub const RAIL: usize = 26;
 }
 
 /// Which record: the order of keys is the order in which they were made.
@@ -301,6 +305,10 @@ pub fn encode_change(key: Key, change: &Change) -> RecordBytes {
         Cause::EraseArmed => 4,
         Cause::Erased => 5,
         Cause::Rail => 6,
+        Cause::RailTaken(rail) => {
+            put(&mut bytes, at::RAIL, &rail.bytes());
+            7
+        }
     };
     put(&mut bytes, at::RECORDING, &[change.recording.into()]);
     put(&mut bytes, at::CAUSE, &[cause]);
@@ -395,6 +403,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
                 4 => Cause::EraseArmed,
                 5 => Cause::Erased,
                 6 => Cause::Rail,
+                7 => Cause::RailTaken(Rail::of_bytes(take(bytes, at::RAIL))),
                 _ => Cause::Command,
             },
         }),

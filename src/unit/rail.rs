@@ -1,7 +1,8 @@
 //! The launch rail over the umbilical: G_RA with G_CK.
 //!
 //! A rail in use lasts over a reset, in retained memory; after a power cut it must be said again. In WAIT the filter takes it once for
-//! each attitude that is found. One that contradicts the attitude is said to and left out. In FLIGHT it is not looked at.
+//! each attitude that is found, and the log keeps its numbers and when. One that contradicts the attitude is said to and left out. In
+//! FLIGHT it is not looked at.
 
 use super::shared::Shared;
 use crate::{
@@ -39,7 +40,10 @@ fn take(shared: &Shared, rail: Rail) {
 pub fn met(shared: &Shared, met: Result<(), f32>) {
     shared.rail_is_new.set(false);
     match met {
-        Ok(()) => shared.say(format_args!("rail taken")),
+        Ok(()) => {
+            shared.note(Cause::RailTaken(shared.rail.get()));
+            shared.say(format_args!("rail taken"));
+        }
         Err(off) => shared.say(format_args!(
             "rail CONTRADICTS the attitude by {} deg, not used",
             (off.to_degrees() + 0.5) as u8

@@ -8,7 +8,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use emems::{board::ResetCause, crash::CrashCause, flight_log::record::Start};
+use emems::{
+    board::ResetCause,
+    crash::CrashCause,
+    flight_log::record::Start,
+    mode::{Cause, Change},
+    rail::Rail,
+};
 use packets::{
     input, output,
     stream::{Bytes5To8, Decoder, Item},
@@ -135,6 +141,7 @@ fn json(log: &Log, all_epochs: bool) -> serde_json::Value {
             "at_us": change.at_us,
             "mode": change.mode.name(),
             "by": change.cause.name(),
+            "rail": rail(change).map(|rail| rail.to_string()),
         })
     });
     let gaps = log.gaps().into_iter().map(|gap| {
@@ -235,12 +242,13 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
     for (key, change) in &log.changes {
         writeln!(
             remarks,
-            "epoch {} boot {}: mode {} at {:.3} s by {}",
+            "epoch {} boot {}: mode {} at {:.3} s by {}{}",
             key.epoch,
             key.boot,
             change.mode.name(),
             change.at_us as f64 * 1e-6,
-            change.cause.name()
+            change.cause.name(),
+            rail(change).map_or(String::new(), |rail| format!(": {rail}"))
         )?;
     }
     let gaps = log.gaps();
@@ -282,6 +290,14 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
         damage.used, damage.corrected, damage.lost, damage.astray
     )?;
     remarks.flush()
+}
+
+/// The rail that the attitude took.
+fn rail(change: &Change) -> Option<Rail> {
+    match change.cause {
+        Cause::RailTaken(rail) => Some(rail),
+        _ => None,
+    }
 }
 
 /// How a unit started, in words.
@@ -348,12 +364,25 @@ mod tests {
             recording: true,
             cause: Cause::LiftOff,
         };
+        let taken = Change {
+            at_us: 1_500_000,
+            mode: Mode::Wait,
+            recording: false,
+            cause: Cause::RailTaken(Rail::of_bytes([0x1B, 0x58, 0x21, 0x34, 0x05, 0x03])),
+        };
         log.changes.insert(
             Key {
                 seq: 1,
                 ..Key::default()
             },
             change,
+        );
+        log.changes.insert(
+            Key {
+                seq: 2,
+                ..Key::default()
+            },
+            taken,
         );
         let mut remarks = Vec::new();
         write_remarks(&log, false, &mut remarks).expect("written");
@@ -365,6 +394,11 @@ mod tests {
         let json = json(&log, false);
         assert_eq!(json["boots"][0]["started"], started);
         assert_eq!(json["changes"][0]["mode"], "FLIGHT");
+        let said = "azimuth 70.00 elevation 85.00 sigma 0.5 0.3 deg";
+        let text = format!("mode WAIT at 1.500 s by the launch rail taken: {said}");
+        assert!(remarks.contains(&text), "{remarks}");
+        assert_eq!(json["changes"][1]["rail"], said);
+        assert!(json["changes"][0]["rail"].is_null());
         assert_eq!(
             (&json["changes"][0]["at_us"], &json["records"]),
             (&2_000_000.into(), &0.into())

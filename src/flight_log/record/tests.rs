@@ -143,6 +143,11 @@ fn a_change_of_mode_says_what_it_was_given() {
         (Mode::Wait, false, Cause::Command),
         (Mode::Flight, false, Cause::Log),
         (Mode::Wait, false, Cause::Rail),
+        (
+            Mode::Wait,
+            true,
+            Cause::RailTaken(Rail::of_bytes([0x1B, 0x58, 0x21, 0x34, 0x05, 0x03])),
+        ),
     ] {
         let change = Change {
             at_us: 5_000_000_000,
