@@ -97,9 +97,15 @@ impl<'a> Belief<'a> {
     }
 
     /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
-    /// effects on readings.
-    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize) {
-        let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
+    /// effects on readings; `worth` is what they are worth beside the reference's own errors \[nats\], where that is known.
+    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize, worth: &[Option<f64>]) {
+        let gain = |index: usize, cause: &Cause| worth.get(index).copied().flatten().unwrap_or(cause.gain);
+        let gains: Vec<f64> = causes
+            .iter()
+            .enumerate()
+            .map(|(index, cause)| gain(index, cause))
+            .collect();
+        let strongest = gains.iter().copied().fold(0.0, f64::max);
         for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
             let trust = match self.courses.filter(|_| index < on_readings) {
                 Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
@@ -110,8 +116,9 @@ impl<'a> Belief<'a> {
                 Some(_) if index < on_readings => 1.0,
                 _ => above_doubt(cause.gain),
             };
-            let is_no_remainder = if cause.gain < strongest {
-                cause.gain / (cause.gain + REMAINDER * strongest)
+            let own = gains[index];
+            let is_no_remainder = if own < strongest {
+                own.max(0.0) / (own.max(0.0) + REMAINDER * strongest)
             } else {
                 1.0
             };

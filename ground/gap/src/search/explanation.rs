@@ -46,7 +46,7 @@ pub struct Explanation {
     pub beneath: Vec<Vec<f64>>,
     /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
     pub louder: Vec<f64>,
-    /// How many different effects, refused ones included, are in the channels of one of them, at most.
+    /// How many different effects, refused ones included, the search put into the channels of one of them, at most.
     company: usize,
     /// Whether those that were refused explain more than those that were kept.
     is_refused: bool,
@@ -212,7 +212,6 @@ impl Explanation {
 
     /// Makes the model of its effects anew.
     fn renew(&mut self, problem: &Problem, library: &Library) {
-        self.company = company(problem, library, &self.found.chosen, self.scatter.as_ref());
         self.model = Model::around(problem, self.found.model(library));
         self.beneath.clone_from(&self.model.predicted);
         match &self.scatter {
