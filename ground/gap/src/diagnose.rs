@@ -5,6 +5,7 @@
 //! gap, they say whether it is there too.
 
 use nalgebra::DVector;
+use twin::effect::Texture;
 
 use crate::{
     advise::{
@@ -31,15 +32,16 @@ use crate::{
     probability::{
         cause::{Cause, share_out},
         doubt::Promised,
+        importance::setting,
         outcome::{Outcome, is_unexplained},
         posterior::Believed,
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
-    thresholds::SAID,
+    thresholds::{MOST_EFFECTS, SAID},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
-        reconsidered,
+        recognised::recognised,
         remainder::{Remainder, Setting},
         traces::{Trace, cells, traces},
         views,
@@ -138,8 +140,6 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
     let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
     progress("leftover", 0.0);
-    reconsidered::prune(&problem, &mut library, &mut explanation, subject);
-    reconsidered::compare(&problem, &mut library, &mut explanation, subject, &quiet);
     let mut left = match explanation.is_empty() {
         true => gate.clone(),
         false => left_by(&problem, &explanation),
@@ -171,7 +171,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     } else {
         Vec::new()
     };
-    let seen = reconsidered::recognise(&problem, &mut library, &mut explanation, subject, &quiet);
+    let seen = recognise(subject, &problem, &library, &mut explanation, &quiet);
     let events = if seen {
         Events::of(&problem, &explanation.model)
     } else {
@@ -305,6 +305,38 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     }
 }
 
+/// Takes in what is recognised beneath what an explanation leaves, where the reference is not exact; whether anything was.
+fn recognise(
+    subject: &Subject,
+    problem: &Problem,
+    library: &Library,
+    explanation: &mut Explanation,
+    quiet: &Model,
+) -> bool {
+    if subject.slow.attitude_sigma_rad <= 0.0 {
+        return false;
+    }
+    let before = explanation.found.chosen.len();
+    while explanation.found.chosen.len() < MOST_EFFECTS {
+        let model = if explanation.found.chosen.is_empty() {
+            quiet
+        } else {
+            &explanation.model
+        };
+        let Some(chosen) = recognised(
+            problem,
+            library,
+            model,
+            &explanation.found.chosen,
+            &setting(subject, explanation),
+        ) else {
+            break;
+        };
+        explanation.add(problem, library, chosen);
+    }
+    explanation.found.chosen.len() > before
+}
+
 /// The effects on readings that are named, without those that were found and are not likely enough.
 fn said(explanation: &Explanation, causes: &[Cause]) -> Vec<Component> {
     let is_said = |component: &&Component| {
@@ -327,9 +359,18 @@ fn remains(
 ) -> Remainder {
     let is_named = |scatter: &&Scatter| causes.iter().any(|cause| cause.effect == scatter.effect.page().name);
     let scatter = explanation.scatter.as_ref().filter(is_named);
+    let scattered = scatter.map_or(&[][..], |scatter| &scatter.channels);
+    // Of a walk, and of what makes other readings of those beneath it, a mean over time is no remainder.
+    let is_hidden = |scatter: &Scatter| scatter.effect.page().texture == Texture::Walk || !scatter.beneath.is_empty();
+    let wanders = scatter.is_some_and(is_hidden);
     let as_described = vec![1.0; subject.twin.unit().channels.len()];
-    let louder = scatter.map_or(&as_described, |_| &explanation.louder);
-    let setting = Setting::of(subject, scatter, louder);
+    let setting = Setting {
+        slow: &subject.slow,
+        bars: &subject.bars,
+        louder: scatter.map_or(&as_described, |_| &explanation.louder),
+        scattered,
+        wandering: if wanders { scattered } else { &[] },
+    };
     remainder::of_log(subject, said, &setting, !causes.is_empty() && is_random)
 }
 

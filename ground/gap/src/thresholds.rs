@@ -86,11 +86,6 @@ thresholds! {
         larger: "unknown effects are called clean",
         smaller: "misfits that change nothing are called unknown effects",
         Convention("a twentieth of the noise");
-    /// Part of an effect's energy, beyond what the calibration takes up, that means over short stretches must keep to tell of it.
-    MEANS_TELL: f64 = 0.25, in "part",
-        larger: "more effects are believed by evidence that takes coloured noise for white",
-        smaller: "quick effects are asked of means that do not show them",
-        Convention("half of the amplitude");
     // Step 4, search
     /// Evidence that an effect must bring beyond its prior odds, on readings or on the scatter, and must be able to bring in other blocks that are to say anything of it.
     EFFECT_MARGIN: f64 = 3.0, in "nats",

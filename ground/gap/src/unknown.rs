@@ -3,8 +3,7 @@
 //! In: a finished model. Out: [`adequacy::Leftover`], a probability of as much by chance with the aspects that say otherwise,
 //! by logs simulated from the model; [`place::Place`], the shares of the gap by channel, group, octave, regime and time; and
 //! [`traces`] of the channels that stand out. [`views`] says what each channel is looked at with. How large it is, and whether that
-//! matters, says [`remainder::Remainder`]; whether it is an effect of the library after all, [`recognised`]. Where the reference is not exact
-//! what the search found is [`reconsidered`] so.
+//! matters, says [`remainder::Remainder`]; whether it is an effect of the library after all, [`recognised`].
 
 pub mod adequacy;
 mod binned;
@@ -13,7 +12,6 @@ mod fast;
 pub mod octaves;
 pub mod place;
 pub mod recognised;
-pub mod reconsidered;
 pub mod remainder;
 pub mod shapley;
 pub mod slow;

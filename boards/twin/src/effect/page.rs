@@ -66,8 +66,6 @@ pub enum Needs {
     Light,
     /// Cycles of one length, counted: rows that bring their own time leave a hole when they are lost, and nothing late.
     Counter,
-    /// Several plates: one alone takes the whole unit along, and what yields then is its mount.
-    Plates,
 }
 
 impl Needs {
@@ -79,7 +77,6 @@ impl Needs {
                 channel.sensor == Kind::Gyro && channel.bits.is_none() && may_be_of_light(channel.range)
             }),
             Needs::Counter => unit.cycle_s.is_some(),
-            Needs::Plates => unit.channels.windows(2).any(|pair| pair[0].group != pair[1].group),
         }
     }
 }

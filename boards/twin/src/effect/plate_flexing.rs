@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Effect, Needs, Page, Scope, Site, Symbol};
+use super::{Effect, Page, Scope, Site, Symbol};
 use crate::channel::{Aim, Chain, Kind};
 
 /// The variant of a load that is the force; its unit of compliance is then rad per m/s2.
@@ -25,7 +25,6 @@ const PAGE: Page = Page {
     siblings: &["lever-arm", "accel-nonlinearity", "plate-rotation", "mounting"],
     confirm_by: "Spin at two rates with the board stiffened and not.",
     scope: Scope::Plate,
-    needs: Some(Needs::Plates),
     sensors: &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer],
     parameters: &[
         Symbol::signed("cx", "rad s^2/rad^2", 5e-4),

@@ -97,28 +97,17 @@ impl<'a> Belief<'a> {
     }
 
     /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
-    /// effects on readings; `worth` is what they are worth beside the reference's own errors \[nats\], where that is known.
-    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize, worth: &[Option<f64>]) {
-        let gain = |index: usize, cause: &Cause| worth.get(index).copied().flatten().unwrap_or(cause.gain);
-        let gains: Vec<f64> = causes
-            .iter()
-            .enumerate()
-            .map(|(index, cause)| gain(index, cause))
-            .collect();
-        let strongest = gains.iter().copied().fold(0.0, f64::max);
+    /// effects on readings.
+    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize) {
+        let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
             let trust = match self.courses.filter(|_| index < on_readings) {
                 Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
                 None => self.trust(Some(cause.effect), &cause.channels, *explained),
             };
-            let is_no_chance = match self.courses {
-                // Asked beyond what the reference may be off.
-                Some(_) if index < on_readings => 1.0,
-                _ => above_doubt(cause.gain),
-            };
-            let own = gains[index];
-            let is_no_remainder = if own < strongest {
-                own.max(0.0) / (own.max(0.0) + REMAINDER * strongest)
+            let is_no_chance = above_doubt(cause.gain);
+            let is_no_remainder = if cause.gain < strongest {
+                cause.gain / (cause.gain + REMAINDER * strongest)
             } else {
                 1.0
             };
@@ -128,8 +117,8 @@ impl<'a> Belief<'a> {
 }
 
 /// Believes causes less, which are the model's effects in their order, that may be an error of the reference or the field. Returns what each
-/// is worth \[nats\] beyond that: in means over short stretches, whose noise is as their neighbours differ, or, where those do not tell of it,
-/// sample by sample; none where the reference is exact.
+/// is worth \[nats\] beyond that, sample by sample or in means over short stretches, whichever shows more; none where the reference is
+/// exact.
 pub fn beyond_reference(
     problem: &Problem,
     errors: &SlowErrors,
@@ -146,10 +135,8 @@ pub fn beyond_reference(
         return Vec::new();
     };
     let weighed = causes.iter_mut().enumerate().map(|(index, cause)| {
-        let nats = match importance {
-            Some(importance) if importance.is_seen[index] => importance.worth[index],
-            _ => beyond.nats(&model.components, index),
-        };
+        let slow = importance.map_or(0.0, |importance| importance.worth[index]);
+        let nats = beyond.nats(&model.components, index).max(slow);
         cause.probability *= above_doubt(nats);
         nats
     });

@@ -5,16 +5,16 @@
 //!
 //! A real unit is off by a little everywhere, and thousands of samples make any of it significant: a gyro's scale that is off by two of its
 //! sigmas is fifty nats and a hundredth of the noise. That is for the calibration, and no name. So a name must explain what would
-//! matter without it, by the user's bars: in some channel the gap would grow by more, or the attitude be off by more by what it does to
-//! the readings of the unit as described. Of one that is too quick for means over short stretches a slow course above its bar must be left
-//! without it: what errs quickly in a reference is worth nats sample by sample and moves no attitude.
+//! matter without it, by the bars of the remainder: a slow course above its bar, or in some channel a growth of the gap above the user's.
+
+use twin::effect::Texture;
 
 use crate::{
     input::case::Subject,
     null::{model::Model, problem::Problem},
     search::explanation::Explanation,
     unknown::{
-        remainder::{Setting, attitude_deg, courses, judged},
+        remainder::{Setting, courses, judged},
         slow::{Beside, Slow},
     },
 };
@@ -36,10 +36,8 @@ pub struct Importance {
     pub courses: Vec<Course>,
     /// Per effect of the model, the probability that what it explains matters.
     pub matters: Vec<f64>,
-    /// \[nats\] that each is worth in means over short stretches.
+    /// \[nats\] that each is worth.
     pub worth: Vec<f64>,
-    /// Whether those tell of it.
-    pub is_seen: Vec<bool>,
 }
 
 impl Importance {
@@ -49,12 +47,9 @@ impl Importance {
         if subject.slow.attitude_sigma_rad <= 0.0 || model.components.is_empty() {
             return None;
         }
-        let setting = Setting::of(subject, explanation.scatter.as_ref(), &explanation.louder);
-        let beside = Beside::of(problem, model, &setting)?;
+        let setting = setting(subject, explanation);
+        let beside = Beside::of(problem, model, &setting, None)?;
         let matters = |effect: usize| {
-            if beside.sees(effect) {
-                return f64::from(u8::from(is_large(problem, model, effect, &setting)));
-            }
             let channels = problem.contribution(&model.components, effect);
             let is_its = |slow: &&Slow| channels.iter().any(|(channel, _)| slow.channels.contains(channel));
             let without = courses(problem, &beside, &setting, Some(effect));
@@ -72,8 +67,21 @@ impl Importance {
             courses: left.iter().map(course).collect(),
             matters: (0..model.components.len()).map(matters).collect(),
             worth: (0..model.components.len()).map(|effect| beside.worth(effect)).collect(),
-            is_seen: (0..model.components.len()).map(|effect| beside.sees(effect)).collect(),
         })
+    }
+}
+
+/// What an explanation's effect on the scatter leaves to be judged.
+pub fn setting<'a>(subject: &'a Subject, explanation: &'a Explanation) -> Setting<'a> {
+    let scatter = explanation.scatter.as_ref();
+    let scattered = scatter.map_or(&[][..], |scatter| &scatter.channels);
+    let wanders = scatter.is_some_and(|scatter| scatter.effect.page().texture == Texture::Walk);
+    Setting {
+        slow: &subject.slow,
+        bars: &subject.bars,
+        louder: &explanation.louder,
+        scattered,
+        wandering: if wanders { scattered } else { &[] },
     }
 }
 
@@ -87,10 +95,4 @@ fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> 
             let left = problem.in_sigmas(channel, &problem.frames[channel].left(&added));
             left.norm_squared() > bar * left.len() as f64
         })
-}
-
-/// Whether that is so, or the attitude would be off by more than the user's bar with what the effect does.
-fn is_large(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> bool {
-    grows(problem, model, effect, setting)
-        || attitude_deg(problem, &problem.added(&model.components, effect)) > setting.bars.attitude_deg
 }

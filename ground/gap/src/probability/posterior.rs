@@ -75,15 +75,11 @@ impl Believed {
         // What the effects on readings explain is no sign of another's either.
         let of_readings: f64 = causes.iter().take(imitated.len()).map(|cause| 2.0 * cause.gain).sum();
         let of_scatter = scatter.map(|_| (whole - of_readings).max(0.0));
-        let told = importance.as_ref().map_or_else(Vec::new, |importance| {
-            let told = importance.worth.iter().zip(&importance.is_seen);
-            told.map(|(nats, is_seen)| is_seen.then_some(*nats)).collect()
-        });
         let worth = beyond.into_iter().chain(std::iter::repeat(0.0));
         let explained = imitated.into_iter().zip(&causes).zip(worth);
         let explained = explained.map(|((whole, cause), nats)| whole.max(2.0 * cause.gain).max(2.0 * nats));
         let explained: Vec<f64> = explained.chain(of_scatter).collect();
-        belief.weigh(&mut causes, &explained, on_readings, &told);
+        belief.weigh(&mut causes, &explained, on_readings);
         one_name(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.

@@ -21,6 +21,7 @@ use crate::{
     },
     search::{
         bias_walk::Walk,
+        gauss_newton::refine,
         odds::probability_of_any,
         readings::{Attribution, Chosen, attribute},
         scatter::{Scatter, scatters},
@@ -32,7 +33,6 @@ use crate::{
 const WALKS: usize = 4;
 
 /// The effects that a log speaks for.
-#[derive(Clone)]
 pub struct Explanation {
     /// Effects on readings, of which those are chosen that are likelier than not.
     pub found: Attribution,
@@ -46,7 +46,7 @@ pub struct Explanation {
     pub beneath: Vec<Vec<f64>>,
     /// How much more a sample scatters with the effect on the scatter, in the unit's channel order.
     pub louder: Vec<f64>,
-    /// How many different effects, refused ones included, the search put into the channels of one of them, at most.
+    /// How many different effects, refused ones included, are in the channels of one of them, at most.
     company: usize,
     /// Whether those that were refused explain more than those that were kept.
     is_refused: bool,
@@ -186,32 +186,13 @@ impl Explanation {
         (quiet.left() - self.model.left()).max(0.0).sqrt()
     }
 
-    /// Takes one more effect on readings in, as it is.
+    /// Takes one more effect on readings in, and fits all of them anew.
     pub fn add(&mut self, problem: &Problem, library: &Library, chosen: Chosen) {
         self.found.chosen.push(chosen);
-        self.renew(problem, library);
-    }
-
-    /// Takes one effect on readings out.
-    pub fn remove(&mut self, problem: &Problem, library: &Library, at: usize) {
-        self.refused.push(self.found.chosen.remove(at));
-        self.renew(problem, library);
-    }
-
-    /// Takes one for another.
-    pub fn replace(&mut self, problem: &Problem, library: &Library, at: usize, chosen: Chosen) {
-        self.found.chosen[at] = chosen;
-        self.renew(problem, library);
-    }
-
-    /// Moves the parameters of its effects on readings.
-    pub fn shift(&mut self, problem: &Problem, library: &Library, moves: &[DVector<f64>]) {
-        (self.found.chosen.iter_mut().zip(moves)).for_each(|(chosen, by)| chosen.theta += by);
-        self.renew(problem, library);
-    }
-
-    /// Makes the model of its effects anew.
-    fn renew(&mut self, problem: &Problem, library: &Library) {
+        let set: Vec<usize> = self.found.chosen.iter().map(|chosen| chosen.hypothesis).collect();
+        let start: Vec<DVector<f64>> = self.found.chosen.iter().map(|chosen| chosen.theta.clone()).collect();
+        let refined = refine(problem, library, &set, &start);
+        (self.found.chosen.iter_mut().zip(refined.thetas)).for_each(|(chosen, theta)| chosen.theta = theta);
         self.model = Model::around(problem, self.found.model(library));
         self.beneath.clone_from(&self.model.predicted);
         match &self.scatter {
@@ -231,7 +212,6 @@ impl Explanation {
             .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
             .collect();
         names.extend(self.scatter.take().map(|scatter| scatter.effect.page().name));
-        self.louder.fill(1.0);
         self.refused.append(&mut self.found.chosen);
         names
     }

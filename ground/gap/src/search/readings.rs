@@ -19,11 +19,9 @@ mod variant;
 
 use nalgebra::{DMatrix, DVector};
 
-pub use self::{
-    chosen::{Chosen, Rival},
-    columns::{always, timed},
-};
+pub use self::chosen::{Chosen, Rival};
 use self::{
+    columns::always,
     intervals::{bounded, fitted, stretches, taken},
     rivals::compare,
     screen::{CANDIDATES, gains, is_physical, leading},

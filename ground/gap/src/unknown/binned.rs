@@ -1,7 +1,7 @@
 //! Samples averaged over short stretches of time: what is slow loses nothing by it, and the state-space pass has few of them.
 //!
 //! In: one channel's fitted samples and the standard deviation of each. Out: for any series at the samples its weighted mean in each
-//! stretch that has one. White noise of a stretch then has the variance `1 / sum(1 / sigma^2)`, times a [factor](Binned::factors) that the
+//! stretch that has one. White noise of a stretch then has the variance `1 / sum(1 / sigma^2)`, times a [`Binned::factor`] that the
 //! differences of neighbouring stretches tell (von Neumann 1941): noise is often louder, quieter or coloured, and a slow course hardly
 //! moves between neighbours.
 
@@ -12,9 +12,6 @@ pub const BINS: usize = 600;
 
 /// Noise is not taken for quieter than this part of its variance.
 const QUIETEST: f64 = 0.25;
-
-/// Stretches over which noise is as loud: a tenth of a log, whose median square is known to a quarter.
-const ALIKE: usize = BINS / 10;
 
 /// One channel's stretches.
 pub struct Binned {
@@ -63,44 +60,17 @@ impl Binned {
         means
     }
 
-    /// Energy of a series in its means, and in all its samples, in squares of noise.
-    pub fn energies(&self, series: impl Fn(usize) -> f64) -> [f64; 2] {
-        let means = self.means(&series);
-        let in_means = means
-            .iter()
-            .zip(&self.variances)
-            .map(|(mean, variance)| mean * mean / variance);
-        let samples = self.places.iter().enumerate();
-        let in_samples = samples.map(|(sample, (at, weight))| weight * series(sample).powi(2) / self.variances[*at]);
-        [in_means.sum(), in_samples.sum()]
-    }
-
-    /// By how much more than described the means of a residual vary from one stretch to the next, about each: their mean square, as large
-    /// in a part of the log as the median is there. A jump is in few pairs, and a median does not see it.
-    pub fn factors(&self, residual: &[f64]) -> Vec<f64> {
+    /// By how much more than described the means of a residual vary from one stretch to the next.
+    pub fn factor(&self, residual: &[f64]) -> f64 {
         let pairs = residual.windows(2).zip(self.variances.windows(2));
-        let squares: Vec<f64> = pairs
-            .map(|(values, variances)| (values[1] - values[0]).powi(2) / (variances[0] + variances[1]))
-            .collect();
-        let told = squares.iter().copied().filter(|square| square.is_finite());
-        let (sum, count) = told.fold((0.0, 0.0), |(sum, count), own| (sum + own, count + 1.0));
-        let whole = median(&squares);
-        if count == 0.0 || whole <= 0.0 {
-            return vec![if count > 0.0 { QUIETEST } else { 1.0 }; residual.len()];
+        let squares = pairs.map(|(values, variances)| (values[1] - values[0]).powi(2) / (variances[0] + variances[1]));
+        let (sum, count) = squares
+            .filter(|square| square.is_finite())
+            .fold((0.0, 0.0), |(sum, count), own| (sum + own, count + 1.0));
+        if count > 0.0 {
+            f64::max(sum / count, QUIETEST)
+        } else {
+            1.0
         }
-        let parts = (residual.len() / ALIKE).max(1);
-        let level = |at: usize| {
-            let part = at * parts / residual.len();
-            let edge = |part: usize| (part * squares.len()).div_ceil(parts);
-            sum / count * median(&squares[edge(part)..edge(part + 1)]) / whole
-        };
-        (0..residual.len()).map(|at| f64::max(level(at), QUIETEST)).collect()
     }
-}
-
-/// The median of those that are finite; 0 of none.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }

@@ -10,16 +10,15 @@
 //! as the sensor weighs among those of its kind.
 
 use nalgebra::{Matrix3, Vector3};
-use twin::{effect::Texture, predict::Kind};
+use twin::predict::Kind;
 
 use super::{
     fast::{Fast, excesses},
     slow::{Beside, Slow, Where},
 };
 use crate::{
-    input::case::{Bars, SlowErrors, Subject},
+    input::case::{Bars, SlowErrors},
     null::{model::Model, problem::Problem},
-    search::scatter::Scatter,
     thresholds::{FILTER_S, REFERENCE_KNOWN, REFERENCE_SIGMAS},
 };
 
@@ -45,23 +44,6 @@ pub struct Setting<'a> {
     pub scattered: &'a [usize],
     /// Channels whose mean over time the model leaves open, such as a zero that wanders: nothing slow is seen in them.
     pub wandering: &'a [usize],
-}
-
-impl<'a> Setting<'a> {
-    /// With an effect on the scatter, if there is one; `louder` is how much more each channel scatters by it.
-    pub fn of(subject: &'a Subject, scatter: Option<&'a Scatter>, louder: &'a [f64]) -> Self {
-        let scattered = scatter.map_or(&[][..], |scatter| &scatter.channels);
-        // Of a walk, and of what makes other readings of those beneath it, a mean over time is no remainder.
-        let is_hidden =
-            |scatter: &Scatter| scatter.effect.page().texture == Texture::Walk || !scatter.beneath.is_empty();
-        Setting {
-            slow: &subject.slow,
-            bars: &subject.bars,
-            louder,
-            scattered,
-            wandering: if scatter.is_some_and(is_hidden) { scattered } else { &[] },
-        }
-    }
 }
 
 /// What is left.
@@ -125,7 +107,7 @@ fn present(log_bayes_factor: f64, several: usize) -> f64 {
 
 /// What a model leaves.
 pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Remainder {
-    let beside = Beside::of(problem, model, setting);
+    let beside = Beside::of(problem, model, setting, None);
     let slow = beside.map_or_else(Vec::new, |beside| courses(problem, &beside, setting, None));
     let fast = excesses(problem, model, floor, setting.louder).into_iter();
     let fast: Vec<Fast> = fast.filter(|fast| !setting.scattered.contains(&fast.channel)).collect();
@@ -233,56 +215,17 @@ fn degrees(problem: &Problem, place: Where) -> Option<f64> {
     (rad.is_finite()).then(|| (rad * part).to_degrees())
 }
 
-/// \[deg\] root mean square of the attitude error that errors of sensors make, each given at every row of the log: of the kind of sensor that is
-/// worst. A filter forgets what a rate adds up over [`FILTER_S`].
-pub fn attitude_deg(problem: &Problem, errors: &[(usize, Vec<f64>)]) -> f64 {
-    let channels = &problem.twin.unit().channels;
-    let starts_s = problem.twin.starts_s();
-    let rows = problem.fitted_rows();
-    let of_kind = |kind: Kind| {
-        let degrees = degrees(problem, Where::VectorB(kind)).unwrap_or_default();
-        let own: Vec<_> = errors
-            .iter()
-            .filter(|(channel, _)| channels[*channel].sensor == kind)
-            .collect();
-        let solve = vector_of(problem, kind);
-        let (mut kept, mut last_s, mut sum) = (Vector3::zeros(), f64::NEG_INFINITY, 0.0);
-        for row in &rows {
-            let pull: Vector3<f64> = own
-                .iter()
-                .map(|(channel, error)| channels[*channel].axis_b * error[*row])
-                .sum();
-            let vector_b = solve * pull;
-            let forgotten = match kind {
-                Kind::Gyro => (-(starts_s[*row] - last_s) / FILTER_S).exp(),
-                _ => 0.0,
-            };
-            kept = kept * forgotten + vector_b * (1.0 - forgotten);
-            last_s = starts_s[*row];
-            sum += kept.norm_squared();
-        }
-        degrees * (sum / rows.len().max(1) as f64).sqrt()
-    };
-    [Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]
-        .map(of_kind)
-        .into_iter()
-        .fold(0.0, f64::max)
-}
-
-/// `(S'S)^-1` of a kind, which makes a vector of what its sensors feel along their axes; 1 where they are not of three axes.
-fn vector_of(problem: &Problem, kind: Kind) -> Matrix3<f64> {
-    let of_kind = problem.twin.unit().channels.iter().filter(|own| own.sensor == kind);
-    let square: Matrix3<f64> = of_kind.map(|own| own.axis_b * own.axis_b.transpose()).sum();
-    let inverse = square
-        .try_inverse()
-        .filter(|inverse| inverse.iter().all(|value| value.is_finite()));
-    inverse.unwrap_or_else(Matrix3::identity)
-}
-
-/// How far one sensor moves the vector of its kind: `|(S'S)^-1 s|`; at most 1.
+/// How far one sensor moves the vector of its kind: `|(S'S)^-1 s|`; 1 where its kind has no three axes.
 fn weight(problem: &Problem, channel: usize) -> f64 {
-    let own = &problem.twin.unit().channels[channel];
-    (vector_of(problem, own.sensor) * own.axis_b).norm().min(1.0)
+    let channels = &problem.twin.unit().channels;
+    let own = &channels[channel];
+    let of_kind = channels.iter().filter(|other| other.sensor == own.sensor);
+    let square: Matrix3<f64> = of_kind.map(|other| other.axis_b * other.axis_b.transpose()).sum();
+    let vector: Option<Vector3<f64>> = square.cholesky().map(|factor| factor.solve(&own.axis_b));
+    vector
+        .map(|vector| vector.norm())
+        .filter(|weight| weight.is_finite() && *weight < 1.0)
+        .unwrap_or(1.0)
 }
 
 fn unit(problem: &Problem, place: Where) -> &'static str {

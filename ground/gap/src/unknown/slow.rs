@@ -1,8 +1,7 @@
 //! Slow courses that a model leaves: in one sensor, in all of a kind, as a rotation, a factor, a delay.
 //!
 //! In: the problem, the model's effects with their parameters, how reference and field err slowly. Out: [`Beside`], and of it for each such
-//! discrepancy its [`Posterior`], with the whole model and without one of its effects; and what [`effects`] of the library are worth there,
-//! those that come and go in each stretch of time ([`passing`]).
+//! discrepancy its [`Posterior`], with the whole model and without one of its effects; and what [`effects`] of the library are worth there.
 //! Calibration, field, its gradient and the effects' parameters are open beside it with their prior sigmas; attitude error
 //! of the reference, field error and wandering zeros are taken out by [`crate::null::whitening`].
 //!
@@ -11,18 +10,16 @@
 mod effects;
 mod normal;
 mod open;
-mod passing;
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use twin::predict::{Feel, Kind};
 
 use self::{
     effects::{Asked, asked},
     normal::{Pass, Sums, Tried},
     open::open_columns,
-    passing::{Passing, passing},
 };
 use super::{
     binned::{BINS, Binned},
@@ -32,12 +29,7 @@ use super::{
 };
 use crate::{
     library::hypotheses::Library,
-    null::{
-        model::Model,
-        problem::{Component, Problem},
-        wander::felt_b,
-    },
-    thresholds::MEANS_TELL,
+    null::{model::Model, problem::Problem, wander::felt_b},
 };
 
 /// Courses in time: the last has a period of a sixteenth of the log.
@@ -106,13 +98,6 @@ struct Seen {
     reading: Vec<f64>,
 }
 
-/// Which effects of a library are tried: all, or the time of one of them, more closely.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Look {
-    /// That one.
-    pub only: Option<usize>,
-}
-
 /// What a model leaves, with all that is open beside it marginalised.
 pub struct Beside {
     sums: Sums,
@@ -124,32 +109,11 @@ pub struct Beside {
     of_effect: Vec<Range<usize>>,
     /// Effects of the library, tried after the courses.
     asked: Vec<Asked>,
-    /// Those that come and go, tried piece by piece after these.
-    passing: Vec<Passing>,
-    /// \[s\] when the log begins and ends.
-    span_s: [f64; 2],
-    /// Of each effect of the model, the part of what it does beyond the calibration that is left in means over short stretches.
-    seen: Vec<f64>,
 }
 
 impl Beside {
-    /// Of a model. `None` where there is no sample.
-    pub fn of(problem: &Problem, model: &Model, setting: &Setting) -> Option<Self> {
-        Self::tried(problem, model, setting, None, &Look::default())
-    }
-
-    /// The same, with effects of a library tried.
-    pub fn with(problem: &Problem, model: &Model, setting: &Setting, library: &Library, look: &Look) -> Option<Self> {
-        Self::tried(problem, model, setting, Some(library), look)
-    }
-
-    fn tried(
-        problem: &Problem,
-        model: &Model,
-        setting: &Setting,
-        library: Option<&Library>,
-        look: &Look,
-    ) -> Option<Self> {
+    /// Of a model; with a library its effects are tried too. `None` where there is no sample.
+    pub fn of(problem: &Problem, model: &Model, setting: &Setting, library: Option<&Library>) -> Option<Self> {
         let errors = setting.slow;
         let channels = &problem.twin.unit().channels;
         let rows = problem.fitted_rows();
@@ -167,9 +131,7 @@ impl Beside {
                 .iter()
                 .any(|channel| !seen[*channel].residuals[0].is_empty())
         });
-        let asked = library.filter(|_| look.only.is_none()).map_or_else(Vec::new, asked);
-        let pieces = passing::PIECES[usize::from(look.only.is_some())];
-        let passing = library.map_or_else(Vec::new, |library| passing(problem, library, look.only, pieces));
+        let asked = library.map_or_else(Vec::new, asked);
         let of_place = |slow: &Slow| Tried {
             channels: slow.channels.clone(),
             width: count * slow.place.components(),
@@ -181,7 +143,6 @@ impl Beside {
         let mut tried: Vec<Tried> = found.iter().map(of_place).collect();
         if let Some(library) = library {
             tried.extend(asked.iter().map(|asked| asked.tried(problem, library, &seen)));
-            tried.extend(passing.iter().map(|passing| passing.tried(problem, library, &seen)));
         }
         let pass = Pass {
             problem,
@@ -193,16 +154,12 @@ impl Beside {
         };
         let sums = pass.sums();
         drop(tried);
-        let in_means = (0..model.components.len()).map(|effect| in_means(problem, model, effect, &seen));
         Some(Beside {
             sums,
             found,
             count,
             of_effect: open.of_effect,
             asked,
-            passing,
-            span_s,
-            seen: in_means.collect(),
         })
     }
 
@@ -229,53 +186,11 @@ impl Beside {
 }
 
 impl Beside {
-    /// What the whole model leaves, in squares of noise.
-    pub fn energy(&self) -> f64 {
-        self.sums.without(0..0).map_or(f64::INFINITY, |all| all.energy(0))
-    }
-
-    /// By how much the parameters of each effect of the model should move; not at all where means do not tell of it.
-    pub fn moves(&self, problem: &Problem, model: &Model) -> Option<Vec<DVector<f64>>> {
-        let open = self.sums.without(0..0)?.found(0);
-        let moved = |(effect, component): (usize, &Component)| {
-            let parameters = component.active.cause.parameters(problem.twin.unit());
-            let own = self.of_effect[effect].clone().zip(&parameters);
-            let is_seen = f64::from(u8::from(self.sees(effect)));
-            DVector::from_iterator(
-                parameters.len(),
-                own.map(|(at, parameter)| is_seen * open[at] * parameter.prior_sigma),
-            )
-        };
-        Some(model.components.iter().enumerate().map(moved).collect())
-    }
-
-    /// Whether means over short stretches keep half of the amplitude of what an effect of the model does, so that [`Beside::worth`] tells of it.
-    pub fn sees(&self, effect: usize) -> bool {
-        self.seen[effect] >= MEANS_TELL
-    }
-
     /// \[nats\] that an effect of the model is worth.
     pub fn worth(&self, effect: usize) -> f64 {
         let fixed = self.sums.without(self.of_effect[effect].clone());
         fixed.map_or(0.0, |fixed| 0.5 * (fixed.energy(effect + 1) - fixed.energy(0)))
     }
-}
-
-/// Part of the energy of what an effect does beyond the calibration that means over short stretches keep.
-fn in_means(problem: &Problem, model: &Model, effect: usize, seen: &[Seen]) -> f64 {
-    let of_channel = |(channel, added): (usize, DVector<f64>)| {
-        let frame = &problem.frames[channel];
-        let left = frame.left(&added);
-        seen[channel]
-            .binned
-            .energies(|sample| left[sample] * frame.weights[sample])
-    };
-    let sums = problem
-        .contribution(&model.components, effect)
-        .into_iter()
-        .map(of_channel);
-    let [kept, all] = sums.fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
-    kept / all.max(f64::MIN_POSITIVE)
 }
 
 /// Of each stretch of the log, how far the courses have run there, 0 to 1, and how many stretches have samples: a course runs over the time
@@ -299,12 +214,14 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
     let mut binned = Binned::of(problem, channel, span_s, setting.louder[channel]);
     // What is left once all is fitted tells the noise; what the pass begins with is only about the effects.
     let rest = binned.means(|sample| model.fitted.rest[channel][sample] * frame.weights[sample]);
-    let mut factors = binned.factors(&rest);
-    if setting.wandering.contains(&channel) {
-        // A sample of a wandering zero says nothing of what is slow: the pass leaves it out.
-        factors.fill(f64::INFINITY);
-    }
-    (binned.variances.iter_mut().zip(factors)).for_each(|(variance, factor)| *variance *= factor);
+    let factor = binned.factor(&rest);
+    // A sample of a wandering zero says nothing of what is slow: the pass leaves it out.
+    let factor = if setting.wandering.contains(&channel) {
+        f64::INFINITY
+    } else {
+        factor
+    };
+    binned.variances.iter_mut().for_each(|variance| *variance *= factor);
     let predicted = problem.predict(channel, &model.components);
     let rows = &frame.series.rows;
     let left =

@@ -4,20 +4,11 @@
 
 use nalgebra::DVector;
 
-use crate::{
-    library::hypotheses::Library,
-    null::{interval::Interval, problem::Problem},
-    search::gauss_newton::model_of,
-};
+use crate::{library::hypotheses::Library, null::problem::Problem, search::gauss_newton::model_of};
 
 /// Takes the stretch of time from a hypothesis again.
-pub fn always(problem: &Problem, library: &mut Library, hypothesis: usize) {
-    timed(problem, library, hypothesis, None);
-}
-
-/// Has a hypothesis on in an interval.
-pub fn timed(problem: &Problem, library: &mut Library, hypothesis: usize, span: Option<Interval>) {
-    library.hypotheses[hypothesis].span = span;
+pub(super) fn always(problem: &Problem, library: &mut Library, hypothesis: usize) {
+    library.hypotheses[hypothesis].span = None;
     let zero = DVector::zeros(library.hypotheses[hypothesis].parameters.len());
     renew(problem, library, &[hypothesis], &[zero]);
 }

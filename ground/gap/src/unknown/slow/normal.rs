@@ -90,11 +90,6 @@ impl Marginal<'_> {
         self.sums.energies[residual] - pull.dot(&self.factor.solve(&pull))
     }
 
-    /// What is open, in prior sigmas, where nothing of it is dropped.
-    pub fn found(&self, residual: usize) -> DVector<f64> {
-        self.factor.solve(&self.sums.pull.column(residual).into_owned())
-    }
-
     /// Information and score of one that was tried, against one residual.
     pub fn of(&self, tried: usize, residual: usize) -> (DMatrix<f64>, DVector<f64>) {
         let (own, with_open, pull) = &self.sums.own[tried];
