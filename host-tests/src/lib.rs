@@ -4,6 +4,7 @@ mod coasting;
 pub mod counts;
 pub mod recorder;
 pub mod reference;
+pub mod replay;
 pub mod watched;
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};

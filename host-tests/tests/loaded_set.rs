@@ -2,17 +2,16 @@
 
 use emems::{
     calibration::{Ranges, Set},
-    derived::{self, Derived},
+    derived::Derived,
     estimate::Estimator,
     flight_log::{
         LOG_START, page,
         record::{self, Content},
     },
     nand::{PAGES_PER_BLOCK, PageAddress},
-    sample::Sample,
     unit::Settings,
 };
-use host_tests::{Flight, Flown, MS, S, set_words, world};
+use host_tests::{Flight, Flown, MS, S, replay, set_words, world};
 use twin::plant::Plant;
 
 fn nominal() -> Set {
@@ -42,26 +41,12 @@ fn flight() -> Flight {
 /// Cycles whose frame is not, bit for bit, what `sets` make of it, each from its cycle on.
 fn differing(flown: &Flown, sets: &[(u16, Set)]) -> Vec<u16> {
     let mut estimator = Estimator::of(&Settings::NOMINAL);
-    let mut differing = Vec::new();
-    for frame in &flown.derived {
+    replay::differing(flown, |frame, sample| {
         if let Some((_, set)) = sets.iter().find(|(from, _)| *from == frame.counter) {
             estimator = Estimator::new(*set, &Settings::NOMINAL.site);
         }
-        let packet = flown.packets.iter().find(|(_, packet)| packet.counter == frame.counter);
-        let sample = Sample {
-            reading: packet.expect("its packet").1,
-            start_us: frame.start_us,
-            slots_us: frame.slots_us,
-        };
-        let again = Derived {
-            estimate: estimator.step(&sample, &frame.increments),
-            ..*frame
-        };
-        if derived::encode(frame) != derived::encode(&again) {
-            differing.push(frame.counter);
-        }
-    }
-    differing
+        estimator.step(sample, &frame.increments)
+    })
 }
 
 #[test]

@@ -1,15 +1,14 @@
 //! A launch rail told over the umbilical: taken, contradicted, kept, and only where it may be.
 
 use emems::{
-    derived::{self, Derived},
+    derived::Derived,
     estimate::{Estimator, Site},
     flight_log::record::Content,
     mode::Cause,
     rail::Rail,
-    sample::Sample,
     unit::Settings,
 };
-use host_tests::{Flight, Flown, MS, S, recorder::contents, world};
+use host_tests::{Flight, Flown, MS, S, recorder::contents, replay, world};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 use twin::{
     motion::{Motion as _, SoundingRocket},
@@ -107,30 +106,18 @@ fn a_rail_lasts_over_a_reset_and_a_wrong_number_changes_nothing() {
     assert!(flying.replied("G_RA no: only in WAIT"), "{:?}", flying.replies());
 }
 
-/// Cycles whose frame is not, bit for bit, what the estimation makes of it with rails taken at these times \[us\].
+/// Cycles whose frame is not, bit for bit, what the estimation makes of it with rails taken at these times \[us\], each before the next
+/// cycle.
 fn differing(flown: &Flown, settings: &Settings, rails: &[(u64, Rail)]) -> Vec<u16> {
     let mut estimator = Estimator::of(settings);
-    let (mut differing, mut rails) = (Vec::new(), rails.iter().peekable());
-    for (number, frame) in flown.derived.iter().enumerate() {
-        let packet = flown.packets.iter().find(|(_, packet)| packet.counter == frame.counter);
-        let sample = Sample {
-            reading: packet.expect("its packet").1,
-            start_us: frame.start_us,
-            slots_us: frame.slots_us,
-        };
-        let again = Derived {
-            estimate: estimator.step(&sample, &frame.increments),
-            ..*frame
-        };
-        if derived::encode(frame) != derived::encode(&again) {
-            differing.push(frame.counter);
-        }
-        let next_us = flown.derived.get(number + 1).map_or(u64::MAX, |next| next.start_us);
-        while let Some((_, rail)) = rails.next_if(|(at_us, _)| (frame.start_us..next_us).contains(at_us)) {
+    let mut rails = rails.iter().peekable();
+    let differing = replay::differing(flown, |frame, sample| {
+        while let Some((_, rail)) = rails.next_if(|(at_us, _)| *at_us < frame.start_us) {
             assert_eq!(estimator.know_nose(&rail.nose(), true), Some(Ok(())), "{rail}");
         }
-    }
-    assert_eq!(rails.next(), None, "a rail outside of the flight");
+        estimator.step(sample, &frame.increments)
+    });
+    assert_eq!(rails.next(), None, "a rail after the flight");
     differing
 }
 

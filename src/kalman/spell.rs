@@ -16,7 +16,7 @@
 //! better than `v`: until then the gyros keep the heading.
 //!
 //! **Contradiction.** While norm and dip are the reference's and the heading is not, nothing tells which of field and attitude is
-//! wrong, and who has stood for longer is believed: the attitude stays until it has been contradicted for longer than the field stood
+//! wrong, and the one that has stood for longer is believed: the attitude stays until it has been contradicted for longer than the field stood
 //! by it, and is then found afresh. With the times as odds, and the contradiction `c` the error if the other side is right, there is a
 //! doubt about the vertical beside the covariance,
 //!

@@ -1,7 +1,7 @@
 //! The launch rail over the umbilical: G_RA with G_CK.
 //!
 //! A rail in use lasts over a reset, in retained memory; after a power cut it must be said again. In WAIT the filter takes it once for
-//! each attitude that is found, and the log keeps its numbers and when. One that contradicts the attitude is said to and left out. In
+//! each attitude that is found, and the log keeps its numbers and when. One that contradicts the attitude is announced and left out. In
 //! FLIGHT it is not looked at.
 
 use super::shared::Shared;
