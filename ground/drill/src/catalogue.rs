@@ -1,4 +1,4 @@
-//! The catalogue: 86 faults in five groups, each with its drill, its tests and what is open. Plain data.
+//! The catalogue: 86 faults in five groups, each with its drill and its tests. Plain data.
 //!
 //! A test is named `file: function`, the file from the root of the repository.
 
@@ -24,8 +24,6 @@ pub struct Row {
     pub drill: Drill,
     /// The tests that cover it, or what the drill cannot.
     pub tests: &'static [&'static str],
-    /// What the catalogue asks for and the unit or its tests do not give, and why; empty if nothing.
-    pub open: &'static str,
 }
 
 /// How a fault is drilled.
@@ -62,18 +60,11 @@ pub const CATALOGUE: [&[Row]; 5] = [
     &system::ROWS,
 ];
 
-const fn row(
-    id: &'static str,
-    fault: &'static str,
-    drill: Drill,
-    tests: &'static [&'static str],
-    open: &'static str,
-) -> Row {
+const fn row(id: &'static str, fault: &'static str, drill: Drill, tests: &'static [&'static str]) -> Row {
     Row {
         id,
         fault,
         drill,
         tests,
-        open,
     }
 }

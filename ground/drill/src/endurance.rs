@@ -1,7 +1,7 @@
-//! A long flight with faults that arrive at random: `ground drill --long`, after the catalogue.
+//! A long flight with faults that arrive at random: `ground drill day`, and `--long` after the catalogue.
 //!
-//! In: a seed, hours. Out: how many faults struck, and what the unit did. Faults of every kind that the host board can make come
-//! one after the other, 5 to 60 s apart, each for up to 20 s; every ten minutes the ground leads out of safe mode, and every two
+//! In: a board, a seed, seconds. Out: how many faults struck, and what the unit did. Faults of every kind that the board can make
+//! come one after the other, 5 to 60 s apart, each for up to 20 s; every ten minutes the ground leads out of safe mode, and every two
 //! hours it reads nothing out, erases the log and begins to record anew.
 //!
 //! Accepted is a flight in which
@@ -14,14 +14,17 @@
 //!
 //! What the unit has of memory is static and its stack is not the host's: the image's own test looks at that.
 
-use host_tests::{Flight, Flown, MS, S, recorder::draws, world};
+use host_tests::{Flown, MS, S, recorder::draws, world};
 use twin::{
     fault::{Planned, SENSOR_NAMES},
     part::Nanos,
     plant::Plant,
 };
 
-use crate::campaign::Told;
+use crate::{
+    campaign::Told,
+    flight::{Board, flown},
+};
 
 /// \[s\] between what the ground does.
 const LEAVES_SAFE_MODE_S: u64 = 600;
@@ -81,7 +84,8 @@ struct Arriving {
     excuses: bool,
 }
 
-fn arriving(seed: u64, until_s: u64) -> Vec<Arriving> {
+/// What befalls the unit of a board whose faults have this letter ([`twin::fault::Word::places`]).
+fn arriving(letter: char, seed: u64, until_s: u64) -> Vec<Arriving> {
     let mut draw = draws(seed, 86);
     let (mut plan, mut at_ms) = (Vec::new(), 10_000);
     while at_ms < until_s * 1000 {
@@ -103,13 +107,17 @@ fn arriving(seed: u64, until_s: u64) -> Vec<Arriving> {
         } else {
             format!("{at_ms}ms")
         };
-        let planned = format!("{text}@{when}");
+        let written = format!("{text}@{when}");
+        let planned: Planned = written.parse().unwrap_or_else(|error| panic!("the plan: {error}"));
+        if !planned.word.places.contains(letter) {
+            continue;
+        }
         let is_reset = RESETS.contains(&text.as_str()) || text.starts_with("hang");
         let is_stuck = text == "telemetry-stuck";
         let after = if is_reset { BACK } else { 400 * MS };
         plan.push(Arriving {
-            planned: planned.parse().unwrap_or_else(|error| panic!("the plan: {error}")),
-            text: planned,
+            planned,
+            text: written,
             felt: (at_ms * MS, ends_ms * MS + after),
             excuses: is_reset || is_stuck,
         });
@@ -119,38 +127,42 @@ fn arriving(seed: u64, until_s: u64) -> Vec<Arriving> {
 }
 
 /// Flies so long.
-pub fn fly(seed: u64, seconds: u64) -> Told {
-    let plan = arriving(seed, seconds.saturating_sub(QUIET_S));
-    let mut flight = Flight::ideal(world("still"));
-    flight.plant = Plant::new(world("still"), seed);
+pub fn fly(board: &Board<'_>, seed: u64, seconds: u64) -> Told {
+    let plan = arriving(board.letter(), seed, seconds.saturating_sub(QUIET_S));
+    let (mut strokes, mut said) = (Vec::new(), Vec::new());
+    let mut say = |at: Nanos, words: &[u8]| said.push((at, words.to_vec()));
     for (n, arriving) in plan.iter().enumerate() {
-        flight.faults.extend(arriving.planned.strokes(seed + n as u64));
+        strokes.extend(arriving.planned.strokes(seed + n as u64));
         if arriving.text.contains("umbilical-") {
             // The part that sends hangs, or finds its line stuck, when it has something to send.
-            flight = flight.say(arriving.felt.0 + MS, b"G_VE");
+            say(arriving.felt.0 + MS, b"G_VE");
         }
     }
-    flight = flight.say(S, b"G_MVG_MV").say(2 * S, b"G_MGG_MG");
+    say(S, b"G_MVG_MV");
+    say(2 * S, b"G_MGG_MG");
     for at_s in (LEAVES_SAFE_MODE_S..seconds - QUIET_S).step_by(LEAVES_SAFE_MODE_S as usize) {
-        flight = flight.say(at_s * S, b"G_XN");
+        say(at_s * S, b"G_XN");
     }
     for at_s in (BEGINS_ANEW_S..seconds - QUIET_S).step_by(BEGINS_ANEW_S as usize) {
-        flight = flight
-            .say((at_s + 1) * S, b"G_MEG_ME")
-            .say((at_s + 2) * S, b"G_MAG_CA")
-            .say((at_s + 30) * S, b"G_MVG_MVG_MGG_MG");
+        say((at_s + 1) * S, b"G_MEG_ME");
+        say((at_s + 2) * S, b"G_MAG_CA");
+        say((at_s + 30) * S, b"G_MVG_MVG_MGG_MG");
     }
     let end = seconds * S;
     // Derived frames of a day would fill the memory; those of the end are enough.
-    flight = flight
-        .say(end - 60 * S, b"G_XNG_MVG_MVG_MGG_MG")
-        .say(end - 5 * S, b"G_DL")
-        .say(end - 2 * S, b"G_ST");
-    flight.said.sort_by_key(|(at, _)| *at);
-    let flown = flight.fly(end);
-    Told {
-        struck: flown.report.struck.values().sum(),
-        did: judged(&plan, &flown),
+    say(end - 60 * S, b"G_XNG_MVG_MVG_MGG_MG");
+    say(end - 5 * S, b"G_DL");
+    say(end - 2 * S, b"G_ST");
+    said.sort_by_key(|(at, _)| *at);
+    match flown(board, Plant::new(world("still"), seed), strokes, said, end) {
+        Ok(flown) => Told {
+            struck: flown.report.struck.values().sum(),
+            did: judged(&plan, &flown),
+        },
+        Err(why) => Told {
+            struck: 0,
+            did: Err(why),
+        },
     }
 }
 
@@ -228,6 +240,8 @@ fn judged(plan: &[Arriving], flown: &Flown) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
+    use host_tests::Flight;
+
     use super::*;
 
     /// What is not excused is found.

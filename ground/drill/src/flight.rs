@@ -54,18 +54,30 @@ pub fn planned(text: &str) -> Vec<Planned> {
 
 /// Flies one plan of a drill; the reason if the unit's code panicked.
 pub fn fly(board: &Board<'_>, drill: &Fly, plan: &str, seed: u64) -> Result<Flown, String> {
-    let strokes = schedule(&planned(plan), seed);
     let said = drill
         .said
         .iter()
         .map(|(ms, words)| (ms * host_tests::MS, words.as_bytes().to_vec()));
-    let said: Vec<(Nanos, Vec<u8>)> = said.collect();
-    let end = drill.ms * host_tests::MS;
+    let plant = Plant::new(world(drill.motion), UNIT);
+    let strokes = schedule(&planned(plan), seed);
+    flown(board, plant, strokes, said.collect(), drill.ms * host_tests::MS)
+}
+
+/// Flies a plant until an instant, with what befalls it and what is said on the umbilical and when.
+///
+/// # Errors
+/// The unit's code panicked on the host, or the image cannot be flown.
+pub fn flown(
+    board: &Board<'_>,
+    plant: Plant,
+    strokes: Vec<Scheduled>,
+    said: Vec<(Nanos, Vec<u8>)>,
+    end: Nanos,
+) -> Result<Flown, String> {
     match board {
         Board::Host => {
-            let mut flight = Flight::ideal(world(drill.motion));
-            flight.plant = Plant::new(world(drill.motion), UNIT);
-            (flight.faults, flight.said) = (strokes, said);
+            let mut flight = Flight::ideal(world("still"));
+            (flight.plant, flight.faults, flight.said) = (plant, strokes, said);
             // A panic of the unit's code is what a drill may find.
             catch_unwind(AssertUnwindSafe(|| flight.fly(end))).map_err(|panic| {
                 let text = panic.downcast_ref::<String>().cloned();
@@ -73,25 +85,17 @@ pub fn fly(board: &Board<'_>, drill: &Fly, plan: &str, seed: u64) -> Result<Flow
                 format!("the unit panics: {}", text.unwrap_or_default())
             })
         }
-        Board::Image(image) => on_image(image, drill, &strokes, said, end),
+        Board::Image(image) => {
+            let mut framed = Framed {
+                flown: Flown::listening(said),
+                frame: Vec::new(),
+            };
+            let (report, cells) = image(plant, &strokes, end, &mut framed)?;
+            let mut flown = framed.flown;
+            (flown.report, flown.nand) = (report, Some(cells));
+            Ok(flown)
+        }
     }
-}
-
-fn on_image(
-    image: &OnImage<'_>,
-    drill: &Fly,
-    strokes: &[Scheduled],
-    said: Vec<(Nanos, Vec<u8>)>,
-    end: Nanos,
-) -> Result<Flown, String> {
-    let mut framed = Framed {
-        flown: Flown::listening(said),
-        frame: Vec::new(),
-    };
-    let (report, cells) = image(Plant::new(world(drill.motion), UNIT), strokes, end, &mut framed)?;
-    let mut flown = framed.flown;
-    (flown.report, flown.nand) = (report, Some(cells));
-    Ok(flown)
 }
 
 /// The emulated board's bytes as the frames that the host board gives.

@@ -13,10 +13,11 @@
 //! What neither can inject is covered by tests that the row names; a test of this package looks whether they are there, and
 //! `cargo host-test` runs them. Their verdict here is `by test`.
 //!
-//! A drill whose fault never struck is not accepted, whatever the unit did. A row may be open: its drills and tests pass, but the
-//! catalogue asks for more than the unit does. It is `not accepted`, with the reason.
+//! A drill whose fault never struck is not accepted, whatever the unit did. What is not accepted ends the
+//! command with exit code 1.
 //!
-//! `--long` flies more runs of each row, and then a day in which faults arrive at random ([`endurance`]).
+//! `--long` flies more runs of each row, and then a day in which faults arrive at random ([`endurance`]); with `--image` an hour.
+//! `ground drill day` flies that alone.
 //!
 //! `--guards` asks the opposite of the tests: does each fail without its guard ([`guards`])?
 //!
@@ -32,4 +33,4 @@ pub mod judge;
 mod table;
 
 pub use command::{Arguments, DrillError, run};
-pub use flight::OnImage;
+pub use flight::{Board, OnImage};

@@ -133,8 +133,8 @@ fn level(number: usize, size: Option<f64>) -> Level {
     match number {
         0 => Level::High,
         1 => Level::Low,
-        // 10 kHz, as of a relay's contact.
-        _ => Level::Bouncing(ms(size, 0.05).max(1)),
+        // Some 10 kHz, as of a relay's contact; at 0.05 each look of the unit, a whole millisecond after the last, saw the same side.
+        _ => Level::Bouncing(ms(size, 0.053).max(1)),
     }
 }
 

@@ -14,7 +14,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/mode/tests.rs: recording_and_packets_take_their_word_twice_within_ten_seconds",
             "host-tests/tests/umbilical.rs: one_wrong_bit_in_a_word_costs_a_report_at_most",
         ],
-        "",
     ),
     row(
         "C2",
@@ -24,7 +23,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/mode/tests.rs: no_lost_doubled_or_swapped_byte_erases_or_changes_to_a_mode_that_was_not_sent",
             "src/mode/tests.rs: no_two_bit_error_in_one_deed_erases",
         ],
-        "",
     ),
     row(
         "C3",
@@ -37,7 +35,6 @@ pub(super) const ROWS: [Row; 15] = [
             "ground/hostile/tests/replay.rs: commands",
             "host-tests/tests/umbilical.rs: a_parser_keeps_sixteen_letters_whatever_comes",
         ],
-        "",
     ),
     row(
         "C4",
@@ -53,14 +50,12 @@ pub(super) const ROWS: [Row; 15] = [
             "boards/emulated/tests/image.rs: a_framing_error_on_every_byte_loses_the_command_and_nothing_else",
             "host-tests/tests/guards.rs: c4_a_damaged_byte_ends_the_word_that_it_is_in",
         ],
-        "",
     ),
     row(
         "C5",
         "flood of words at the line's rate",
         Campaign("57 words every 20 ms", campaign::flood),
         &[],
-        "",
     ),
     row(
         "C6",
@@ -71,7 +66,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/mode/tests.rs: a_task_of_the_other_mode_is_refused",
             "host-tests/tests/recorder_unit.rs: lift_off_during_an_erase_is_recorded_all_the_same",
         ],
-        "",
     ),
     row(
         "C7",
@@ -82,14 +76,12 @@ pub(super) const ROWS: [Row; 15] = [
             "host-tests/tests/console.rs: a_flight_is_recorded_dumped_and_erased",
             "host-tests/tests/resets.rs: c7_arming_an_erase_and_erasing_are_in_the_log",
         ],
-        "",
     ),
     row(
         "C8",
         "half a word, then a pause",
         None,
         &["src/command.rs: a_half_word_is_forgotten_after_two_seconds"],
-        "",
     ),
     row(
         "C9",
@@ -116,7 +108,6 @@ pub(super) const ROWS: [Row; 15] = [
             },
         ]),
         &["ground/src/console/session.rs: the_console_goes_on_in_the_same_recording_after_a_replug"],
-        "",
     ),
     row(
         "C10",
@@ -132,7 +123,6 @@ pub(super) const ROWS: [Row; 15] = [
             "host-tests/tests/guards.rs: c10_on_a_slow_line_frames_are_whole_or_not_there",
             "host-tests/tests/guards.rs: c10_a_line_that_is_stuck_with_derived_frames_on_does_not_let_the_watchdog_bite",
         ],
-        "",
     ),
     row(
         "C11",
@@ -142,7 +132,6 @@ pub(super) const ROWS: [Row; 15] = [
             "ground/packets/src/stream/tests.rs: a_truncated_packet_costs_itself_only",
             "ground/packets/src/stream/tests.rs: two_packets_spliced_into_one_are_one_stretch",
         ],
-        "",
     ),
     row(
         "C12",
@@ -153,7 +142,6 @@ pub(super) const ROWS: [Row; 15] = [
             "ground/packets/src/stream/tests.rs: an_over_long_packet_is_rejected_and_the_next_one_found",
             "ground/packets/src/stream/tests.rs: starts_and_ends_within_a_packet_do_not_hide_the_next",
         ],
-        "",
     ),
     row(
         "C13",
@@ -164,7 +152,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/command.rs: a_range_takes_twelve_digits_and_names_a_wrong_one",
             "host-tests/tests/recorder_unit.rs: f19_a_dump_goes_on_where_it_was_interrupted",
         ],
-        "",
     ),
     row(
         "C14",
@@ -178,7 +165,6 @@ pub(super) const ROWS: [Row; 15] = [
             "ground/hostile/tests/replay.rs: recording",
             "ground/hostile/tests/replay.rs: csv",
         ],
-        "",
     ),
     row(
         "C15",
@@ -188,6 +174,5 @@ pub(super) const ROWS: [Row; 15] = [
             "host-tests/tests/umbilical.rs: every_word_is_on_the_page_of_threats_with_what_it_reads_and_writes",
             "host-tests/tests/umbilical.rs: what_is_asked_for_beyond_the_log_or_a_set_is_not_there",
         ],
-        "",
     ),
 ];

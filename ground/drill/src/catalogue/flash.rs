@@ -31,42 +31,36 @@ pub(super) const ROWS: [Row; 21] = [
         "power cut between any two operations of the NAND",
         Campaign("cut at one of the first 150 operations", campaign::one_cut),
         &["host-tests/tests/recorder_cuts.rs: a_cut_at_any_operation_in_any_way_loses_nothing"],
-        "",
     ),
     row(
         "F2",
         "power cut inside a page's program, torn in nine ways",
         Campaign("each operation torn in nine ways", campaign::one_cut),
         &["host-tests/tests/recorder_cuts.rs: a_cut_at_any_operation_in_any_way_loses_nothing"],
-        "",
     ),
     row(
         "F3",
         "unstable bits: a torn page reads differently each time",
         Campaign("weak and half-torn pages, read four times", campaign::unstable_bits),
         &["host-tests/tests/recorder_faults.rs: f03_a_torn_record_comes_back_as_itself_or_not_at_all"],
-        "",
     ),
     row(
         "F4",
         "power cut inside a block's erase",
         None,
         &["host-tests/tests/recorder_erase.rs: f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used"],
-        "",
     ),
     row(
         "F5",
         "second cut during recovery",
         Campaign("a cut, and another 1 to 12 operations later", campaign::two_cuts),
         &["host-tests/tests/recorder_cuts.rs: a_second_cut_soon_after_the_first_loses_nothing"],
-        "",
     ),
     row(
         "F6",
         "up to twelve cuts in one flight",
         Campaign("1 to 12 cuts, wrong bits, worn blocks", campaign::many_cuts),
         &["host-tests/tests/recorder_cuts.rs: many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing"],
-        "",
     ),
     row(
         "F7",
@@ -76,7 +70,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_erase.rs: f07_a_cut_at_any_operation_of_an_erase_leaves_the_old_log_or_none",
             "host-tests/tests/recorder_erase.rs: f07_an_erase_ordered_again_after_a_cut_and_cut_again_leaves_the_old_log_or_none",
         ],
-        "",
     ),
     row(
         "F8",
@@ -86,7 +79,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_unit.rs: f08_resets_at_random_instants_lose_no_record_and_end_in_flight",
             "boards/emulated/tests/recorder.rs: cuts_at_random_instants_lose_no_record_and_end_in_flight",
         ],
-        "",
     ),
     row(
         "F9",
@@ -96,14 +88,12 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_unit.rs: f09_a_power_cut_in_flight_ends_in_flight_and_recording",
             "host-tests/tests/recorder_unit.rs: f09_a_power_cut_without_lift_off_resumes_from_the_log_alone",
         ],
-        "",
     ),
     row(
         "F10",
         "factory bad blocks",
         None,
         &["host-tests/tests/recorder_faults.rs: f10_marked_blocks_are_neither_written_nor_erased_and_their_marks_stay"],
-        "",
     ),
     row(
         "F11",
@@ -113,7 +103,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_faults.rs: f11_a_block_that_wears_out_costs_no_record",
             "host-tests/tests/recorder_starts.rs: bad_blocks_beyond_those_that_are_remembered_do_not_stop_the_recorder",
         ],
-        "",
     ),
     row(
         "F12",
@@ -129,7 +118,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_faults.rs: f12_a_wrong_bit_in_every_half_page_costs_nothing_and_is_counted",
             "src/nand/ecc.rs: every_single_wrong_bit_is_put_right",
         ],
-        "",
     ),
     row(
         "F13",
@@ -139,14 +127,12 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_faults.rs: f13_any_lost_page_costs_at_most_the_newest_record",
             "src/nand/ecc.rs: two_wrong_bits_are_noticed_wherever_they_are",
         ],
-        "",
     ),
     row(
         "F14",
         "misdirected write, address line stuck",
         None,
         &["host-tests/tests/recorder_faults.rs: f14_pages_that_answer_for_others_are_noticed_and_never_erased"],
-        "",
     ),
     row(
         "F15",
@@ -157,7 +143,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_unit.rs: a_chip_that_comes_back_is_used_again",
             "host-tests/tests/recorder_unit.rs: f15_a_dead_or_absent_chip_costs_neither_packets_nor_the_console",
         ],
-        "",
     ),
     row(
         "F16",
@@ -167,7 +152,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_faults.rs: f16_a_full_log_stops_and_overwrites_nothing",
             "host-tests/tests/recorder_unit.rs: f16_a_full_recorder_says_so_and_packets_go_on",
         ],
-        "",
     ),
     row(
         "F17",
@@ -179,7 +163,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_superblock.rs: f17_foreign_content_is_left_alone_until_it_is_erased_by_command",
             "host-tests/tests/recorder_superblock.rs: f17_the_mode_of_an_older_save_gives_way_to_that_of_the_newest_record",
         ],
-        "",
     ),
     row(
         "F18",
@@ -189,7 +172,6 @@ pub(super) const ROWS: [Row; 21] = [
             "ground/hostile/tests/replay.rs: flight_log",
             "host-tests/tests/recorder_superblock.rs: f18_arbitrary_images_are_mounted_read_and_appended_to_in_bounded_time",
         ],
-        "",
     ),
     row(
         "F19",
@@ -212,7 +194,6 @@ pub(super) const ROWS: [Row; 21] = [
             "host-tests/tests/recorder_unit.rs: f19_a_dump_goes_on_where_it_was_interrupted",
             "ground/recorder/src/dump/tests.rs: wherever_it_is_unplugged_it_goes_on_and_ends_whole",
         ],
-        "",
     ),
     row(
         "F20",
@@ -224,13 +205,11 @@ pub(super) const ROWS: [Row; 21] = [
             "boards/emulated/tests/recorder.rs: a_failing_supply_begins_no_operation",
             "boards/emulated/tests/recorder.rs: a_dip_of_20_ms_costs_no_record",
         ],
-        "",
     ),
     row(
         "F21",
         "a million reads of a block",
         None,
         &["host-tests/tests/recorder_faults.rs: f21_a_million_reads_cost_corrected_bits_and_no_record"],
-        "",
     ),
 ];

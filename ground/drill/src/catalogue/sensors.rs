@@ -35,7 +35,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/cycle.rs: k_silent_sensors_cost_their_own_values_only",
             "boards/emulated/tests/faults.rs: a_silent_sensor_has_its_error_bit_until_it_answers_again",
         ],
-        "",
     ),
     row(
         "S2",
@@ -52,7 +51,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/guards.rs: s2_parts_that_run_out_of_time_at_once_leave_the_packet_its_deadline",
             "src/budget.rs: whatever_sensors_are_silent_the_others_have_time_and_the_packet_closes",
         ],
-        "",
     ),
     row(
         "S3",
@@ -76,7 +74,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/guards.rs: s3_a_part_that_holds_sda_costs_one_packet",
             "boards/emulated/tests/faults.rs: a_part_that_holds_sda_is_clocked_free",
         ],
-        "",
     ),
     row(
         "S4",
@@ -89,7 +86,6 @@ pub(super) const ROWS: [Row; 23] = [
             "boards/emulated/tests/faults.rs: a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free",
             "boards/emulated/tests/faults.rs: a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most",
         ],
-        "",
     ),
     row(
         "S5",
@@ -102,7 +98,6 @@ pub(super) const ROWS: [Row; 23] = [
             "boards/emulated/tests/faults.rs: a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free",
             "boards/emulated/tests/faults.rs: a_controller_that_sends_no_start_is_reset",
         ],
-        "",
     ),
     row(
         "S6",
@@ -122,14 +117,12 @@ pub(super) const ROWS: [Row; 23] = [
             "drivers/src/lis331hh/tests.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
             "drivers/src/tmp102.rs: a_part_that_does_not_acknowledge_is_a_bus_error",
         ],
-        "",
     ),
     row(
         "S7",
         "clock stretched for 20 ms",
         None,
         &["host-tests/tests/cycle.rs: a_part_that_stretches_the_clock_too_long_is_cut_off_and_all_others_are_read"],
-        "",
     ),
     row(
         "S8",
@@ -145,7 +138,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/guards.rs: s8_a_gyro_that_answers_at_random_adds_no_word_to_its_increments",
             "drivers/src/adis16265/tests.rs: a_held_line_is_not_a_gyro_but_a_still_one_is",
         ],
-        "",
     ),
     row(
         "S9",
@@ -156,7 +148,6 @@ pub(super) const ROWS: [Row; 23] = [
             "src/faults/repeat.rs: it_takes_five_repeats_at_3_mg_and_some_twenty_at_12",
             "host-tests/tests/faults.rs: healthy_units_raise_at_most_one_alarm_in_ten_hours",
         ],
-        "",
     ),
     row(
         "S10",
@@ -166,7 +157,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/guards.rs: s10_a_magnetometer_beyond_its_range_says_so",
             "drivers/src/hmc5883l/tests.rs: a_lock_left_by_a_partial_reading_is_opened_and_the_held_set_not_used",
         ],
-        "",
     ),
     row(
         "S11",
@@ -177,7 +167,6 @@ pub(super) const ROWS: [Row; 23] = [
             "src/kalman/tests/recovery.rs: a_saturated_spin_is_recovered_from_within_a_minute",
             "src/estimate/turn.rs: one_saturated_gyro_is_left_out_and_two_make_a_lower_bound",
         ],
-        "",
     ),
     row(
         "S12",
@@ -191,7 +180,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/guards.rs: s12_a_part_that_restarts_by_itself_is_found_by_the_verification_in_turn",
             "drivers/src/lis331hh/tests.rs: verify_finds_a_part_that_restarted",
         ],
-        "",
     ),
     row(
         "S13",
@@ -205,14 +193,12 @@ pub(super) const ROWS: [Row; 23] = [
             "src/calibration/tests.rs: exchanged_plates_swapped_axes_and_signs_are_refused",
             "drivers/src/lis331hh/tests.rs: another_part_is_refused_by_its_identity_and_not_written_to",
         ],
-        "",
     ),
     row(
         "S14",
         "axis reversed, axes swapped",
         None,
         &["host-tests/tests/faults.rs: s14_reversed_axes_and_swapped_ones_are_out_in_five_seconds_of_motion"],
-        "",
     ),
     row(
         "S15",
@@ -223,7 +209,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/faults.rs: s15_a_step_of_one_axis_is_isolated_in_a_second_or_in_five",
             "host-tests/tests/faults.rs: s15_ramps_and_scale_steps_of_one_axis_are_isolated",
         ],
-        "",
     ),
     row(
         "S16",
@@ -234,21 +219,18 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/faults.rs: s16_a_step_of_one_gyro_is_detected_in_a_second_or_in_five",
             "host-tests/tests/faults.rs: s16_a_gyro_is_isolated_by_the_vectors_at_rest_and_in_motion",
         ],
-        "",
     ),
     row(
         "S17",
         "tenfold noise on one axis",
         None,
         &["host-tests/tests/faults.rs: s17_tenfold_noise_is_out_within_ten_seconds"],
-        "",
     ),
     row(
         "S18",
         "two faults at once on different plates",
         None,
         &["host-tests/tests/faults.rs: s18_of_two_faults_on_different_plates_both_are_named"],
-        "",
     ),
     row(
         "S19",
@@ -260,7 +242,6 @@ pub(super) const ROWS: [Row; 23] = [
             "src/kalman/tests/iron.rs: a_magnet_on_its_way_past_is_no_iron_of_the_unit",
             "src/kalman/tests/disturbed.rs: a_disturbance_of_any_length_leaves_the_heading_right_or_said_to_be_wrong",
         ],
-        "",
     ),
     row(
         "S20",
@@ -270,7 +251,6 @@ pub(super) const ROWS: [Row; 23] = [
             "src/kalman/tests/force.rs: boost_and_free_fall_after_lift_off_do_not_move_it",
             "src/kalman/tests/force.rs: in_micro_gravity_the_field_bounds_what_it_can",
         ],
-        "",
     ),
     row(
         "S21",
@@ -280,7 +260,6 @@ pub(super) const ROWS: [Row; 23] = [
             "src/calibration/tests.rs: the_temperature_of_its_own_plate_corrects_an_axis",
             "src/calibration/tests.rs: beyond_its_validity_a_set_is_applied_as_at_its_end_and_says_so",
         ],
-        "",
     ),
     row(
         "S22",
@@ -290,7 +269,6 @@ pub(super) const ROWS: [Row; 23] = [
             "host-tests/tests/faults.rs: s22_a_sensor_that_sends_random_words_is_out_in_three_samples",
             "host-tests/tests/faults.rs: a_gyro_that_sends_random_words_is_detected",
         ],
-        "",
     ),
     row(
         "S23",
@@ -301,6 +279,5 @@ pub(super) const ROWS: [Row; 23] = [
             "src/increments.rs: gaps_and_time_going_back_are_not_integrated",
             "src/kalman/tests.rs: slot_times_and_delays_are_taken_off",
         ],
-        "",
     ),
 ];

@@ -27,7 +27,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/unit/vote.rs: any_one_of_the_eight_alone_keeps_the_watchdog_from_being_fed",
             "boards/emulated/tests/faults.rs: a_part_that_hangs_lets_the_watchdog_bite_and_flight_is_resumed",
         ],
-        "",
     ),
     row(
         "U2",
@@ -45,7 +44,6 @@ pub(super) const ROWS: [Row; 15] = [
             judge: judge::nearly_steady,
         }]),
         &["host-tests/tests/guards.rs: u2_a_processor_that_is_kept_busy_through_a_cycle_closes_the_packet_and_says_so"],
-        "",
     ),
     row(
         "U3",
@@ -65,7 +63,6 @@ pub(super) const ROWS: [Row; 15] = [
             "boards/emulated/tests/crash.rs: an_instruction_that_is_none_leaves_a_crash_record_and_the_unit_goes_on",
             "boards/emulated/tests/crash.rs: a_panic_leaves_a_crash_record_that_the_log_keeps",
         ],
-        "",
     ),
     row(
         "U4",
@@ -75,7 +72,6 @@ pub(super) const ROWS: [Row; 15] = [
             "boards/emulated/tests/crash.rs: a_stack_that_runs_over_leaves_a_crash_record_and_the_unit_goes_on",
             "boards/emulated/tests/image.rs: the_stack_stays_within_its_place_through_commands_self_test_and_faults",
         ],
-        "",
     ),
     row(
         "U5",
@@ -99,7 +95,6 @@ pub(super) const ROWS: [Row; 15] = [
             "host-tests/tests/safe_mode.rs: a_word_leaves_safe_mode_and_the_attitude_comes_back",
             "host-tests/tests/safe_mode.rs: a_minute_of_health_begins_the_count_anew",
         ],
-        "",
     ),
     row(
         "U6",
@@ -116,7 +111,6 @@ pub(super) const ROWS: [Row; 15] = [
             "boards/emulated/tests/image.rs: a_board_without_its_crystal_says_so_everywhere_and_flies_on",
             "boards/emulated/tests/image.rs: a_crystal_that_stops_in_flight_costs_a_reset_and_flight_goes_on",
         ],
-        "",
     ),
     row(
         "U7",
@@ -134,7 +128,6 @@ pub(super) const ROWS: [Row; 15] = [
             "ground/packets/src/stream/sequence.rs: a_day_is_numbered_without_a_break",
             "ground/packets/src/stream/sequence.rs: a_gap_is_missed_packets_also_over_the_wrap",
         ],
-        "",
     ),
     row(
         "U8",
@@ -151,7 +144,6 @@ pub(super) const ROWS: [Row; 15] = [
             judge: judge::time_goes_on,
         }]),
         &[],
-        "",
     ),
     row(
         "U9",
@@ -180,7 +172,6 @@ pub(super) const ROWS: [Row; 15] = [
             "boards/emulated/tests/crash.rs: a_flipped_bit_of_the_mode_in_ram_is_put_right_and_said",
             "boards/emulated/tests/crash.rs: flipped_bits_of_the_filter_in_ram_are_found_and_the_attitude_goes_on",
         ],
-        "",
     ),
     row(
         "U10",
@@ -196,7 +187,6 @@ pub(super) const ROWS: [Row; 15] = [
             "host-tests/tests/guards.rs: u10_a_bit_of_the_image_that_flips_is_said_and_in_the_status",
             "boards/emulated/tests/image.rs: the_status_has_the_checksum_of_the_image_and_another_one_for_another",
         ],
-        "",
     ),
     row(
         "U11",
@@ -232,7 +222,6 @@ pub(super) const ROWS: [Row; 15] = [
             "src/discrete.rs: a_glitch_of_two_polls_never_passes",
             "src/discrete.rs: a_bouncing_edge_passes_once",
         ],
-        "",
     ),
     row(
         "U12",
@@ -245,7 +234,6 @@ pub(super) const ROWS: [Row; 15] = [
             judge: judge::attitude_goes_by_the_norm,
         }]),
         &["host-tests/tests/flight.rs: lift_off_starts_flight_and_recording"],
-        "",
     ),
     row(
         "U13",
@@ -258,7 +246,6 @@ pub(super) const ROWS: [Row; 15] = [
             judge: judge::flight_goes_on_and_the_log_is_whole,
         }]),
         &["boards/emulated/tests/recorder.rs: a_record_is_durable_400_ms_after_a_power_cut_and_sooner_after_a_reset"],
-        "",
     ),
     row(
         "U14",
@@ -277,7 +264,6 @@ pub(super) const ROWS: [Row; 15] = [
             judge: judge::what_was_lost_is_counted,
         }]),
         &[],
-        "",
     ),
     row(
         "U15",
@@ -287,6 +273,5 @@ pub(super) const ROWS: [Row; 15] = [
             ".ci/supply: cargo deny --locked --workspace check --hide-inclusion-graph licenses bans sources",
             "ground/src/sbom.rs: a_package_that_is_not_from_a_registry_is_refused",
         ],
-        "",
     ),
 ];
