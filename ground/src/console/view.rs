@@ -74,7 +74,7 @@ pub fn draw(frame: &mut Frame, model: &Model, view: &View) {
     // On a small terminal a fresh reply comes before the table's last rows.
     let beside = frame.area().height.saturating_sub(state::LINES + 2);
     let reply = match view.scroll {
-        0 => reply_rows(model).min(beside.into()) as u16,
+        0 => reply_rows(model, frame.area().width).min(beside.into()) as u16,
         _ => 0,
     };
     let log = match view.page {
@@ -121,16 +121,12 @@ fn input_line(input: &Input) -> Line<'static> {
 const REPLY_SHOWN: Duration = Duration::from_secs(20);
 
 /// Rows that the last word and all that came after it take, while it is fresh.
-fn reply_rows(model: &Model) -> usize {
-    let after = model
-        .log
-        .iter()
-        .rev()
-        .take_while(|line| line.source != Source::Sent)
-        .count();
+fn reply_rows(model: &Model, width: u16) -> usize {
+    let unasked = |line: &&LogLine| line.source != Source::Sent;
+    let after = model.log.iter().rev().take_while(unasked).count();
     let asked = model.log.len().checked_sub(after + 1).and_then(|at| model.log.get(at));
     let fresh = |line: &LogLine| model.now.saturating_sub(line.at) < REPLY_SHOWN;
-    match asked {
+    let shown = match asked {
         Some(asked) if fresh(asked) => after + 1,
         // What the console answers itself has no word before it.
         _ => {
@@ -139,7 +135,9 @@ fn reply_rows(model: &Model) -> usize {
                 .take_while(|line| line.source == Source::Console && fresh(line))
                 .count()
         }
-    }
+    };
+    let lines = model.log.iter().rev().take(shown);
+    lines.map(|line| log_rows(line, width).len()).sum()
 }
 
 fn draw_body(frame: &mut Frame, area: Rect, model: &Model, view: &View) {
@@ -165,7 +163,7 @@ fn draw_body(frame: &mut Frame, area: Rect, model: &Model, view: &View) {
 }
 
 fn draw_log(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
-    let area = if area.height > 2 && usize::from(area.height) > reply_rows(model) {
+    let area = if area.height > 2 && usize::from(area.height) > reply_rows(model, area.width) {
         let title = if scroll > 0 {
             " log, scrolled back: PgDn "
         } else {
@@ -180,19 +178,60 @@ fn draw_log(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
     };
     let rows = usize::from(area.height);
     let end = model.log.len().saturating_sub(scroll).max(rows.min(model.log.len()));
-    let lines = model.log.range(end.saturating_sub(rows)..end).map(log_line);
-    frame.render_widget(Paragraph::new(lines.collect::<Vec<_>>()), area);
+    let lines = model.log.range(end.saturating_sub(rows)..end);
+    let mut lines: Vec<Line> = lines.flat_map(|line| log_rows(line, area.width)).collect();
+    lines.drain(..lines.len().saturating_sub(rows));
+    frame.render_widget(Paragraph::new(lines), area);
 }
 
 /// A line of the log.
 pub fn log_line(line: &LogLine) -> Line<'static> {
+    let (before, style) = before_text(line);
+    Line::styled(before + &line.text, style)
+}
+
+/// Columns of a log line's time and mark.
+const BEFORE_TEXT: usize = 12;
+
+fn before_text(line: &LogLine) -> (String, Style) {
     let (mark, style) = match line.source {
         Source::Unit => ("<", Style::new()),
         Source::Sent => (">", Style::new().fg(Color::Cyan)),
         Source::Console => ("*", Style::new().fg(Color::Yellow)),
         Source::Unread => ("!", Style::new().fg(Color::Red)),
     };
-    Line::styled(format!("{:9.2} {mark} {}", line.at.as_secs_f64(), line.text), style)
+    (format!("{:9.2} {mark} ", line.at.as_secs_f64()), style)
+}
+
+/// A line of the log, in as many rows as it takes; the later ones begin under the first one's text.
+fn log_rows(line: &LogLine, width: u16) -> Vec<Line<'static>> {
+    let (before, style) = before_text(line);
+    let mut rows = vec![before];
+    // A terminal too narrow for any text shows a letter a row.
+    let room = usize::from(width).saturating_sub(BEFORE_TEXT).max(1);
+    let mut taken = 0;
+    for (at, word) in line.text.split(' ').enumerate() {
+        let letters: Vec<char> = word.chars().collect();
+        let gap = usize::from(at > 0);
+        if taken > 0 && taken + gap + letters.len() > room {
+            rows.push(" ".repeat(BEFORE_TEXT));
+            taken = 0;
+        } else if let Some(row) = rows.last_mut() {
+            row.extend(std::iter::repeat_n(' ', gap));
+            taken += gap;
+        }
+        for part in letters.chunks(room) {
+            if taken + part.len() > room {
+                rows.push(" ".repeat(BEFORE_TEXT));
+                taken = 0;
+            }
+            if let Some(row) = rows.last_mut() {
+                row.extend(part);
+            }
+            taken += part.len();
+        }
+    }
+    rows.into_iter().map(|row| Line::styled(row, style)).collect()
 }
 
 fn hint_text(input: &Input) -> String {
@@ -319,6 +358,35 @@ mod tests {
             screen(&model, &view, 80, 24)[3].contains("x cnt"),
             "the table comes back"
         );
+    }
+
+    #[test]
+    fn a_reply_longer_than_the_screen_is_wide_goes_on_in_the_next_row() {
+        let mut model = model();
+        model.sent(Duration::from_secs(1), "G_ST");
+        let status = "G_ST clock crystal stack 9000 of 65536 bytes brown-out 2700 mV of 2700 image 0123ABCD";
+        let item = Item::Reply(status.into());
+        model.found(Duration::from_secs(1), Found { at: 0, item });
+        let rows = screen(&model, &View::default(), 80, 24);
+        assert!(rows[19].ends_with("> G_ST"), "{rows:#?}");
+        assert!(rows[20].ends_with("brown-out 2700 mV of"), "{rows:#?}");
+        assert_eq!(rows[21], "            2700 image 0123ABCD");
+        // A word without a gap is cut where the row ends, at any width.
+        let line = |text: &str| LogLine {
+            at: Duration::ZERO,
+            source: Source::Unit,
+            text: text.into(),
+        };
+        let whole = "x".repeat(100);
+        for width in 0..120 {
+            let rows = log_rows(&line(&whole), width);
+            let letters: usize = rows.iter().map(|row| row.to_string().matches('x').count()).sum();
+            assert_eq!(letters, 100, "{width}");
+            assert!(
+                rows.iter().all(|row| row.width() <= usize::from(width.max(13))),
+                "{width}"
+            );
+        }
     }
 
     #[test]
