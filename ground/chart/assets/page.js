@@ -343,6 +343,12 @@ class Panel {
           ctx.rotate(Math.PI / 2);
           ctx.textAlign = "left";
           ctx.textBaseline = "alphabetic";
+          // A rim of the page's colour: the next line is often closer than the name is wide.
+          ctx.setLineDash([]);
+          ctx.lineWidth = 4 * px;
+          ctx.lineJoin = "round";
+          ctx.strokeStyle = colour("--back");
+          ctx.strokeText(name, 0, 4 * px);
           ctx.fillStyle = colour("--soft");
           ctx.fillText(name, 0, 4 * px);
           ctx.restore();
