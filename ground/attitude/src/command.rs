@@ -54,15 +54,9 @@ pub struct Arguments {
     /// log's own columns are used
     #[arg(long, value_name = "FILE", requires = "log")]
     pub reference: Option<PathBuf>,
-    /// Seconds to add to the reference's times to have the log's
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        requires = "reference",
-        default_value_t = 0.0,
-        allow_hyphen_values = true
-    )]
-    pub offset_s: f64,
+    /// Seconds to add to the reference's times to have the log's [default: 0]
+    #[arg(long, value_name = "SECONDS", requires = "reference", allow_hyphen_values = true)]
+    pub offset_s: Option<f64>,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
     pub units: Units,
@@ -154,7 +148,7 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
     }
     let path = arguments.log.clone().unwrap_or_default();
     let reference = match &arguments.reference {
-        Some(file) => Some(reference::read(file, arguments.offset_s)?),
+        Some(file) => Some(reference::read(file, arguments.offset_s.unwrap_or_default())?),
         None => None,
     };
     let never = || AttitudeError::NeverMeet(arguments.reference.as_ref().unwrap_or(&path).display().to_string());
@@ -233,11 +227,19 @@ fn split(line: &str) -> (String, String) {
 /// What to say of a reference whose clock seems to be off.
 fn warning(arguments: &Arguments, offset: &Offset) -> String {
     let said = match arguments.reference {
-        Some(_) => format!("--offset-s {:.4}", arguments.offset_s + offset.later_s),
+        Some(_) => format!(
+            "--offset-s {:.4}",
+            arguments.offset_s.unwrap_or_default() + offset.later_s
+        ),
         None => format!("its times later by {:.4} s", offset.later_s),
     };
+    let used = match (&arguments.reference, arguments.offset_s) {
+        (Some(_), Some(_)) => "the errors are by the offset that was told",
+        (Some(_), None) => "the errors are by no offset, as none was told",
+        (None, _) => "the errors are by its times as they stand",
+    };
     format!(
-        "{:<28}the reference fits best with {said} (sigma {:.4} s): error about its mean {:.2} instead of {:.2} deg; used as told",
+        "{:<28}the reference fits best with {said} (sigma {:.4} s): error about its mean {:.2} instead of {:.2} deg; {used}",
         "warning", offset.sigma_s, offset.rms_deg[1], offset.rms_deg[0]
     )
 }

@@ -2,7 +2,7 @@
 //!
 //! In: CSV with the columns `counter` and the 36 channels by name (`a1x` .. `t4`); `errors` in hexadecimal, `lift_off` and
 //! `micro_g` where they are there. Out: readings in the order of the rows; an empty cell was not read. Refuses files
-//! without those columns and cells that are no whole number, with line and column.
+//! without those columns, tables in SI (with `t_s`, without `counter`) and cells that are no whole number, with line and column.
 
 use std::io::BufRead;
 
@@ -27,6 +27,9 @@ pub fn parse(file: &str, lines: impl BufRead) -> Result<Vec<Reading>, RecordingE
     let header = lines.next().transpose().map_err(io)?.unwrap_or_default();
     let names: Vec<&str> = header.trim_end().split(',').map(str::trim).collect();
     let place = |column: &'static str| names.iter().position(|name| *name == column);
+    if place("counter").is_none() && place("t_s").is_some() {
+        return Err(RecordingError::Converted { file: file.to_string() });
+    }
     let needed = |column: &'static str| {
         place(column).ok_or_else(|| RecordingError::Column {
             file: file.to_string(),
@@ -125,6 +128,9 @@ mod tests {
         assert!(error.to_string().contains("line 2, column \"a1x\""), "{error}");
         let error = parse("log.csv", "t_s,a1x\n".as_bytes()).expect_err("no counter");
         assert!(error.to_string().contains("counter"), "{error}");
+        let converted = table("0").replace(",counter,errors,lift_off,micro_g", "");
+        let error = parse("si.csv", converted.as_bytes()).expect_err("in SI");
+        assert!(error.to_string().contains("packets.txt or counts.csv"), "{error}");
         assert!(is_one("t_s,counter,a1x") && !is_one("t_s,gyr_x"));
     }
 }

@@ -52,6 +52,14 @@ pub enum RecordingError {
         /// What is there.
         found: String,
     },
+    /// Channels of the unit, converted.
+    #[error(
+        "{file}: no column \"counter\", so these are the unit's channels in SI; the filter runs on what the unit sent: packets.txt or counts.csv of the same flight"
+    )]
+    Converted {
+        /// Which file.
+        file: String,
+    },
     /// A cell is no number.
     #[error("{file}, line {line}, column {column:?}: {cell:?} is no finite number")]
     Cell {
