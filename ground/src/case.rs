@@ -35,7 +35,17 @@ pub enum Step {
     Check {
         /// Folder of the case
         folder: PathBuf,
+        /// Print the points as JSON
+        #[arg(long)]
+        json: bool,
     },
+}
+
+impl Step {
+    /// Whether standard output takes JSON.
+    pub fn json(&self) -> bool {
+        matches!(self, Step::Check { json: true, .. })
+    }
 }
 
 /// A case that cannot be made, or that lacks something.
@@ -56,9 +66,12 @@ pub enum StepError {
 pub fn case(step: &Step) -> Result<(), StepError> {
     match step {
         Step::New(arguments) => print!("{}", made::made(arguments)?),
-        Step::Check { folder } => {
+        Step::Check { folder, json } => {
             let checked = checked::checked(folder);
-            print!("{}", checked.text);
+            match json {
+                true => println!("{:#}", checked.json()),
+                false => print!("{}", checked.text),
+            }
             if !checked.is_whole {
                 return Err(StepError::Lacks(folder.clone()));
             }

@@ -1,6 +1,6 @@
 //! `ground effects`: what a unit may have and its description may lack.
 //!
-//! In: the library's own pages ([`twin::effect::Page`]), and for `--with` the trials' disturbances. Out: text: what each effect is, its
+//! In: the library's own pages ([`twin::effect::Page`]), and for `--with` the trials' disturbances. Out: text or JSON: what each effect is, its
 //! parameters with unit and usual size, what makes it show, what it is mistaken for, how to confirm it, and whether and
 //! where `ground fly --with` lets it strike. That physics is the trials' own and shares no equation with the library.
 
@@ -28,6 +28,9 @@ pub struct Arguments {
     /// Only effects whose name holds this
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
+    /// Print them as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Nothing of this name.
@@ -42,11 +45,38 @@ pub struct NoEffect(String);
 pub fn effects(arguments: &Arguments) -> Result<String, NoEffect> {
     let wanted = arguments.name.as_deref().unwrap_or_default();
     let pages = LIBRARY.iter().map(|effect| effect.page());
-    let text: String = pages.filter(|page| page.name.contains(wanted)).map(told).collect();
-    match text.is_empty() {
-        true => Err(NoEffect(wanted.to_owned())),
-        false => Ok(text),
+    let pages: Vec<&Page> = pages.filter(|page| page.name.contains(wanted)).collect();
+    match (pages.is_empty(), arguments.json) {
+        (true, _) => Err(NoEffect(wanted.to_owned())),
+        (false, true) => Ok(format!(
+            "{:#}\n",
+            serde_json::Value::from_iter(pages.into_iter().map(listed))
+        )),
+        (false, false) => Ok(pages.into_iter().map(told).collect()),
     }
+}
+
+/// The page for programs, under the names that the text has.
+fn listed(page: &Page) -> serde_json::Value {
+    let sizes = page.parameters.iter().map(|symbol| {
+        serde_json::json!({
+            "name": symbol.name,
+            "unit": symbol.unit,
+            "usual": symbol.prior_sigma,
+            "signed": symbol.signed,
+        })
+    });
+    serde_json::json!({
+        "name": page.name,
+        "what": page.physics,
+        "equation": page.equation,
+        "size": serde_json::Value::from_iter(sizes),
+        "source": page.source,
+        "shows": page.excited_by,
+        "mistaken": page.siblings,
+        "confirm": page.confirm_by,
+        "with": with(page.name),
+    })
 }
 
 fn told(page: &Page) -> String {
@@ -133,7 +163,11 @@ mod tests {
 
     #[test]
     fn every_effect_is_listed_with_all_that_is_to_be_known() {
-        let text = effects(&Arguments { name: None }).expect("all of them");
+        let text = effects(&Arguments {
+            name: None,
+            json: false,
+        })
+        .expect("all of them");
         for effect in LIBRARY {
             let page = effect.page();
             assert!(text.contains(&format!("{}\n    what", page.name)), "{}", page.name);
@@ -148,12 +182,14 @@ mod tests {
     fn a_name_narrows_the_list_and_a_strange_one_is_refused() {
         let text = effects(&Arguments {
             name: Some("hard-iron".into()),
+            json: false,
         })
         .expect("one");
         assert_eq!(text.matches("    what").count(), 1);
         assert!(
             effects(&Arguments {
-                name: Some("softiron".into())
+                name: Some("softiron".into()),
+                json: false,
             })
             .is_err()
         );

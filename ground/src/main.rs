@@ -83,6 +83,8 @@ fn prints_what_was_asked_for(command: &Command) -> bool {
         Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
         Command::Recover(arguments) => arguments.table.is_none() || arguments.json,
         Command::Size(arguments) => arguments.json,
+        Command::Case(step) => step.json(),
+        Command::Effects(arguments) => arguments.json,
         Command::Design(arguments) => arguments.prints_the_plan(),
         Command::Calibrate(arguments) => arguments.json(),
         Command::Calibration(arguments) => arguments.json(),

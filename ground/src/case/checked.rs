@@ -32,6 +32,27 @@ pub struct Checked {
     pub is_whole: bool,
 }
 
+impl Checked {
+    /// The points for programs: `whole`, and `points` of a `mark` (`ok`, `look`, `missing`) and what it `says`.
+    pub fn json(&self) -> serde_json::Value {
+        let mut points: Vec<(String, String)> = Vec::new();
+        for line in self.text.lines() {
+            match (line.split_once(' '), points.last_mut()) {
+                // A message of several lines goes on without a mark.
+                (Some((mark @ ("ok" | "look" | "missing"), says)), _) => {
+                    points.push((mark.to_owned(), says.trim().to_owned()));
+                }
+                (_, Some((_, says))) => says.extend(["\n", line]),
+                (_, None) => {}
+            }
+        }
+        let points = points
+            .into_iter()
+            .map(|(mark, says)| serde_json::json!({ "mark": mark, "says": says }));
+        serde_json::json!({ "whole": self.is_whole, "points": serde_json::Value::from_iter(points) })
+    }
+}
+
 /// Checks a case.
 pub fn checked(folder: &Path) -> Checked {
     let mut lines = Vec::new();
