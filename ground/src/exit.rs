@@ -18,9 +18,12 @@ use gap::GapError;
 use recorder::{dump::DumpError, recover::RecoverError};
 
 use crate::{
+    acceptance::AcceptanceError,
+    case::{StepError, made::MadeError},
     compare::CompareError,
     console,
     decode::DecodeError,
+    effects::NoEffect,
     fly::{FlyError, board::BoardError, source::SourceError},
     size::SizeError,
 };
@@ -89,6 +92,11 @@ fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
     false
 }
 
+/// Whether it is the file of an image that is at fault, not the board.
+fn is_bad_image(error: &BoardError) -> bool {
+    matches!(error, BoardError::Image(error) if error.is_of_the_file())
+}
+
 /// Whether it is the input or the command line that is at fault, not the world.
 fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
     if let Some(error) = error.downcast_ref::<CalibrateError>() {
@@ -111,10 +119,9 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
         return !matches!(error, RecoverError::Output(_));
     }
     if let Some(error) = error.downcast_ref::<FlyError>() {
-        let is_bad_image = |error: &BoardError| matches!(error, BoardError::Image(error) if error.is_of_the_file());
         return match error {
             FlyError::Board(error) => is_bad_image(error),
-            error => matches!(error, FlyError::Source(_) | FlyError::Plan(_)),
+            error => matches!(error, FlyError::Source(_) | FlyError::Plan(_) | FlyError::Disturb(_)),
         };
     }
     if let Some(error) = error.downcast_ref::<AllanError>() {
@@ -132,7 +139,17 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
     if let Some(error) = error.downcast_ref::<console::Error>() {
         return matches!(error, console::Error::NoPort(_));
     }
-    error.is::<TableError>() || error.is::<SourceError>() || error.is::<DesignError>()
+    if let Some(StepError::Made(error)) = error.downcast_ref() {
+        return !matches!(error, MadeError::File { .. });
+    }
+    if let Some(error) = error.downcast_ref::<AcceptanceError>() {
+        return match error {
+            AcceptanceError::Number(_) | AcceptanceError::NoPort(_) | AcceptanceError::OnlyEmulated => true,
+            AcceptanceError::Board(error) => is_bad_image(error),
+            _ => false,
+        };
+    }
+    error.is::<TableError>() || error.is::<SourceError>() || error.is::<DesignError>() || error.is::<NoEffect>()
 }
 
 #[cfg(test)]

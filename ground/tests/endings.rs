@@ -33,6 +33,10 @@ fn bad_input_is_code_2_with_the_reason_and_no_output() {
         &["decode", &page, "--no-such-option"],
         &["fly", "--image", &page],
         &["fly", "--image", &page, "--host"],
+        &["fly", "--host", "--unit", &page],
+        &["fly", "--host", "--with", "gyro-scale@z9"],
+        &["acceptance", &page],
+        &["effects", "no-such-effect"],
     ] {
         let output = run(words);
         assert_eq!(output.status.code(), Some(2), "{words:?}: {}", said(&output));
@@ -53,6 +57,40 @@ fn bad_input_is_code_2_with_the_reason_and_no_output() {
         !said(&run(&["attitude", &log, "--forces", "g"])).contains("--forces"),
         "what was said is believed"
     );
+}
+
+#[test]
+fn a_case_that_cannot_be_made_leaves_no_half_of_one() {
+    let place = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| place.path().join(name).display().to_string();
+    let flights = path("flights");
+    let words = [
+        "fly",
+        "--host",
+        "--motion",
+        "tumble",
+        "--duration",
+        "20s",
+        "--out",
+        &flights,
+    ];
+    assert!(run(&words).status.success());
+    let of = |name: &str| path(&format!("flights/tumble-1/{name}"));
+    let (log, motion, unit, out) = (of("packets.txt"), of("motion.csv"), of("unit.toml"), path("case"));
+    std::fs::write(path("page.html"), "<!doctype html><p>404").expect("written");
+    let new = |reference: &str| {
+        let words = ["--log", &log, "--unit", &unit, "--reference", reference, "--out", &out];
+        run(&[&["case", "new", "--latitude-deg=-23.2"][..], &words].concat())
+    };
+    let refused = new(&path("page.html"));
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(!std::path::Path::new(&out).exists(), "half a case");
+    // Nor is one that is there touched.
+    std::fs::create_dir(&out).expect("made");
+    std::fs::write(path("case/mine"), "mine").expect("written");
+    let refused = new(&motion);
+    assert!(said(&refused).contains("is there already"), "{}", said(&refused));
+    assert_eq!(std::fs::read(path("case/mine")).expect("there"), b"mine");
 }
 
 #[test]
@@ -108,7 +146,7 @@ fn it_says_its_commit_its_codes_and_its_words() {
 }
 
 #[test]
-fn fly_size_and_recover_speak_json() {
+fn what_prints_a_report_speaks_json_too() {
     let place = tempfile::tempdir().expect("temporary folder");
     let path = |name: &str| place.path().join(name).display().to_string();
     let json = |words: &[&str]| -> serde_json::Value {
@@ -132,6 +170,17 @@ fn fly_size_and_recover_speak_json() {
         "{flown}"
     );
     assert!(std::path::Path::new(flown["page"].as_str().expect("a page")).is_file());
+    let checked = run(&["case", "check", &path("flights"), "--json", "--quiet"]);
+    assert_eq!(checked.status.code(), Some(1), "{}", said(&checked));
+    let checked: serde_json::Value = serde_json::from_slice(&checked.stdout).expect("JSON of what is missing");
+    assert_eq!(
+        (&checked["whole"], &checked["points"][0]["mark"]),
+        (&false.into(), &"missing".into()),
+        "{checked}"
+    );
+    let effects = json(&["effects", "hard-iron", "--json", "--quiet"]);
+    assert_eq!(effects[0]["name"], "hard-iron");
+    assert_eq!(effects[0]["size"][0]["unit"], "uT", "{effects}");
     let size = json(&["size", env!("CARGO_BIN_EXE_ground"), "--json"]);
     assert_eq!(
         size["flash"].as_u64().expect("flash"),

@@ -131,12 +131,21 @@ pub enum MadeError {
 /// # Errors
 /// When no case can be made.
 pub fn made(arguments: &Arguments) -> Result<String, MadeError> {
+    make(&arguments.out)?;
+    let made = make_case(arguments);
+    if made.is_err() {
+        // Half a case would stand in the way of the next attempt. What cannot be removed does no other harm.
+        let _ = fs::remove_dir_all(&arguments.out);
+    }
+    made
+}
+
+fn make_case(arguments: &Arguments) -> Result<String, MadeError> {
     let mut said = Vec::new();
     let bytes = read_bytes(&arguments.log)?;
     let log_name = arguments.log.display().to_string();
     let (kind, slots) = format_of(&bytes, &log_name)?;
     let unit = unit(arguments, kind, slots.as_ref(), &mut said)?;
-    make(&arguments.out)?;
     let measured = if kind == LogKind::Packets {
         "measured.txt"
     } else {
@@ -291,9 +300,15 @@ fn forces_off(subject: &Subject) -> f64 {
 }
 
 fn make(folder: &Path) -> Result<(), MadeError> {
-    fs::create_dir(folder).map_err(|source| MadeError::File {
-        path: folder.into(),
-        source,
+    fs::create_dir(folder).map_err(|source| match source.kind() {
+        io::ErrorKind::AlreadyExists => MadeError::Wrong(format!(
+            "{} is there already and is left as it is; --out names another folder",
+            folder.display()
+        )),
+        _ => MadeError::File {
+            path: folder.into(),
+            source,
+        },
     })
 }
 
