@@ -13,6 +13,8 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 use std::{
     fs::File,
     io::{self, BufReader, Chain, Cursor, ErrorKind, Read},

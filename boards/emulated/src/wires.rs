@@ -125,9 +125,14 @@ impl Device for SensorPort {
         if register == Register::Cr1 {
             if cr1::SWRST.is_set(value) {
                 self.plant.lock().controller_reset();
-            } else if cr1::START.is_set(value) && self.plant.lock().start_is_refused() {
-                // It stays asked for, and nothing comes of it.
-                return registers.set(Register::Cr1, value);
+            } else if cr1::START.is_set(value) {
+                let mut plant = self.plant.lock();
+                // A line that is held keeps it pending, as `feel` has it; the plant counts that its fault was met.
+                plant.sda_in_the_way();
+                if plant.start_is_refused() {
+                    // It stays asked for, and nothing comes of it.
+                    return registers.set(Register::Cr1, value);
+                }
             }
         }
         self.i2c.write(register, value, registers, context);
