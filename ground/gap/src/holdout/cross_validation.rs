@@ -104,7 +104,7 @@ fn blocks(problem: &Problem) -> Vec<Vec<usize>> {
 /// Whether most of an effect is in one block.
 fn is_event(problem: &Problem, components: &[Component], index: usize, blocks: &[Vec<usize>]) -> bool {
     let mut energies = [0.0; BLOCKS];
-    for (channel, apart) in problem.contribution(components, index) {
+    for (channel, apart) in problem.contribution(components, &[index]) {
         for (value, block) in apart.iter().zip(&blocks[channel]) {
             energies[*block] += value * value;
         }

@@ -13,6 +13,8 @@
 
 mod frame;
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 use twin::{
     effect::{Active, Cause},
@@ -265,10 +267,28 @@ impl<'a> Problem<'a> {
         DVector::from_iterator(frame.series.rows.len(), errors)
     }
 
-    /// What `model[of]` adds to each channel it touches at every row, in physical units.
-    pub fn added(&self, model: &[Component], of: usize) -> Vec<(usize, Vec<f64>)> {
-        let mut others = model.to_vec();
-        let own = others.remove(of);
+    /// Places in a model of the parts of one effect that are one name with `model[of]`, which is among them: at several places with channels in
+    /// common, such as what all plates share and what each has of its own. They are fitted together and mean nothing alone. One effect
+    /// twice at one place is two events.
+    pub fn parts(&self, model: &[Component], of: usize) -> Vec<usize> {
+        let channels = |at: usize| model[at].active.cause.channels(self.twin.unit());
+        let (own, place) = (&model[of].active.cause, channels(of));
+        let is_part = |at: &usize| {
+            let other = &model[*at].active.cause;
+            let is_elsewhere = other.effect.page().name == own.effect.page().name && other.locality != own.locality;
+            *at == of || is_elsewhere && channels(*at).iter().any(|channel| place.contains(channel))
+        };
+        (0..model.len()).filter(is_part).collect()
+    }
+
+    /// What parts of a model add to each channel they touch at every row, in physical units.
+    pub fn added(&self, model: &[Component], of: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        let (own, others): (Vec<_>, Vec<_>) = model.iter().enumerate().partition(|(at, _)| of.contains(at));
+        let others: Vec<Component> = others.into_iter().map(|(_, component)| component.clone()).collect();
+        let touched = own
+            .iter()
+            .flat_map(|(_, component)| component.active.cause.channels(self.twin.unit()));
+        let touched: BTreeSet<usize> = touched.collect();
         let difference = |channel: usize| {
             let pairs = self
                 .predict(channel, model)
@@ -276,12 +296,11 @@ impl<'a> Problem<'a> {
                 .zip(self.predict(channel, &others));
             (channel, pairs.map(|(with, without)| with - without).collect())
         };
-        let touched = own.active.cause.channels(self.twin.unit());
         touched.into_iter().map(difference).collect()
     }
 
     /// The same at the fitted samples, in units of noise.
-    pub fn contribution(&self, model: &[Component], of: usize) -> Vec<(usize, DVector<f64>)> {
+    pub fn contribution(&self, model: &[Component], of: &[usize]) -> Vec<(usize, DVector<f64>)> {
         let fitted = |(channel, added): (usize, Vec<f64>)| {
             let frame = &self.frames[channel];
             let rows = frame.series.rows.iter().zip(frame.weights.iter());
@@ -390,3 +409,6 @@ fn white_sigma<'a>(twin: &'a Twin, instrument: &'a Reference, index: usize) -> i
     let sharing: f64 = beside.map(|own| own.axis_b.dot(&channel.axis_b).powi(2)).sum();
     move |row| (channel.sigma()).hypot(sharing.sqrt() * instrument.fast_sigma(index, row))
 }
+
+#[cfg(test)]
+mod tests;

@@ -130,7 +130,7 @@ pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<
     let model: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
     let rest = space.rest(&space.project_residual(residual_of(space.problem, &model), prior));
     let strength = |(at, (component, covariance)): (usize, &Fitted)| {
-        let added = space.problem.contribution(&model, at);
+        let added = space.problem.contribution(&model, &[at]);
         let own_rest = space.rest(&space.project(added.clone()));
         let energy = dot(&added, &own_rest);
         let is_sized = component.active.cause.effect.page().nature != Nature::Discrete;

@@ -76,7 +76,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
         let page = hypothesis.cause.effect.page();
         let mut energy = vec![0.0; feels.len()];
         let mut by_channel = Vec::new();
-        for (channel, added) in problem.contribution(&model, index) {
+        for (channel, added) in problem.contribution(&model, &[index]) {
             let rows = &problem.frames[channel].series.rows;
             (rows.iter().zip(added.iter())).for_each(|(row, value)| energy[*row as usize] += value * value);
             by_channel.push((channel, added.norm_squared()));

@@ -217,7 +217,7 @@ pub fn promises(
     }
     let error = FitError::of(problem, model);
     let promised = |(index, cause): (usize, &mut Cause)| {
-        let added = problem.added(&model.components, index);
+        let added = problem.added(&model.components, &[index]);
         let open: Vec<_> = added.iter().map(|(channel, _)| problem.still_open(*channel)).collect();
         let hypothesis = &library.hypotheses[chosen[index].hypothesis];
         let promise = held.promise(Claimed {

@@ -6,6 +6,7 @@
 //! A real unit is off by a little everywhere, and thousands of samples make any of it significant: a gyro's scale that is off by two of its
 //! sigmas is fifty nats and a hundredth of the noise. That is for the calibration, and no name. So a name must explain what would
 //! matter without it, by the bars of the remainder: a slow course above its bar, or in some channel a growth of the gap above the user's.
+//! Parts of one effect that share channels go together ([`Problem::parts`]): without one of them the others take its place.
 
 use twin::effect::Texture;
 
@@ -50,7 +51,7 @@ impl Importance {
         let setting = setting(subject, explanation);
         let beside = Beside::of(problem, model, &setting, None)?;
         let matters = |effect: usize| {
-            let channels = problem.contribution(&model.components, effect);
+            let channels = problem.contribution(&model.components, &problem.parts(&model.components, effect));
             let is_its = |slow: &&Slow| channels.iter().any(|(channel, _)| slow.channels.contains(channel));
             let without = courses(problem, &beside, &setting, Some(effect));
             let slow = without.iter().filter(is_its);
@@ -89,7 +90,7 @@ pub fn setting<'a>(subject: &'a Subject, explanation: &'a Explanation) -> Settin
 fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> bool {
     let bar = (1.0 + setting.bars.gap_sigma).powi(2) - 1.0;
     problem
-        .contribution(&model.components, effect)
+        .contribution(&model.components, &problem.parts(&model.components, effect))
         .into_iter()
         .any(|(channel, added)| {
             let left = problem.in_sigmas(channel, &problem.frames[channel].left(&added));

@@ -240,7 +240,7 @@ fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Opt
     let model: Vec<Component> = chosen.iter().map(component).collect();
     let mut places: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
     for (at, one) in chosen.iter().enumerate().filter(|(_, one)| one.gain >= least) {
-        let added = problem.contribution(&model, at);
+        let added = problem.contribution(&model, &[at]);
         let total: f64 = added.iter().map(|(_, values)| values.norm_squared()).sum();
         let own = added
             .iter()

@@ -11,8 +11,6 @@ mod effects;
 mod normal;
 mod open;
 
-use std::ops::Range;
-
 use nalgebra::DMatrix;
 use twin::predict::{Feel, Kind};
 
@@ -89,7 +87,7 @@ pub struct Slow {
 /// What a channel has.
 struct Seen {
     binned: Binned,
-    /// What the whole model leaves, and what it leaves without each of its effects.
+    /// What the whole model leaves, and what it leaves without each of its effects and all parts of it.
     residuals: Vec<Vec<f64>>,
     /// What the unit does at each of its samples.
     feels: Vec<Feel>,
@@ -105,8 +103,8 @@ pub struct Beside {
     found: Vec<Slow>,
     /// Courses of each.
     count: usize,
-    /// Which open parameters are each effect's of the model.
-    of_effect: Vec<Range<usize>>,
+    /// Which open parameters are each effect's of the model, with all parts of it ([`Problem::parts`]).
+    of_effect: Vec<Vec<usize>>,
     /// Effects of the library, tried after the courses.
     asked: Vec<Asked>,
 }
@@ -166,7 +164,7 @@ impl Beside {
     /// The slow courses, with the whole model or without one of its effects; `about` is the size, in physical units, about which the grid
     /// of sizes is.
     pub fn courses(&self, without: Option<usize>, about: &dyn Fn(&Slow) -> f64) -> Vec<Slow> {
-        let dropped = without.map_or(0..0, |effect| self.of_effect[effect].clone());
+        let dropped = without.map_or(&[][..], |effect| &self.of_effect[effect]);
         let Some(marginal) = self.sums.without(dropped) else {
             return Vec::new();
         };
@@ -186,9 +184,9 @@ impl Beside {
 }
 
 impl Beside {
-    /// \[nats\] that an effect of the model is worth.
+    /// \[nats\] that an effect of the model is worth, with all parts of it.
     pub fn worth(&self, effect: usize) -> f64 {
-        let fixed = self.sums.without(self.of_effect[effect].clone());
+        let fixed = self.sums.without(&self.of_effect[effect]);
         fixed.map_or(0.0, |fixed| 0.5 * (fixed.energy(effect + 1) - fixed.energy(0)))
     }
 }
@@ -228,8 +226,9 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
         |predicted: &[f64]| binned.means(|sample| frame.series.values[sample] - predicted[rows[sample] as usize]);
     let mut residuals = vec![left(&predicted)];
     residuals.extend((0..model.components.len()).map(|without| {
-        let mut others = model.components.clone();
-        others.remove(without);
+        let parts = problem.parts(&model.components, without);
+        let others = (0..model.components.len()).filter(|at| !parts.contains(at));
+        let others: Vec<_> = others.map(|at| model.components[at].clone()).collect();
         left(&problem.predict(channel, &others))
     }));
     let feels = problem.true_twin().feels(channel);

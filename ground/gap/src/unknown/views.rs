@@ -113,7 +113,7 @@ pub fn views(problem: &Problem, read: &[Vec<f64>]) -> Vec<View> {
 pub fn suspects(problem: &Problem, model: &Model) -> Vec<Suspect> {
     let suspect = |index: usize| Suspect {
         name: model.components[index].active.cause.effect.page().name.to_owned(),
-        entries: problem.contribution(&model.components, index),
+        entries: problem.contribution(&model.components, &[index]),
     };
     (0..model.components.len()).map(suspect).collect()
 }

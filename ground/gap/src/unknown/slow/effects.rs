@@ -77,7 +77,7 @@ impl Asked {
 impl Beside {
     /// Of each hypothesis that was tried, its index and its normal equations beside the whole model.
     pub fn effects(&self, library: &Library) -> Vec<(usize, Screen)> {
-        let Some(marginal) = self.sums.without(0..0) else {
+        let Some(marginal) = self.sums.without(&[]) else {
             return Vec::new();
         };
         let mut screens = Vec::new();

@@ -4,8 +4,6 @@
 //! what its own pass of [`crate::null::whitening`] says, and of these the information and the score of what is tried with all else
 //! marginalised.
 
-use std::ops::Range;
-
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use twin::predict::Kind;
 
@@ -65,7 +63,7 @@ impl Sums {
     }
 
     /// What is open, factored, but for some of it that is not there.
-    pub fn without(&self, dropped: Range<usize>) -> Option<Marginal<'_>> {
+    pub fn without(&self, dropped: &[usize]) -> Option<Marginal<'_>> {
         let kept: Vec<usize> = (0..self.open.nrows()).filter(|at| !dropped.contains(at)).collect();
         let open = self.open.select_rows(&kept).select_columns(&kept);
         Some(Marginal {

@@ -4,8 +4,6 @@
 //! In: the problem with its model, and what each channel has ([`Seen`]). Out: [`Open`], a column for each open parameter, averaged as the
 //! residual is and scaled to one prior sigma.
 
-use std::ops::Range;
-
 use nalgebra::DVector;
 
 use super::Seen;
@@ -18,8 +16,8 @@ use crate::{
 pub(super) struct Open {
     /// For each parameter, per channel that it touches the means of its column, for one prior sigma.
     pub columns: Vec<Vec<(usize, Vec<f64>)>>,
-    /// Which of them are each effect's.
-    pub of_effect: Vec<Range<usize>>,
+    /// Which of them are each effect's, with all parts of it ([`Problem::parts`]).
+    pub of_effect: Vec<Vec<usize>>,
 }
 
 pub(super) fn open_columns(problem: &Problem, model: &Model, errors: &SlowErrors, seen: &[Seen]) -> Open {
@@ -49,7 +47,7 @@ pub(super) fn open_columns(problem: &Problem, model: &Model, errors: &SlowErrors
         };
         open.push(column.entries.iter().map(means).collect());
     }
-    let mut of_effect = Vec::new();
+    let mut of_part = Vec::new();
     for (at, component) in model.components.iter().enumerate() {
         let first = open.len();
         let parameters = component.active.cause.parameters(problem.twin.unit());
@@ -61,8 +59,11 @@ pub(super) fn open_columns(problem: &Problem, model: &Model, errors: &SlowErrors
             };
             open.push(column.iter().map(means).collect());
         }
-        of_effect.push(first..open.len());
+        of_part.push(first..open.len());
     }
+    let parts = (0..of_part.len()).map(|effect| problem.parts(&model.components, effect));
+    let of_effect = parts.map(|parts| parts.into_iter().flat_map(|part| of_part[part].clone()).collect());
+    let of_effect = of_effect.collect();
     Open {
         columns: open,
         of_effect,
