@@ -53,13 +53,10 @@ fn run() -> Result<(), String> {
     eprintln!("{} mutants", mutants.len());
     let built = built::built(&root, &mutants, &tests)?;
     let notes = root.join("target/mutants");
-    let mut tests = tried::tests(&built.programs, &notes, WORKERS);
     let longest = longest.map_or(Duration::MAX, Duration::from_secs_f64);
+    let tests = tried::tests(&built.programs, &notes, longest, WORKERS);
     let all: Duration = tests.iter().map(|test| test.takes).sum();
-    let before = tests.len();
-    tests.retain(|test| test.takes <= longest);
-    let kept: Duration = tests.iter().map(|test| test.takes).sum();
-    eprintln!("{before} tests, {all:.1?}; {} of them used, {kept:.1?}", tests.len());
+    eprintln!("{} tests, {all:.1?} one after another", tests.len());
     let done = AtomicUsize::new(0);
     let verdicts = tried::each(mutants.len(), WORKERS, |number| {
         let verdict = if built.unviable.contains(&number) {

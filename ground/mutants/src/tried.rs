@@ -54,8 +54,9 @@ fn names(program: &(PathBuf, PathBuf), more: &[&str]) -> BTreeSet<String> {
     text.lines().filter_map(|line| Some(line.strip_suffix(": test")?.to_string())).collect()
 }
 
-/// Every test of the programs, run once alone without a mutant; one that fails so is told and left out.
-pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, workers: usize) -> Vec<Test> {
+/// Every test of the programs, run once alone without a mutant; one that fails so, or takes longer than `longest`, is told and
+/// left out.
+pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, workers: usize) -> Vec<Test> {
     let mut all = Vec::new();
     for program in programs {
         let ignored = names(program, &["--ignored"]);
@@ -68,12 +69,13 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, workers: usize) -> V
         let began = Instant::now();
         let mut run = command(program);
         run.args(["--exact", name]).env("MUTANTS_REACHED", &note).stdout(Stdio::null());
-        let passes = run.status().is_ok_and(|status| status.success());
+        let passes = ended(run.spawn().ok()?, began, longest);
         let takes = began.elapsed();
         let text = fs::read_to_string(&note).unwrap_or_default();
         let reached = text.lines().filter_map(|line| line.parse().ok()).collect();
-        if !passes {
-            eprintln!("left out, fails without a mutant: {name}");
+        if passes != Some(true) {
+            let why = if passes.is_none() { "takes too long" } else { "fails without a mutant" };
+            eprintln!("left out, {why}: {name}");
             return None;
         }
         Some(Test { program: program.clone(), name: name.clone(), takes, reached })
@@ -81,6 +83,21 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, workers: usize) -> V
     .into_iter()
     .flatten()
     .collect()
+}
+
+/// Whether it ended well, or nothing if it was ended because it took too long.
+fn ended(mut child: Child, began: Instant, longest: Duration) -> Option<bool> {
+    loop {
+        match child.try_wait() {
+            Ok(None) if began.elapsed() < longest => thread::sleep(Duration::from_millis(2)),
+            Ok(Some(status)) => return Some(status.success()),
+            _ => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return None;
+            }
+        }
+    }
 }
 
 /// `of(0)` to `of(count - 1)` by some workers, the results in order.
