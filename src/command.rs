@@ -373,6 +373,29 @@ mod tests {
         assert_eq!(parser.passed_over, 4);
     }
 
+    /// A ground that sends a letter every two seconds is heard: forgetting begins after them, not with them.
+    #[test]
+    fn a_half_word_is_kept_for_two_seconds() {
+        let mut parser = Parser::default();
+        let words = b"G_ST".iter().zip(0..);
+        let heard: Vec<_> = words
+            .filter_map(|(byte, at)| parser.hear(*byte, at * HALF_WORD_TIMEOUT_US))
+            .collect();
+        assert_eq!(heard, [Heard::Command(Command::Status)]);
+    }
+
+    /// The status tells what was passed over as a sign of a bad line: a terminal that ends its lines is none.
+    #[test]
+    fn line_ends_and_blanks_are_not_counted_as_passed_over() {
+        let mut parser = Parser::default();
+        for byte in b"\r\n G_ST\r\n" {
+            parser.hear(*byte, 0);
+        }
+        assert_eq!(parser.passed_over, 0);
+        parser.hear(b'x', 0);
+        assert_eq!(parser.passed_over, 1);
+    }
+
     #[test]
     fn a_range_takes_twelve_digits_and_names_a_wrong_one() {
         assert_eq!(

@@ -24,8 +24,10 @@ pub struct Test {
     pub program: (PathBuf, PathBuf),
     /// Its name within that program.
     pub name: String,
-    /// How long it takes.
+    /// How long it takes; as long as a test may at most, if it takes longer.
     pub takes: Duration,
+    /// It takes longer: it is ended then, and has not failed.
+    pub cut: bool,
     /// The mutants that it passes.
     pub reached: BTreeSet<usize>,
 }
@@ -54,8 +56,8 @@ fn names(program: &(PathBuf, PathBuf), more: &[&str]) -> BTreeSet<String> {
     text.lines().filter_map(|line| Some(line.strip_suffix(": test")?.to_string())).collect()
 }
 
-/// Every test of the programs, run once alone without a mutant; one that fails so, or takes longer than `longest`, is told and
-/// left out.
+/// Every test of the programs, run once alone without a mutant; one that fails so is told and left out. One
+/// that takes longer than `longest` is ended then.
 pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, workers: usize) -> Vec<Test> {
     let mut all = Vec::new();
     for program in programs {
@@ -73,12 +75,15 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, w
         let takes = began.elapsed();
         let text = fs::read_to_string(&note).unwrap_or_default();
         let reached = text.lines().filter_map(|line| line.parse().ok()).collect();
-        if passes != Some(true) {
-            let why = if passes.is_none() { "takes too long" } else { "fails without a mutant" };
-            eprintln!("left out, {why}: {name}");
+        if passes == Some(false) {
+            eprintln!("left out, fails without a mutant: {name}");
             return None;
         }
-        Some(Test { program: program.clone(), name: name.clone(), takes, reached })
+        let cut = passes.is_none();
+        if cut {
+            eprintln!("ended after {takes:.0?}: {name}");
+        }
+        Some(Test { program: program.clone(), name: name.clone(), takes, cut, reached })
     })
     .into_iter()
     .flatten()
@@ -132,7 +137,7 @@ pub fn tried(mutant: usize, tests: &[Test]) -> Verdict {
     let (mut from, mut budget) = (0, FIRST);
     while from < count {
         let (mut to, mut takes) = (from, Duration::ZERO);
-        while to < count && (to == from || takes + passing[to].takes < budget) {
+        while to < count && (to == from || takes + passing[to].takes < budget && !passing[to].cut) {
             takes += passing[to].takes;
             to += 1;
         }
@@ -152,6 +157,7 @@ pub fn tried(mutant: usize, tests: &[Test]) -> Verdict {
 
 fn failed(mutant: usize, program: &(PathBuf, PathBuf), tests: &[&Test]) -> Option<Verdict> {
     let takes: Duration = tests.iter().map(|test| test.takes).sum();
+    let cut = tests.iter().any(|test| test.cut);
     let mut run = command(program);
     run.args(["--exact", "--test-threads=1"]).args(tests.iter().map(|test| &test.name));
     run.env("MUTANT", mutant.to_string()).stdout(Stdio::piped());
@@ -161,7 +167,7 @@ fn failed(mutant: usize, program: &(PathBuf, PathBuf), tests: &[&Test]) -> Optio
     let (late, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     let watch = {
         let (child, late, done) = (child.clone(), late.clone(), done.clone());
-        let until = Instant::now() + takes * SLOWER + AT_LEAST;
+        let until = Instant::now() + if cut { takes } else { takes * SLOWER + AT_LEAST };
         thread::spawn(move || {
             while !done.load(Ordering::Relaxed) {
                 if Instant::now() > until {
@@ -190,6 +196,7 @@ fn failed(mutant: usize, program: &(PathBuf, PathBuf), tests: &[&Test]) -> Optio
     let _ = watch.join();
     match failure {
         Some(name) => Some(Verdict::Caught(name)),
+        None if late.load(Ordering::Relaxed) && cut => None,
         None if late.load(Ordering::Relaxed) => Some(Verdict::Timeout(last)),
         // It died without a word: an abort, or a stack that ran over.
         None if !succeeded => Some(Verdict::Caught(last)),
