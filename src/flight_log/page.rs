@@ -257,6 +257,28 @@ mod tests {
         assert_eq!(stamp(&[0; SPARE_BYTES], AT), Stamp::Garbage);
     }
 
+    /// A spare area torn so that a few bits came to be is no blank one: the search for the head ends at a blank page.
+    #[test]
+    fn a_spare_area_with_more_than_stray_zeros_is_not_blank() {
+        let torn = |zeros: usize| {
+            let mut spare = [0xFF; SPARE_BYTES];
+            spare[1..=zeros].fill(0xFE);
+            stamp(&spare, AT)
+        };
+        assert_eq!((torn(2), torn(3)), (Stamp::Blank, Stamp::Garbage));
+    }
+
+    /// A firmware of a later format tells these pages by it: what is written must be what the first page says.
+    #[test]
+    fn format_and_kind_stand_in_the_last_column() {
+        assert_eq!(page()[527], 0x11);
+        for (kind, byte) in [(Kind::Superblock, 0x12), (Kind::Set, 0x13)] {
+            let mut page = page();
+            address(&mut page, AT, Tag { kind, ..TAG_OF_LOG });
+            assert_eq!(page[527], byte);
+        }
+    }
+
     #[test]
     fn a_page_of_another_format_is_not_ours() {
         let mut bytes = TAG.map(|column| spare(&page())[column]);

@@ -264,6 +264,26 @@ impl<'ast> Visit<'ast> for Weaver<'_> {
         self.depth -= 1;
     }
 
+    /// A match of whose arms one may be away is no longer complete without a guess: the compiler blames what is matched.
+    fn visit_expr_match(&mut self, matched: &'ast syn::ExprMatch) {
+        let arms = matched.arms.iter().filter_map(|arm| {
+            let start = arm.span().start();
+            self.at.get(&("MatchArm".to_string(), (start.line, start.column + 1)))
+        });
+        let found: Vec<(usize, String)> = arms.flatten().cloned().collect();
+        if let Some((last, _)) = found.first() {
+            let (start, end) = self.range(&*matched.expr);
+            self.open(start, start, marks(&found));
+            self.close(end, format!("/*{last})*/"));
+        }
+        self.depth += 1;
+        self.visit_expr(&matched.expr);
+        self.depth -= 1;
+        for arm in &matched.arms {
+            self.visit_arm(arm);
+        }
+    }
+
     fn visit_arm(&mut self, arm: &'ast syn::Arm) {
         let deleted = self.take("MatchArm", arm);
         let absent: String = deleted.iter().map(|(number, _)| format!("!crate::mutants::on({number})")).collect();

@@ -124,16 +124,70 @@ fn a_header_says_what_it_was_given_and_describes_the_log() {
     }
 }
 
-/// Until then the description went on to where the start stands now.
+/// Until then the description went on to where the start stands now. Its flag decides, also where those bytes would pass for
+/// a start.
 #[test]
 fn a_header_of_older_firmware_says_nothing_of_its_start() {
-    let mut bytes = begin(KEY, HEADER, 0, 5);
-    put(&mut bytes, at::DESCRIPTION, &[b'x'; CHECKED - at::DESCRIPTION]);
-    seal(&mut bytes);
-    let Ok((_, Content::Header(header))) = decode(&bytes) else {
+    assert!(ResetCause::of_code(1).is_some());
+    for byte in [b'x', 1] {
+        let mut bytes = begin(KEY, HEADER, 0, 5);
+        put(&mut bytes, at::DESCRIPTION, &[byte; CHECKED - at::DESCRIPTION]);
+        seal(&mut bytes);
+        let Ok((_, Content::Header(header))) = decode(&bytes) else {
+            panic!("no header");
+        };
+        assert_eq!((header.opened_us, header.start), (5, None));
+    }
+}
+
+/// Readers that others write take the flags bit by bit: of a header only the third may be set.
+#[test]
+fn a_header_has_no_flag_but_that_of_its_start() {
+    assert_eq!(flags(&encode_header(KEY, &BootHeader::default())), 0);
+    let start = Start {
+        reset: ResetCause::Software,
+        starts: 1,
+        crash: None,
+    };
+    let told = BootHeader {
+        start: Some(start),
+        ..BootHeader::default()
+    };
+    assert_eq!(flags(&encode_header(KEY, &told)), 4);
+}
+
+/// The file and the line of a panic stand at the end of its place: they must outlast the room there is.
+#[test]
+fn of_a_long_place_of_a_crash_the_end_is_kept() {
+    let long = "src/flight_log/record.rs:289";
+    let start = Start {
+        reset: ResetCause::Software,
+        starts: 1,
+        crash: Some(CrashRecord::new(CrashCause::Panic, 1, 2, 3, 4_000, long)),
+    };
+    let header = BootHeader {
+        start: Some(start),
+        ..BootHeader::default()
+    };
+    let Ok((_, Content::Header(header))) = decode(&encode_header(KEY, &header)) else {
         panic!("no header");
     };
-    assert_eq!((header.opened_us, header.start), (5, None));
+    let place = header.start.and_then(|start| start.crash).map(|crash| crash.place);
+    assert_eq!(place.as_deref(), Some("og/record.rs:289"));
+}
+
+/// What stops a dump must say whether the ground or the log is to blame.
+#[test]
+fn an_error_names_what_does_not_fit_and_the_version_that_is_known() {
+    use std::string::ToString;
+    assert!(
+        RecordError::Newer(2)
+            .to_string()
+            .contains("version 2; this reader knows 1")
+    );
+    assert!(RecordError::Type(9).to_string().contains("type 9"));
+    assert!(RecordError::Magic.to_string().contains("E7 4D"));
+    assert!(RecordError::Checksum.to_string().contains("CRC-32"));
 }
 
 #[test]

@@ -19,6 +19,10 @@ struct Pins {
     protected_for_good: bool,
     /// When WP# is drawn by somebody else, and the supply fails with it.
     fails_at: Option<Nanos>,
+    /// The supply is good again as soon as it has failed.
+    returns: bool,
+    /// Nobody draws WP# when it fails.
+    unprotected: bool,
 }
 
 impl Pins {
@@ -29,14 +33,18 @@ impl Pins {
             supply_good: true,
             protected_for_good: false,
             fails_at: None,
+            returns: false,
+            unprotected: false,
         })
     }
 
     fn wait(&mut self, time: Nanos) {
         let end = self.now + time;
         if let Some(at) = self.fails_at.take_if(|at| *at <= end) {
-            self.supply_good = false;
-            self.part.protect(true, at.max(self.now));
+            self.supply_good = self.returns;
+            if !self.unprotected {
+                self.part.protect(true, at.max(self.now));
+            }
         }
         self.now = end;
     }
@@ -176,4 +184,28 @@ fn write_protection_drawn_in_the_middle_is_a_failing_supply_and_no_failed_block(
         assert_eq!(block_on(chip.erase(4000)), Ok(()));
         assert_eq!(block_on(chip.program(FAR, &page(0))), Ok(()));
     }
+}
+
+/// A dip that is over before the part is looked at: the supply is good again, and only the part's own status tells that it was
+/// protected meanwhile. A block that is called worn for it is lost for good.
+#[test]
+fn a_dip_that_is_over_is_a_failing_supply_and_no_failed_block() {
+    let pins = Pins::new();
+    let mut chip = driver(&pins);
+    assert_eq!(block_on(chip.erase(4000)), Ok(()));
+    let begins = pins.borrow().now + 600 * CYCLE;
+    pins.borrow_mut().fails_at = Some(begins + 50_000);
+    pins.borrow_mut().returns = true;
+    assert_eq!(block_on(chip.program(FAR, &page(0))), Err(NandError::PowerFailing));
+}
+
+/// The supply fails at the end of an operation, before anybody has drawn WP#: what is there cannot be trusted.
+#[test]
+fn a_supply_that_fails_without_protection_is_no_success() {
+    let pins = Pins::new();
+    let mut chip = driver(&pins);
+    let begins = pins.borrow().now;
+    pins.borrow_mut().unprotected = true;
+    pins.borrow_mut().fails_at = Some(begins + 50_000);
+    assert_eq!(block_on(chip.erase(4000)), Err(NandError::PowerFailing));
 }
