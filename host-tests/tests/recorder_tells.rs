@@ -4,8 +4,8 @@ use std::cell::Cell;
 
 use embassy_futures::block_on;
 use emems::{
-    flight_log::{FlightLog, LOG_START, LogError, record, record::BootHeader},
-    nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress, PageBytes, SpareBytes},
+    flight_log::{FlightLog, LOG_START, LogError, Resumed, record, record::BootHeader},
+    nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress, PageBytes, SpareBytes, ecc},
 };
 use host_tests::recorder::{entry, log, three_boots};
 use twin::part::nand::Cells;
@@ -65,10 +65,123 @@ fn a_page_beyond_the_chip_is_refused() {
     assert_eq!(log.read(pages), Err(LogError::Full));
 }
 
-/// A chip that does nothing while it is told to.
+/// An erase takes effect at once: what its blocks still hold until their turn comes is of the log before.
+#[test]
+fn what_an_erase_has_not_reached_yet_is_read_no_more() {
+    let mut flown = three_boots(BLOCKS, 1);
+    let mut log = log(&mut flown.chip);
+    block_on(async {
+        log.mount().await.expect("mounts");
+        assert!(log.read(0).expect("reads").iter().all(Option::is_some));
+        log.start_erase().await.expect("begins");
+        assert_eq!(log.read(0), Ok([None; 2]));
+    });
+}
+
+/// A block lasts some 100,000 erases (K9F1208U0M data sheet): a save of the superblock takes two pages, and an erase only where
+/// its block is full.
+#[test]
+fn a_block_of_the_superblock_is_erased_after_sixteen_saves() {
+    let (erases, fails, spoils) = Default::default();
+    let mut log = FlightLog::new(chip(&erases, &fails, &spoils), BootHeader::default());
+    block_on(async {
+        log.mount().await.expect("mounts");
+        for save in 0..64 {
+            let flight = save % 2 == 0;
+            let mode = Resumed {
+                flight,
+                ..Resumed::default()
+            };
+            log.keep_mode(mode).await.expect("saves");
+        }
+        assert_eq!(erases.get(), 4);
+        assert_eq!(log.mount().await.map(|mode| mode.flight), Ok(false));
+    });
+}
+
+/// Where the halves of a page begin, and their codes.
+const HALVES: [(usize, usize); 2] = [(0, 512), (256, 518)];
+
+/// More wrong bits in a half than its code corrects.
+fn damaged(page: &mut PageBytes, half: usize) {
+    page[HALVES[half].0 + 9] ^= 0b11;
+}
+
+/// Another half than was given, whole in itself.
+fn exchanged(page: &mut PageBytes, half: usize) {
+    let (at, code) = HALVES[half];
+    let other = [0x3C; 256];
+    page[at..at + 256].copy_from_slice(&other);
+    page[code..code + 3].copy_from_slice(&ecc::code(&other));
+}
+
+/// What may become of a page while the chip reports success.
+const SPOILT: [fn(&mut PageBytes); 5] = [
+    |page| damaged(page, 0),
+    |page| damaged(page, 1),
+    |page| exchanged(page, 0),
+    |page| exchanged(page, 1),
+    // Its tag.
+    |page| page[521..525].fill(0x3C),
+];
+
+/// A chip reports success for what it did not keep. Each page is read back, all of it: half a page is one copy less of a record
+/// that was acknowledged, and a page without its tag is found by nobody.
+#[test]
+fn a_page_that_does_not_hold_what_it_was_given_is_written_elsewhere_and_its_block_retired() {
+    for spoil in SPOILT {
+        let (erases, fails, spoils) = Default::default();
+        let mut log = FlightLog::new(chip(&erases, &fails, &spoils), BootHeader::default());
+        block_on(async {
+            log.mount().await.expect("mounts");
+            log.append(&entry(0)).await.expect("appends");
+            log.append(&entry(1)).await.expect("appends");
+            spoils.set(Some(spoil));
+            log.append(&entry(2)).await.expect("appends");
+            assert_eq!(log.status().bad_blocks, 1);
+        });
+    }
+}
+
+/// So with the superblock; its tag is not looked at there, since its checksum says more.
+#[test]
+fn a_superblock_that_is_not_what_was_saved_is_saved_elsewhere() {
+    for spoil in &SPOILT[..4] {
+        let (erases, fails, spoils) = Default::default();
+        let mut log = FlightLog::new(chip(&erases, &fails, &spoils), BootHeader::default());
+        block_on(async {
+            log.mount().await.expect("mounts");
+            log.append(&entry(0)).await.expect("appends");
+            spoils.set(Some(*spoil));
+            let (flight, recording) = (true, true);
+            let mode = Resumed {
+                flight,
+                recording,
+                ..Resumed::default()
+            };
+            log.keep_mode(mode).await.expect("saves");
+            assert_eq!(log.status().bad_blocks, 1);
+            assert_eq!(log.mount().await, Ok(mode));
+        });
+    }
+}
+
+/// A chip that counts its erases, does nothing while it is told to, and spoils the next page if it is told how.
 struct Failing<'a> {
     chip: Cells,
+    erases: &'a Cell<u32>,
     fails: &'a Cell<bool>,
+    spoils: &'a Cell<Option<fn(&mut PageBytes)>>,
+}
+
+fn chip<'a>(erases: &'a Cell<u32>, fails: &'a Cell<bool>, spoils: &'a Cell<Option<fn(&mut PageBytes)>>) -> Failing<'a> {
+    let chip = Cells::new(BLOCKS, &[], 1);
+    Failing {
+        chip,
+        erases,
+        fails,
+        spoils,
+    }
 }
 
 impl Failing<'_> {
@@ -99,10 +212,15 @@ impl Nand for Failing<'_> {
     }
     async fn program(&mut self, at: PageAddress, bytes: &PageBytes) -> Result<(), NandError> {
         self.now()?;
-        Nand::program(&mut self.chip, at, bytes).await
+        let mut bytes = *bytes;
+        if let Some(spoil) = self.spoils.take() {
+            spoil(&mut bytes);
+        }
+        Nand::program(&mut self.chip, at, &bytes).await
     }
     async fn erase(&mut self, block: u16) -> Result<(), NandError> {
         self.now()?;
+        self.erases.set(self.erases.get() + 1);
         Nand::erase(&mut self.chip, block).await
     }
 }
@@ -111,9 +229,8 @@ impl Nand for Failing<'_> {
 /// that works again, before a mount has looked.
 #[test]
 fn after_a_failure_of_the_chip_nothing_is_written_before_a_mount() {
-    let fails = Cell::new(false);
-    let chip = Cells::new(BLOCKS, &[], 1);
-    let mut log = FlightLog::new(Failing { chip, fails: &fails }, BootHeader::default());
+    let (erases, fails, spoils) = Default::default();
+    let mut log = FlightLog::new(chip(&erases, &fails, &spoils), BootHeader::default());
     block_on(async {
         log.mount().await.expect("mounts");
         log.append(&entry(0)).await.expect("appends");

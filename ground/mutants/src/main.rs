@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use std::{env, fs, process};
 
 use tried::Verdict;
@@ -27,7 +27,14 @@ use tried::Verdict;
 const WORKERS: usize = 2;
 
 /// What may become of a mutant. `apart` is cargo-mutants' own to try, since it cannot be woven.
-const KINDS: [&str; 5] = ["caught", "timeout", "missed", "unviable", "apart"];
+const KINDS: [&str; 6] = ["caught", "timeout", "missed", "untried", "unviable", "apart"];
+
+/// A place in an order that has nothing to do with what the mutants are (FNV-1a): a run that is ended by its time is a sample.
+fn shuffled(name: &str) -> u64 {
+    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
+    let hash = name.bytes().fold(0xCBF2_9CE4_8422_2325, step);
+    (hash ^ hash >> 31).wrapping_mul(0x94D0_49BB_1331_11EB)
+}
 
 /// Of a line of an earlier run: mutant, verdict, and by what.
 fn told(line: &str) -> Option<(&str, (&str, &str))> {
@@ -44,18 +51,20 @@ fn main() {
 
 fn run() -> Result<(), String> {
     let mut arguments = env::args().skip(1);
-    let (mut files, mut longest, mut again) = (Vec::new(), None, false);
+    let (mut files, mut longest, mut minutes, mut again, mut ended) = (Vec::new(), None, None, false, false);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--" => break,
             "--longest" => longest = arguments.next().and_then(|text| text.parse::<f64>().ok()),
+            "--minutes" => minutes = arguments.next().and_then(|text| text.parse::<f64>().ok()),
             "--again" => again = true,
+            "--ended" => ended = true,
             _ => files.push(argument),
         }
     }
     let tests: Vec<String> = arguments.collect();
     if files.is_empty() || tests.is_empty() {
-        return Err("usage: mutants [--longest SECONDS] [--again] GLOB... -- ARGUMENTS OF cargo test".into());
+        return Err("usage: mutants [--longest SECONDS [--ended]] [--minutes MINUTES] [--again] GLOB... -- ARGUMENTS OF cargo test".into());
     }
     let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = root.canonicalize().map_err(|error| error.to_string())?;
@@ -67,18 +76,25 @@ fn run() -> Result<(), String> {
     let built = built::built(&root, &mutants, &tests)?;
     let notes = root.join("target/mutants");
     let longest = longest.map_or(Duration::MAX, Duration::from_secs_f64);
-    let tests = tried::tests(&built.programs, &notes, longest, WORKERS);
+    let mut tests = tried::tests(&built.programs, &notes, longest, WORKERS);
+    tests.retain(|test| ended || !test.cut);
     let all: Duration = tests.iter().map(|test| test.takes).sum();
     eprintln!("{} tests, {all:.1?} one after another", tests.len());
+    let mut order: Vec<usize> = (0..mutants.len()).collect();
+    order.sort_by_key(|number| shuffled(&mutants[*number].name));
+    let until = minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
     let done = AtomicUsize::new(0);
-    let verdicts = tried::each(mutants.len(), WORKERS, |number| {
-        let known = known.get(mutants[number].name.as_str()).filter(|(verdict, _)| *verdict != "missed");
+    let verdicts = tried::each(mutants.len(), WORKERS, |at| {
+        let number = order[at];
+        let known = known.get(mutants[number].name.as_str()).filter(|(verdict, _)| !["missed", "untried"].contains(verdict));
         let verdict = if let Some((verdict, by)) = known {
             (KINDS.iter().find(|kind| kind == &verdict).unwrap_or(&"missed"), (*by).to_string())
         } else if built.unviable.contains(&number) {
             (&"unviable", String::new())
         } else if built.apart.contains(&number) {
             (&"apart", String::new())
+        } else if until.is_some_and(|until| Instant::now() > until) {
+            (&"untried", String::new())
         } else {
             match tried::tried(number, &tests) {
                 Verdict::Caught(test) => (&"caught", test),
@@ -90,10 +106,11 @@ fn run() -> Result<(), String> {
         if *verdict.0 == "missed" {
             eprintln!("{count}: missed: {} ({})", mutants[number].name, verdict.1);
         }
-        verdict
+        (number, verdict)
     });
+    let verdicts: BTreeMap<usize, _> = verdicts.into_iter().collect();
     let (mut csv, mut modules) = (String::new(), BTreeMap::new());
-    for (mutant, (verdict, by)) in mutants.iter().zip(&verdicts) {
+    for (mutant, (verdict, by)) in mutants.iter().zip(verdicts.values()) {
         let _ = writeln!(csv, "{}\t{verdict}\t{by}", mutant.name);
         *modules.entry(&mutant.file).or_insert_with(BTreeMap::new).entry(*verdict).or_insert(0) += 1;
     }
