@@ -57,7 +57,9 @@ pub fn built(root: &Path, mutants: &[Mutant], tests: &[String]) -> Result<Built,
             let now = (built.unviable.len(), built.apart.len(), keep.len());
             eprintln!("{}: {} unviable, {} apart", stage[0], now.0, now.1);
             if before == now {
-                let rendered = messages.iter().filter_map(|message| message["message"]["rendered"].as_str());
+                let rendered = messages
+                    .iter()
+                    .filter_map(|message| message["message"]["rendered"].as_str());
                 return Err(format!("{}{stderr}", rendered.take(5).collect::<String>()));
             }
         }
@@ -70,7 +72,10 @@ fn said<T>(what: &Path, result: std::io::Result<T>) -> Result<T, String> {
 }
 
 fn copied(root: &Path, copy: &Path) -> Result<(), String> {
-    let listed = said(root, Command::new("git").args(["ls-files", "-z"]).current_dir(root).output())?;
+    let listed = said(
+        root,
+        Command::new("git").args(["ls-files", "-z"]).current_dir(root).output(),
+    )?;
     for name in String::from_utf8_lossy(&listed.stdout).split_terminator('\0') {
         if let Ok(bytes) = fs::read(root.join(name)) {
             changed(&copy.join(name), &bytes)?;
@@ -89,37 +94,69 @@ fn changed(path: &Path, bytes: &[u8]) -> Result<(), String> {
     said(path, fs::write(path, bytes))
 }
 
-fn written(root: &Path, copy: &Path, mutants: &[Mutant], built: &mut Built, keep: &BTreeSet<String>) -> Result<(), String> {
+fn written(
+    root: &Path,
+    copy: &Path,
+    mutants: &[Mutant],
+    built: &mut Built,
+    keep: &BTreeSet<String>,
+) -> Result<(), String> {
     let left: BTreeSet<usize> = built.unviable.union(&built.apart).copied().collect();
     let files: BTreeSet<&str> = mutants.iter().map(|mutant| mutant.file.as_str()).collect();
     for file in files {
-        let of_file: Vec<(usize, &Mutant)> = mutants.iter().enumerate().filter(|(_, mutant)| mutant.file == file).collect();
+        let of_file: Vec<(usize, &Mutant)> = mutants
+            .iter()
+            .enumerate()
+            .filter(|(_, mutant)| mutant.file == file)
+            .collect();
         let path = root.join(file);
         let text = said(&path, fs::read_to_string(&path))?;
         let woven = weave::woven(&text, &of_file, &left, keep)?;
         let missing = of_file.iter().map(|(number, _)| *number);
-        built.apart.extend(missing.filter(|number| !woven.mutants.contains(number) && !left.contains(number)));
+        built
+            .apart
+            .extend(missing.filter(|number| !woven.mutants.contains(number) && !left.contains(number)));
         changed(&copy.join(file), woven.text.as_bytes())?;
     }
     for folder in CRATES {
         let path = root.join(folder).join("lib.rs");
         let copied = copy.join(folder).join("lib.rs");
-        let from = if mutants.iter().any(|mutant| mutant.file == format!("{folder}lib.rs")) { &copied } else { &path };
+        let from = if mutants.iter().any(|mutant| mutant.file == format!("{folder}lib.rs")) {
+            &copied
+        } else {
+            &path
+        };
         let text = said(from, fs::read_to_string(from))?;
         let text = if text.ends_with(ASLEEP) { text } else { text + ASLEEP };
-        changed(&copied, text.replacen("#![no_std]", "#![allow(warnings)]\n#![no_std]", 1).as_bytes())?;
+        changed(
+            &copied,
+            text.replacen("#![no_std]", "#![allow(warnings)]\n#![no_std]", 1)
+                .as_bytes(),
+        )?;
     }
     Ok(())
 }
 
 fn cargo(root: &Path, copy: &Path, arguments: &[String]) -> Result<(bool, Vec<Value>, String), String> {
     let mut cargo = Command::new("cargo");
-    cargo.args(arguments).args(["--ignore-rust-version", "--target=host-tuple", "--offline", "--message-format=json"]);
+    cargo.args(arguments).args([
+        "--ignore-rust-version",
+        "--target=host-tuple",
+        "--offline",
+        "--message-format=json",
+    ]);
     cargo.current_dir(copy).env("CARGO_TARGET_DIR", root.join("target"));
     let output = said(copy, cargo.output())?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let messages = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    Ok((output.status.success(), messages, String::from_utf8_lossy(&output.stderr).into_owned()))
+    let messages = text
+        .lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .collect();
+    Ok((
+        output.status.success(),
+        messages,
+        String::from_utf8_lossy(&output.stderr).into_owned(),
+    ))
 }
 
 /// The mutants that an error of the compiler is about are left out.
@@ -140,7 +177,9 @@ fn blame(copy: &Path, message: &Value, built: &mut Built, keep: &mut BTreeSet<St
             continue;
         }
         let file = span["file_name"].as_str().unwrap_or_default();
-        let Ok(text) = fs::read_to_string(copy.join(file)) else { continue };
+        let Ok(text) = fs::read_to_string(copy.join(file)) else {
+            continue;
+        };
         let at = span["byte_start"].as_u64().unwrap_or_default() as usize;
         match weave::blamed(&text, at.min(text.len())) {
             (Some(mutant), _) => drop(built.unviable.insert(mutant)),

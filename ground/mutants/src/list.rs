@@ -23,21 +23,22 @@ pub struct Mutant {
     pub replacement: String,
 }
 
-/// The mutants of `files` (globs) in the repository at `root`.
+/// The mutants that `.cargo/mutants.toml` of the repository at `root` chooses, of files that begin as one of `files`.
 ///
 /// # Errors
 /// When cargo-mutants is not there, or says what is no list.
 pub fn mutants(root: &Path, files: &[String]) -> Result<Vec<Mutant>, String> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["mutants", "--list", "--json", "--workspace"]).current_dir(root);
-    for file in files {
-        cargo.args(["--file", file]);
-    }
+    cargo
+        .args(["mutants", "--list", "--json", "--workspace"])
+        .current_dir(root);
     let said = cargo.output().map_err(|error| format!("cargo mutants: {error}"))?;
     if !said.status.success() {
         return Err(format!("cargo mutants: {}", String::from_utf8_lossy(&said.stderr)));
     }
-    parsed(&said.stdout)
+    let mut mutants = parsed(&said.stdout)?;
+    mutants.retain(|mutant| files.iter().any(|file| mutant.file.starts_with(file)));
+    Ok(mutants)
 }
 
 fn parsed(json: &[u8]) -> Result<Vec<Mutant>, String> {
@@ -48,7 +49,10 @@ fn parsed(json: &[u8]) -> Result<Vec<Mutant>, String> {
         name: text(&one["name"]),
         file: text(&one["file"]),
         genre: text(&one["genre"]),
-        at: (number(&one["span"]["start"]["line"]), number(&one["span"]["start"]["column"])),
+        at: (
+            number(&one["span"]["start"]["line"]),
+            number(&one["span"]["start"]["column"]),
+        ),
         replacement: text(&one["replacement"]),
     };
     Ok(list.iter().map(mutant).collect())

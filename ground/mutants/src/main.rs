@@ -1,6 +1,6 @@
 //! Tries the mutants of cargo-mutants by one build: `docs/mutants.md` says how it is run and what came out.
 //!
-//! In: globs of source files, and after `--` what cargo is told so that it builds the tests. Out: a line for each mutant in
+//! In: how the names of source files begin, and after `--` what cargo is told so that it builds the tests. Out: a line for each mutant in
 //! `target/mutants.tsv`, and a table of the modules.
 //!
 //! 1. [`list`]: cargo-mutants names the mutants.
@@ -64,14 +64,18 @@ fn run() -> Result<(), String> {
     }
     let tests: Vec<String> = arguments.collect();
     if files.is_empty() || tests.is_empty() {
-        return Err("usage: mutants [--longest SECONDS [--ended]] [--minutes MINUTES] [--again] GLOB... -- ARGUMENTS OF cargo test".into());
+        return Err("usage: mutants [--longest SECONDS [--ended]] [--minutes MINUTES] [--again] FILE... -- ARGUMENTS OF cargo test".into());
     }
     let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = root.canonicalize().map_err(|error| error.to_string())?;
     let mutants = list::mutants(&root, &files)?;
     eprintln!("{} mutants", mutants.len());
     let path = root.join("target/mutants.tsv");
-    let before = if again { fs::read_to_string(&path).unwrap_or_default() } else { String::new() };
+    let before = if again {
+        fs::read_to_string(&path).unwrap_or_default()
+    } else {
+        String::new()
+    };
     let known: HashMap<&str, (&str, &str)> = before.lines().filter_map(told).collect();
     let built = built::built(&root, &mutants, &tests)?;
     let notes = root.join("target/mutants");
@@ -86,9 +90,14 @@ fn run() -> Result<(), String> {
     let done = AtomicUsize::new(0);
     let verdicts = tried::each(mutants.len(), WORKERS, |at| {
         let number = order[at];
-        let known = known.get(mutants[number].name.as_str()).filter(|(verdict, _)| !["missed", "untried"].contains(verdict));
+        let known = known
+            .get(mutants[number].name.as_str())
+            .filter(|(verdict, _)| !["missed", "untried"].contains(verdict));
         let verdict = if let Some((verdict, by)) = known {
-            (KINDS.iter().find(|kind| kind == &verdict).unwrap_or(&"missed"), (*by).to_string())
+            (
+                KINDS.iter().find(|kind| kind == &verdict).unwrap_or(&"missed"),
+                (*by).to_string(),
+            )
         } else if built.unviable.contains(&number) {
             (&"unviable", String::new())
         } else if built.apart.contains(&number) {
@@ -112,7 +121,11 @@ fn run() -> Result<(), String> {
     let (mut csv, mut modules) = (String::new(), BTreeMap::new());
     for (mutant, (verdict, by)) in mutants.iter().zip(verdicts.values()) {
         let _ = writeln!(csv, "{}\t{verdict}\t{by}", mutant.name);
-        *modules.entry(&mutant.file).or_insert_with(BTreeMap::new).entry(*verdict).or_insert(0) += 1;
+        *modules
+            .entry(&mutant.file)
+            .or_insert_with(BTreeMap::new)
+            .entry(*verdict)
+            .or_insert(0) += 1;
     }
     fs::write(&path, csv).map_err(|error| format!("{}: {error}", path.display()))?;
     println!("{:40} {}", "file", KINDS.map(|kind| format!("{kind:>9}")).concat());

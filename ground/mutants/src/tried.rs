@@ -45,15 +45,24 @@ pub enum Verdict {
 
 fn command(program: &(PathBuf, PathBuf)) -> Command {
     let mut command = Command::new(&program.0);
-    command.current_dir(&program.1).env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1");
-    command.env("CARGO_MANIFEST_DIR", &program.1).stdin(Stdio::null()).stderr(Stdio::null());
+    command
+        .current_dir(&program.1)
+        .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1");
+    command
+        .env("CARGO_MANIFEST_DIR", &program.1)
+        .stdin(Stdio::null())
+        .stderr(Stdio::null());
     command
 }
 
 fn names(program: &(PathBuf, PathBuf), more: &[&str]) -> BTreeSet<String> {
     let said = command(program).args(["--list", "--format=terse"]).args(more).output();
-    let text = said.map(|said| String::from_utf8_lossy(&said.stdout).into_owned()).unwrap_or_default();
-    text.lines().filter_map(|line| Some(line.strip_suffix(": test")?.to_string())).collect()
+    let text = said
+        .map(|said| String::from_utf8_lossy(&said.stdout).into_owned())
+        .unwrap_or_default();
+    text.lines()
+        .filter_map(|line| Some(line.strip_suffix(": test")?.to_string()))
+        .collect()
 }
 
 /// Every test of the programs, run once alone without a mutant; one that fails so is told and left out. One
@@ -62,7 +71,11 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, w
     let mut all = Vec::new();
     for program in programs {
         let ignored = names(program, &["--ignored"]);
-        all.extend(names(program, &[]).difference(&ignored).map(|name| (program.clone(), name.clone())));
+        all.extend(
+            names(program, &[])
+                .difference(&ignored)
+                .map(|name| (program.clone(), name.clone())),
+        );
     }
     each(all.len(), workers, |at| {
         let (program, name) = &all[at];
@@ -70,7 +83,9 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, w
         let _ = fs::remove_file(&note);
         let began = Instant::now();
         let mut run = command(program);
-        run.args(["--exact", name]).env("MUTANTS_REACHED", &note).stdout(Stdio::null());
+        run.args(["--exact", name])
+            .env("MUTANTS_REACHED", &note)
+            .stdout(Stdio::null());
         let passes = ended(run.spawn().ok()?, began, longest);
         let takes = began.elapsed();
         let text = fs::read_to_string(&note).unwrap_or_default();
@@ -83,7 +98,13 @@ pub fn tests(programs: &[(PathBuf, PathBuf)], notes: &Path, longest: Duration, w
         if cut {
             eprintln!("ended after {takes:.0?}: {name}");
         }
-        Some(Test { program: program.clone(), name: name.clone(), takes, cut, reached })
+        Some(Test {
+            program: program.clone(),
+            name: name.clone(),
+            takes,
+            cut,
+            reached,
+        })
     })
     .into_iter()
     .flatten()
@@ -145,7 +166,11 @@ pub fn tried(mutant: usize, tests: &[Test]) -> Verdict {
         programs.sort();
         programs.dedup();
         for program in programs {
-            let together: Vec<&Test> = passing[from..to].iter().copied().filter(|test| &test.program == program).collect();
+            let together: Vec<&Test> = passing[from..to]
+                .iter()
+                .copied()
+                .filter(|test| &test.program == program)
+                .collect();
             if let Some(verdict) = failed(mutant, program, &together) {
                 return verdict;
             }
@@ -159,7 +184,8 @@ fn failed(mutant: usize, program: &(PathBuf, PathBuf), tests: &[&Test]) -> Optio
     let takes: Duration = tests.iter().map(|test| test.takes).sum();
     let cut = tests.iter().any(|test| test.cut);
     let mut run = command(program);
-    run.args(["--exact", "--test-threads=1"]).args(tests.iter().map(|test| &test.name));
+    run.args(["--exact", "--test-threads=1"])
+        .args(tests.iter().map(|test| &test.name));
     run.env("MUTANT", mutant.to_string()).stdout(Stdio::piped());
     let mut child = run.spawn().ok()?;
     let lines = child.stdout.take()?;
@@ -181,7 +207,9 @@ fn failed(mutant: usize, program: &(PathBuf, PathBuf), tests: &[&Test]) -> Optio
     };
     let (mut last, mut failure) = (tests[0].name.clone(), None);
     for line in BufReader::new(lines).lines().map_while(Result::ok) {
-        let Some(rest) = line.strip_prefix("test ") else { continue };
+        let Some(rest) = line.strip_prefix("test ") else {
+            continue;
+        };
         let name = rest.split(" ... ").next().unwrap_or_default();
         if rest.ends_with("FAILED") {
             failure = Some(name.trim_end_matches(" - should panic").to_string());

@@ -44,10 +44,21 @@ pub fn woven(
         let key = (mutant.genre.clone(), mutant.at);
         at.entry(key).or_default().push((*number, mutant.replacement.clone()));
     }
-    let mut weaver = Weaver { text, starts, at, keep, edits: Vec::new(), depth: 0, mutants: BTreeSet::new() };
+    let mut weaver = Weaver {
+        text,
+        starts,
+        at,
+        keep,
+        edits: Vec::new(),
+        depth: 0,
+        mutants: BTreeSet::new(),
+    };
     weaver.visit_file(&tree);
     let mutants = std::mem::take(&mut weaver.mutants);
-    Ok(Woven { text: weaver.written(), mutants })
+    Ok(Woven {
+        text: weaver.written(),
+        mutants,
+    })
 }
 
 /// The innermost mutant at the byte `at` of a woven text; else the mutants of the innermost place that was changed there.
@@ -55,7 +66,9 @@ pub fn blamed(text: &str, at: usize) -> (Option<usize>, Vec<usize>) {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = 0;
     while let Some(begin) = text[rest..at].find("/*").map(|found| rest + found) {
-        let Some(end) = text[begin..].find("*/").map(|found| begin + found) else { break };
+        let Some(end) = text[begin..].find("*/").map(|found| begin + found) else {
+            break;
+        };
         let mark = &text[begin + 2..end];
         if mark.starts_with(['<', '(']) {
             open.push(mark);
@@ -64,7 +77,12 @@ pub fn blamed(text: &str, at: usize) -> (Option<usize>, Vec<usize>) {
         }
         rest = (end + 2).min(at);
     }
-    let numbers = |mark: &str| mark[1..].split(',').filter_map(|one| one.parse().ok()).collect::<Vec<usize>>();
+    let numbers = |mark: &str| {
+        mark[1..]
+            .split(',')
+            .filter_map(|one| one.parse().ok())
+            .collect::<Vec<usize>>()
+    };
     match open.last() {
         Some(mark) if mark.starts_with('<') => (numbers(mark).first().copied(), Vec::new()),
         Some(mark) => (None, numbers(mark)),
@@ -110,17 +128,32 @@ impl Weaver<'_> {
     /// The mutants of a genre that begin where `of` does; they count as woven.
     fn take(&mut self, genre: &str, of: &impl Spanned) -> Vec<(usize, String)> {
         let start = of.span().start();
-        let found = self.at.remove(&(genre.to_string(), (start.line, start.column + 1))).unwrap_or_default();
+        let found = self
+            .at
+            .remove(&(genre.to_string(), (start.line, start.column + 1)))
+            .unwrap_or_default();
         self.mutants.extend(found.iter().map(|(number, _)| *number));
         found
     }
 
     fn open(&mut self, at: usize, end: usize, text: String) {
-        self.edits.push(Edit { at, end, text, depth: self.depth, closes: false });
+        self.edits.push(Edit {
+            at,
+            end,
+            text,
+            depth: self.depth,
+            closes: false,
+        });
     }
 
     fn close(&mut self, at: usize, text: String) {
-        self.edits.push(Edit { at, end: at, text, depth: self.depth, closes: true });
+        self.edits.push(Edit {
+            at,
+            end: at,
+            text,
+            depth: self.depth,
+            closes: true,
+        });
     }
 
     fn written(mut self) -> String {
@@ -160,7 +193,13 @@ impl Weaver<'_> {
         let either = |with: &dyn Fn(&str) -> String| {
             let mut text = BTreeMap::new();
             for (number, other) in &found {
-                text.insert(number, format!("if crate::mutants::on({number}) {{ /*<{number}*/ {} /*{number}>*/ }} else ", with(other)));
+                text.insert(
+                    number,
+                    format!(
+                        "if crate::mutants::on({number}) {{ /*<{number}*/ {} /*{number}>*/ }} else ",
+                        with(other)
+                    ),
+                );
             }
             format!("{}{{ {} }}", text.into_values().collect::<String>(), with(&op))
         };
@@ -173,7 +212,11 @@ impl Weaver<'_> {
             let on = format!("crate::mutants::on({last})");
             let same = if op == "&&" { on } else { format!("!{on}") };
             self.open(start, start, format!("(match {marks}("));
-            self.open(left_end, right_start, format!(") {{ l => if l == {same} {{ l }} else {{ "));
+            self.open(
+                left_end,
+                right_start,
+                format!(") {{ l => if l == {same} {{ l }} else {{ "),
+            );
             self.close(end, format!(" }} }} /*{last})*/)"));
         } else {
             let compares = ["==", "!=", "<=", ">=", "<", ">"].contains(&op.as_str());
@@ -255,7 +298,8 @@ impl<'ast> Visit<'ast> for Weaver<'_> {
                 let op = self.raw(&unary.op).to_string();
                 let (at, (start, end)) = (self.range(&unary.op).0, self.range(&*unary.expr));
                 self.open(at, start, format!("(match /*({number}*/("));
-                let text = format!("if crate::mutants::on({number}) {{ /*<{number}*/ x /*{number}>*/ }} else {{ {op}x }}");
+                let text =
+                    format!("if crate::mutants::on({number}) {{ /*<{number}*/ x /*{number}>*/ }} else {{ {op}x }}");
                 self.close(end, format!(") {{ x => {text} }} /*{number})*/)"));
             }
         }
@@ -286,7 +330,10 @@ impl<'ast> Visit<'ast> for Weaver<'_> {
 
     fn visit_arm(&mut self, arm: &'ast syn::Arm) {
         let deleted = self.take("MatchArm", arm);
-        let absent: String = deleted.iter().map(|(number, _)| format!("!crate::mutants::on({number})")).collect();
+        let absent: String = deleted
+            .iter()
+            .map(|(number, _)| format!("!crate::mutants::on({number})"))
+            .collect();
         match &arm.guard {
             None if !absent.is_empty() => {
                 let end = self.range(&arm.pat).1;
@@ -294,11 +341,19 @@ impl<'ast> Visit<'ast> for Weaver<'_> {
             }
             Some((_, guard)) => {
                 let (start, end) = self.range(&**guard);
-                let mut text = if absent.is_empty() { String::new() } else { format!("{absent} && ") };
+                let mut text = if absent.is_empty() {
+                    String::new()
+                } else {
+                    format!("{absent} && ")
+                };
                 text += "(";
                 for (number, value) in self.take("MatchArmGuard", &**guard) {
                     let on = format!("crate::mutants::on({number})");
-                    text += &if value == "true" { format!("{on} || ") } else { format!("!{on} && ") };
+                    text += &if value == "true" {
+                        format!("{on} || ")
+                    } else {
+                        format!("!{on} && ")
+                    };
                 }
                 self.open(start, start, text + "(");
                 self.close(end, "))".into());
@@ -315,14 +370,22 @@ impl<'ast> Visit<'ast> for Weaver<'_> {
 
     fn visit_expr_struct(&mut self, made: &'ast syn::ExprStruct) {
         for field in &made.fields {
-            let found = made.rest.as_ref().map(|rest| (self.raw(&**rest).to_string(), self.take("StructField", field)));
+            let found = made
+                .rest
+                .as_ref()
+                .map(|rest| (self.raw(&**rest).to_string(), self.take("StructField", field)));
             if let Some((rest, found)) = found
                 && let Some((number, _)) = found.first()
             {
                 let name = self.raw(&field.member).to_string();
                 let (start, end) = self.range(&field.expr);
-                let colon = if field.colon_token.is_some() { String::new() } else { format!("{name}: ") };
-                let other = format!("if crate::mutants::on({number}) {{ /*<{number}*/ ({rest}).{name} /*{number}>*/ }}");
+                let colon = if field.colon_token.is_some() {
+                    String::new()
+                } else {
+                    format!("{name}: ")
+                };
+                let other =
+                    format!("if crate::mutants::on({number}) {{ /*<{number}*/ ({rest}).{name} /*{number}>*/ }}");
                 self.open(start, start, format!("{colon}({other} else {{ "));
                 self.close(end, " })".into());
             }
