@@ -4,10 +4,15 @@ use std::cell::Cell;
 
 use embassy_futures::block_on;
 use emems::{
-    flight_log::{FlightLog, LOG_START, LogError, Resumed, record, record::BootHeader},
+    flight_log::{
+        FlightLog, LOG_START, LogError, Resumed,
+        page::{self, Stamp},
+        record,
+        record::BootHeader,
+    },
     nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress, PageBytes, SpareBytes, ecc},
 };
-use host_tests::recorder::{entry, log, three_boots};
+use host_tests::recorder::{Flown, entry, log, read_all, three_boots};
 use twin::part::nand::Cells;
 
 const BLOCKS: u16 = 24;
@@ -33,6 +38,33 @@ fn the_newest_record_is_that_of_the_boot_before_and_of_no_other() {
         again.append(&entry(93)).await.expect("appends");
         assert_eq!(again.newest(), None);
     });
+}
+
+/// The last pages of a boot may be torn, and read so once more and then never again: what begins the next boot has both records
+/// that they held. Whatever that boot did, and wherever in its block it ended.
+#[test]
+fn the_two_newest_records_of_the_boot_before_outlast_its_pages() {
+    for records in [1, 2, 3, 20, 27, 28, 29, 30, 31, 32, 60, 61] {
+        let mut flown = Flown::on(Cells::new(BLOCKS, &[], 1));
+        flown.boot(records, None);
+        flown.boot(1, None);
+        for block in LOG_START..BLOCKS {
+            for page in 0..PAGES_PER_BLOCK {
+                let at = PageAddress { block, page };
+                let stamp = page::stamp(page::spare(&flown.chip.read(at)), at);
+                if matches!(stamp, Stamp::Ours(tag) if tag.boot == 1) {
+                    flown.chip.destroy(at);
+                }
+            }
+        }
+        let mut wrong = 0;
+        let found = read_all(&mut flown.chip, &mut wrong);
+        let newest = flown.acknowledged.iter().rev().take(3);
+        for (key, id) in newest {
+            assert_eq!(found.get(key), Some(id), "{records} records: {key:?}");
+        }
+        assert_eq!(wrong, 0);
+    }
 }
 
 /// G_ST tells how many blocks are left to erase, and the ground waits for none before it lets the unit fly.
