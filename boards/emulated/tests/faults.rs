@@ -78,7 +78,11 @@ fn a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free() {
             at_us(begun_us + offset_us, Fault::BusStuck(true)),
             at_us(begun_us + 300_000, Fault::BusStuck(false)),
         ];
-        flown(&Options::default(), &faults, 2_700, &mut tape);
+        let report = flown(&Options::default(), &faults, 2_700, &mut tape);
+        assert!(
+            report.struck.get("bus-stuck").is_some_and(|times| *times > 0),
+            "{offset_us} us"
+        );
         let errors = errors(&tape);
         assert!(errors.len() >= 11, "a packet every 200 ms whatever the bus does");
         assert!(

@@ -103,12 +103,7 @@ pub fn run(
     if arguments.guards {
         return Ok(guards::run(&guards::sources()?, &arguments.rows)?);
     }
-    let (days, rows): (Vec<_>, Vec<_>) = arguments.rows.iter().partition(|name| name.eq_ignore_ascii_case(DAY));
-    let rows = if rows.is_empty() && !days.is_empty() {
-        Vec::new()
-    } else {
-        chosen(&rows)?
-    };
+    let (rows, a_day) = chosen(&arguments.rows)?;
     let image = if arguments.image {
         Some(image().map_err(DrillError::Image)?)
     } else {
@@ -122,7 +117,7 @@ pub fn run(
         lines.push(line);
     }
     let count = |begin: &str| lines.iter().filter(|line| line.verdict.starts_with(begin)).count();
-    let mut refused = count("not accepted");
+    let refused = count("not accepted");
     if !lines.is_empty() {
         println!(
             "{} rows: {} accepted ({} by a drill, {} by the tests they name), {refused} not accepted",
@@ -132,10 +127,11 @@ pub fn run(
             count("by test"),
         );
     }
-    if !days.is_empty() || arguments.long && arguments.rows.is_empty() {
+    let mut not_accepted = refused;
+    if a_day || arguments.long && arguments.rows.is_empty() {
         let seconds = if arguments.image { IMAGE_DAY_S } else { DAY_S };
         let told = endurance::fly(&board, arguments.seed, seconds);
-        refused += usize::from(told.did.is_err());
+        not_accepted += usize::from(told.did.is_err());
         let (Ok(did) | Err(did)) = &told.did;
         let verdict = if told.did.is_ok() { "accepted" } else { "not accepted" };
         println!(
@@ -150,22 +146,31 @@ pub fn run(
             why,
         })?;
     }
+    ended(not_accepted)
+}
+
+/// How the command ends after so much that is not accepted.
+fn ended(refused: usize) -> Result<(), DrillError> {
     match refused {
         0 => Ok(()),
         refused => Err(DrillError::NotAccepted(refused)),
     }
 }
 
-fn chosen(names: &[&String]) -> Result<Vec<&'static Row>, DrillError> {
+/// The rows of these names, all if none is named, and whether the day is among them.
+fn chosen(names: &[String]) -> Result<(Vec<&'static Row>, bool), DrillError> {
+    let all = || CATALOGUE.iter().flat_map(|rows| rows.iter());
     if names.is_empty() {
-        return Ok(CATALOGUE.iter().flat_map(|rows| rows.iter()).collect());
+        return Ok((all().collect(), false));
     }
-    let row = |name: &&String| {
-        let mut rows = CATALOGUE.iter().flat_map(|rows| rows.iter());
-        rows.find(|row| row.id.eq_ignore_ascii_case(name))
-            .ok_or_else(|| DrillError::NoRow(name.to_string()))
+    let (days, rows): (Vec<_>, Vec<_>) = names.iter().partition(|name| name.eq_ignore_ascii_case(DAY));
+    let row = |name: &String| {
+        all()
+            .find(|row| row.id.eq_ignore_ascii_case(name))
+            .ok_or_else(|| DrillError::NoRow(name.clone()))
     };
-    names.iter().map(row).collect()
+    let rows: Result<_, _> = rows.into_iter().map(row).collect();
+    Ok((rows?, !days.is_empty()))
 }
 
 /// One row, drilled.
@@ -262,4 +267,30 @@ fn struck(plan: &str, struck: &Struck) -> Vec<u64> {
     let mut names: Vec<_> = words.collect();
     names.dedup();
     names.into_iter().map(times).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(names: &[&str]) -> Result<(Vec<&'static str>, bool), DrillError> {
+        let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+        chosen(&names).map(|(rows, a_day)| (rows.iter().map(|row| row.id).collect(), a_day))
+    }
+
+    #[test]
+    fn a_day_is_flown_alone_or_beside_rows_and_a_row_that_is_not_there_is_named() {
+        let all = named(&[]).expect("all rows");
+        assert!(all.0.len() == 86 && !all.1);
+        assert_eq!(named(&["day"]).expect("a day"), (vec![], true));
+        assert_eq!(named(&["f8", "DAY"]).expect("both"), (vec!["F8"], true));
+        let error = named(&["day", "X1"]).expect_err("no row").to_string();
+        assert!(error.contains("X1") && error.contains("day"), "{error}");
+    }
+
+    #[test]
+    fn what_is_not_accepted_ends_in_an_error() {
+        assert!(ended(0).is_ok());
+        assert!(matches!(ended(2), Err(DrillError::NotAccepted(2))));
+    }
 }

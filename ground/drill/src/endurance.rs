@@ -244,6 +244,32 @@ mod tests {
 
     use super::*;
 
+    /// A word that strikes nothing on the host would stand in the plan of a day in name only: a line that bounced a whole number of times
+    /// between two looks of the unit did.
+    #[test]
+    fn every_fault_that_may_arrive_strikes() {
+        let sensors = OF_SENSORS.map(|word| format!("{word}:a1@3s..5s"));
+        let i2c = OF_I2C.map(|(word, amount)| format!("{word}:a1{amount}@3s..5s"));
+        let lasting = LASTING.map(|word| format!("{word}@3s..5s"));
+        let once = AT_ONCE.map(|word| format!("{word}@3s"));
+        for text in sensors.into_iter().chain(i2c).chain(lasting).chain(once) {
+            let planned: Planned = text.parse().unwrap_or_else(|error| panic!("{error}"));
+            let said = vec![
+                (S, b"G_MVG_MV".to_vec()),
+                (2 * S, b"G_MGG_MG".to_vec()),
+                (3 * S + MS, b"G_VE".to_vec()),
+            ];
+            let plant = Plant::new(world("still"), 1);
+            let flown = flown(&Board::Host, plant, planned.strokes(1), said, 8 * S).expect("flies");
+            let struck = flown.report.struck.get(planned.word.name);
+            assert!(
+                struck.is_some_and(|times| *times > 0),
+                "{text}: {:?}",
+                flown.report.struck
+            );
+        }
+    }
+
     /// What is not excused is found.
     #[test]
     fn a_packet_that_is_missing_without_excuse_is_found() {
