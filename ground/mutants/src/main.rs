@@ -26,6 +26,9 @@ use tried::Verdict;
 /// As many as the tests and their watchers may use.
 const WORKERS: usize = 2;
 
+const USAGE: &str =
+    "usage: mutants [--longest SECONDS [--ended]] [--minutes MINUTES] [--again] FILE... -- ARGUMENTS OF cargo test";
+
 /// What may become of a mutant. `apart` is cargo-mutants' own to try, since it cannot be woven.
 const KINDS: [&str; 6] = ["caught", "timeout", "missed", "untried", "unviable", "apart"];
 
@@ -42,6 +45,17 @@ fn told(line: &str) -> Option<(&str, (&str, &str))> {
     Some((cells.next()?, (cells.next()?, cells.next()?)))
 }
 
+fn number(option: &str, text: Option<String>) -> Result<f64, String> {
+    let number = text.as_ref().and_then(|text| text.parse().ok());
+    let number = number.filter(|number: &f64| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| {
+        format!(
+            "{option} takes a number above 0, not {:?}\n{USAGE}",
+            text.unwrap_or_default()
+        )
+    })
+}
+
 fn main() {
     if let Err(error) = run() {
         eprintln!("{error}");
@@ -55,16 +69,17 @@ fn run() -> Result<(), String> {
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--" => break,
-            "--longest" => longest = arguments.next().and_then(|text| text.parse::<f64>().ok()),
-            "--minutes" => minutes = arguments.next().and_then(|text| text.parse::<f64>().ok()),
+            "--longest" => longest = Some(number(&argument, arguments.next())?),
+            "--minutes" => minutes = Some(number(&argument, arguments.next())?),
             "--again" => again = true,
             "--ended" => ended = true,
+            _ if argument.starts_with('-') => return Err(format!("there is no option {argument}\n{USAGE}")),
             _ => files.push(argument),
         }
     }
     let tests: Vec<String> = arguments.collect();
     if files.is_empty() || tests.is_empty() {
-        return Err("usage: mutants [--longest SECONDS [--ended]] [--minutes MINUTES] [--again] FILE... -- ARGUMENTS OF cargo test".into());
+        return Err(USAGE.into());
     }
     let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = root.canonicalize().map_err(|error| error.to_string())?;

@@ -414,3 +414,54 @@ impl Weaver<'_> {
         self.depth -= 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mutant(genre: &str, at: Place, replacement: &str) -> Mutant {
+        Mutant {
+            name: String::new(),
+            file: String::new(),
+            genre: genre.into(),
+            at,
+            replacement: replacement.into(),
+        }
+    }
+
+    /// The woven text is Rust, has each mutant behind its number, and an error of the compiler at one is blamed on it.
+    #[test]
+    fn mutants_stand_asleep_in_the_text_and_are_found_there() {
+        let text = "fn f(a: u32, b: u32) -> u32 {\n    a + b\n}\n";
+        let value = mutant("FnValue", (2, 5), "0");
+        let operator = mutant("BinaryOperator", (2, 7), "-");
+        let mutants = [(3, &value), (7, &operator)];
+        let woven = woven(text, &mutants, &BTreeSet::new(), &BTreeSet::new()).expect("Rust");
+        assert_eq!(woven.mutants, BTreeSet::from([3, 7]));
+        assert!(syn::parse_file(&woven.text).is_ok(), "{}", woven.text);
+        assert!(
+            woven
+                .text
+                .contains("if crate::mutants::on(3) { return /*<3*/ 0 /*3>*/; }")
+        );
+        assert!(
+            woven
+                .text
+                .contains("if crate::mutants::on(7) { /*<7*/ l - r /*7>*/ } else { l + r }"),
+            "{}",
+            woven.text
+        );
+        let at = |what: &str| woven.text.find(what).expect("there");
+        assert_eq!(blamed(&woven.text, at("l - r")).0, Some(7));
+        assert_eq!(blamed(&woven.text, at("0 /*3>")).0, Some(3));
+        assert_eq!(blamed(&woven.text, at("l + r")), (None, vec![7]));
+    }
+
+    #[test]
+    fn what_is_left_out_is_not_woven() {
+        let text = "fn f(a: u32, b: u32) -> u32 {\n    a + b\n}\n";
+        let operator = mutant("BinaryOperator", (2, 7), "-");
+        let woven = woven(text, &[(7, &operator)], &BTreeSet::from([7]), &BTreeSet::new()).expect("Rust");
+        assert!(woven.mutants.is_empty() && woven.text == text);
+    }
+}
