@@ -70,9 +70,9 @@ pub fn case(step: &Step) -> Result<(), StepError> {
             let checked = checked::checked(folder);
             match json {
                 true => println!("{:#}", checked.json()),
-                false => print!("{}", checked.text),
+                false => print!("{}", checked.text()),
             }
-            if !checked.is_whole {
+            if !checked.is_whole() {
                 return Err(StepError::Lacks(folder.clone()));
             }
         }

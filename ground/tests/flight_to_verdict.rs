@@ -267,7 +267,7 @@ fn a_real_log_and_its_reference_become_a_case_on_one_clock() {
     assert!(named.is_empty() && diagnosis.gap < 1.2, "{named:?} {}", diagnosis.gap);
     assert!(!diagnosis.is_unexplained(), "{}", diagnosis.none_of_these);
     let whole = checked(&case);
-    assert!(whole.is_whole && !whole.text.contains("look"), "{}", whole.text);
+    assert!(whole.is_whole() && !whole.text().contains("look"), "{}", whole.text());
 
     // With what `calibrate` says of a magnetometer, the case has its parameters and how well they are known.
     let set = place.path().join("set.toml");
@@ -291,7 +291,7 @@ fn a_real_log_and_its_reference_become_a_case_on_one_clock() {
     // A clock that is off is said to be.
     let off = place.path().join("off");
     made(&arguments(&off, &["--offset-s=7.35"])).unwrap_or_else(|error| panic!("{error}"));
-    assert!(self::checked(&off).text.contains("take that off"));
+    assert!(self::checked(&off).text().contains("take that off"));
     // A log of another run is none.
     let other = flown(place.path(), "--motion hand --duration 60s");
     let mut strange = arguments(&place.path().join("strange"), &[]);

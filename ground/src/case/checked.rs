@@ -24,94 +24,115 @@ const DIFFER: f64 = 3.0;
 /// Gap beyond which a unit is rather misread than off: ten sigma in every channel.
 const MISREAD: f64 = 10.0;
 
-/// What was found; whether the case can be diagnosed.
+/// How a point is.
+#[derive(Clone, Copy)]
+enum Mark {
+    Ok,
+    Look,
+    Missing,
+}
+
+impl Mark {
+    fn word(self) -> &'static str {
+        match self {
+            Mark::Ok => "ok",
+            Mark::Look => "look",
+            Mark::Missing => "missing",
+        }
+    }
+}
+
+/// What was found.
 pub struct Checked {
-    /// A line a point.
-    pub text: String,
-    /// Nothing is missing.
-    pub is_whole: bool,
+    points: Vec<(Mark, String)>,
 }
 
 impl Checked {
+    /// Nothing is missing: the case can be diagnosed.
+    pub fn is_whole(&self) -> bool {
+        !self.points.iter().any(|(mark, _)| matches!(mark, Mark::Missing))
+    }
+
+    /// A line a point.
+    pub fn text(&self) -> String {
+        let line = |(mark, says): &(Mark, String)| format!("{:9}{says}\n", mark.word());
+        self.points.iter().map(line).collect()
+    }
+
     /// The points for programs: `whole`, and `points` of a `mark` (`ok`, `look`, `missing`) and what it `says`.
     pub fn json(&self) -> serde_json::Value {
-        let mut points: Vec<(String, String)> = Vec::new();
-        for line in self.text.lines() {
-            match (line.split_once(' '), points.last_mut()) {
-                // A message of several lines goes on without a mark.
-                (Some((mark @ ("ok" | "look" | "missing"), says)), _) => {
-                    points.push((mark.to_owned(), says.trim().to_owned()));
-                }
-                (_, Some((_, says))) => says.extend(["\n", line]),
-                (_, None) => {}
-            }
-        }
-        let points = points
-            .into_iter()
-            .map(|(mark, says)| serde_json::json!({ "mark": mark, "says": says }));
-        serde_json::json!({ "whole": self.is_whole, "points": serde_json::Value::from_iter(points) })
+        let point = |(mark, says): &(Mark, String)| serde_json::json!({ "mark": mark.word(), "says": says });
+        serde_json::json!({ "whole": self.is_whole(), "points": self.points.iter().map(point).collect::<Vec<_>>() })
+    }
+
+    fn ok(&mut self, says: String) {
+        self.points.push((Mark::Ok, says));
+    }
+
+    fn look(&mut self, says: String) {
+        self.points.push((Mark::Look, says));
     }
 }
 
 /// Checks a case.
 pub fn checked(folder: &Path) -> Checked {
-    let mut lines = Vec::new();
+    let mut checked = Checked { points: Vec::new() };
     let subject = match Subject::open(folder) {
         Ok(subject) => subject,
         Err(error) => {
-            return Checked {
-                text: format!("missing  {error}\n"),
-                is_whole: false,
-            };
+            checked.points.push((Mark::Missing, error.to_string()));
+            return checked;
         }
     };
     let unit = subject.twin.unit();
     let rows = subject.twin.starts_s().len();
-    lines.push(format!(
-        "ok       {} channels, {rows} rows in the windows, keys and files as the format has them",
+    checked.ok(format!(
+        "{} channels, {rows} rows in the windows, keys and files as the format has them",
         unit.channels.len()
     ));
-    stream(&subject, rows, &mut lines);
-    clocks(&subject, &mut lines);
-    windows(&subject, &mut lines);
-    sigmas(&subject, &mut lines);
-    gap_of(&subject, &mut lines);
-    Checked {
-        text: lines.join("\n") + "\n",
-        is_whole: true,
-    }
+    stream(&subject, rows, &mut checked);
+    clocks(&subject, &mut checked);
+    windows(&subject, &mut checked);
+    sigmas(&subject, &mut checked);
+    gap_of(&subject, &mut checked);
+    checked
 }
 
-fn stream(subject: &Subject, rows: usize, lines: &mut Vec<String>) {
+fn stream(subject: &Subject, rows: usize, checked: &mut Checked) {
     let stream = subject.stream;
     let spoilt = stream.lost + stream.rejected + stream.repeated;
-    let mark = if spoilt * 50 > rows as u64 { "look " } else { "ok   " };
-    lines.push(format!(
-        "{mark}    packets lost {}, repeated {}, not packets {}; samples unseen by the reference {}",
+    let mark = if spoilt * 50 > rows as u64 {
+        Mark::Look
+    } else {
+        Mark::Ok
+    };
+    let says = format!(
+        "packets lost {}, repeated {}, not packets {}; samples unseen by the reference {}",
         stream.lost, stream.repeated, stream.rejected, subject.unseen
-    ));
+    );
+    checked.points.push((mark, says));
     for (channel, masked) in subject.twin.unit().channels.iter().zip(&subject.masked) {
         let left_out = masked.missing + masked.clipped;
         if left_out * 10 > rows {
-            lines.push(format!(
-                "look     {}: {} samples missing, {} at the end of the range",
+            checked.look(format!(
+                "{}: {} samples missing, {} at the end of the range",
                 channel.name, masked.missing, masked.clipped
             ));
         }
     }
 }
 
-fn clocks(subject: &Subject, lines: &mut Vec<String>) {
+fn clocks(subject: &Subject, checked: &mut Checked) {
     if subject.opened.text.motion.is_none() {
         return;
     }
     match clock::error(subject) {
-        None => lines.push("look     no gyro turns: nothing tells whether the clocks are one".to_owned()),
+        None => checked.look("no gyro turns: nothing tells whether the clocks are one".to_owned()),
         Some(offset) => {
             let is_off = offset.seconds.abs() > OFF * offset.sigma_s && offset.seconds.abs() > MINDED_S;
-            lines.push(format!(
-                "{}    clocks: by the gyros the reference is {:+.4} +- {:.4} s off the log{}",
-                if is_off { "look " } else { "ok   " },
+            let mark = if is_off { Mark::Look } else { Mark::Ok };
+            let says = format!(
+                "clocks: by the gyros the reference is {:+.4} +- {:.4} s off the log{}",
                 offset.seconds,
                 offset.sigma_s,
                 if is_off {
@@ -119,13 +140,14 @@ fn clocks(subject: &Subject, lines: &mut Vec<String>) {
                 } else {
                     ""
                 }
-            ));
+            );
+            checked.points.push((mark, says));
         }
     }
 }
 
 /// What each half of the windows excites.
-fn windows(subject: &Subject, lines: &mut Vec<String>) {
+fn windows(subject: &Subject, checked: &mut Checked) {
     let feels = subject.twin.feels(0);
     let starts_s = subject.twin.starts_s();
     let of = |spans: &[gap::input::windows::Span], what: &dyn Fn(usize) -> f64| {
@@ -147,15 +169,15 @@ fn windows(subject: &Subject, lines: &mut Vec<String>) {
         }
     }
     match differ.is_empty() {
-        true => lines.push("ok       fit and hold hold the same kinds of motion".to_owned()),
-        false => lines.push(format!(
-            "look     fit and hold differ in {}: what only one excites cannot be judged",
+        true => checked.ok("fit and hold hold the same kinds of motion".to_owned()),
+        false => checked.look(format!(
+            "fit and hold differ in {}: what only one excites cannot be judged",
             differ.join(", ")
         )),
     }
 }
 
-fn sigmas(subject: &Subject, lines: &mut Vec<String>) {
+fn sigmas(subject: &Subject, checked: &mut Checked) {
     let sensed = subject
         .twin
         .unit()
@@ -167,23 +189,20 @@ fn sigmas(subject: &Subject, lines: &mut Vec<String>) {
         .map(|channel| channel.name.as_str())
         .collect();
     match exact.is_empty() {
-        true => lines.push("ok       every channel says how well its calibration knew it".to_owned()),
-        false => lines.push(format!(
-            "look     {}: bias_sigma, scale_sigma or axis_sigma_rad is 0, so any unit has a gap; take them from the set's covariance",
+        true => checked.ok("every channel says how well its calibration knew it".to_owned()),
+        false => checked.look(format!("{}: bias_sigma, scale_sigma or axis_sigma_rad is 0, so any unit has a gap; take them from the set's covariance",
             exact.join(" ")
         )),
     }
     let text = &subject.opened.text;
     if text.motion.is_some() && text.reference.attitude_sigma_rad == 0.0 {
-        lines.push(
-            "look     [reference] is absent: the reference is taken for exact, as a table's or a simulation's"
-                .to_owned(),
-        );
+        checked
+            .look("[reference] is absent: the reference is taken for exact, as a table's or a simulation's".to_owned());
     }
 }
 
 /// Channels that are off by so much that they are rather misread.
-fn gap_of(subject: &Subject, lines: &mut Vec<String>) {
+fn gap_of(subject: &Subject, checked: &mut Checked) {
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let predicted = subject.twin.predict(&[]);
     for (index, channel) in subject.twin.unit().channels.iter().enumerate() {
@@ -195,8 +214,8 @@ fn gap_of(subject: &Subject, lines: &mut Vec<String>) {
         let sum: f64 = series.rows.iter().zip(&series.values).map(square).sum();
         let gap = (sum / series.rows.len().max(1) as f64).sqrt();
         if gap > MISREAD {
-            lines.push(format!(
-                "look     {}: {gap:.0} sigma off; rather its unit, axis, sign or zero than an effect",
+            checked.look(format!(
+                "{}: {gap:.0} sigma off; rather its unit, axis, sign or zero than an effect",
                 channel.name
             ));
         }
