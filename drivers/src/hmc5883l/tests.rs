@@ -109,21 +109,23 @@ fn the_first_set_after_configuring_is_withheld() {
     });
 }
 
+fn asked() -> Config {
+    let mode = Mode::Asked;
+    Config {
+        mode,
+        ..Config::default()
+    }
+}
+
 /// Its outputs show the newest measurement until the next one: a second reading before that has the same set, which is as good.
 /// The same goes for one that was asked before and measures by itself now.
 #[test]
 fn a_part_that_measures_by_itself_is_ready_as_often_as_it_is_read() {
-    let (asked, wrote) = ([0x18, 0x20, 0x01], [0x18, 0x20, 0x00]);
+    let (first, then) = ([0x18, 0x20, 0x01], [0x18, 0x20, 0x00]);
     let sets = || vec![set(0x01, [0; 6]); 3].concat();
-    let expected = [configuration(asked, asked), configuration(wrote, wrote), sets()];
+    let expected = [configuration(first, first), configuration(then, then), sets()];
     with(&expected, async |part| {
-        let mode = Mode::Asked;
-        part.configure(Config {
-            mode,
-            ..Config::default()
-        })
-        .await
-        .unwrap();
+        part.configure(asked()).await.unwrap();
         part.configure(Config::default()).await.unwrap();
         assert_eq!(part.read().await, Ok(None));
         for _ in 0..2 {
@@ -138,13 +140,7 @@ fn a_part_that_is_asked_has_nothing_new_before_the_first_question() {
     let wrote = [0x18, 0x20, 0x01];
     let sets = || vec![set(0x01, [0; 6]); 2].concat();
     with(&[configuration(wrote, wrote), sets()], async |part| {
-        let mode = Mode::Asked;
-        part.configure(Config {
-            mode,
-            ..Config::default()
-        })
-        .await
-        .unwrap();
+        part.configure(asked()).await.unwrap();
         assert_eq!(part.read().await, Ok(None));
         assert!(!part.read().await.unwrap().unwrap().ready, "the same set again");
     });

@@ -37,6 +37,23 @@ pub struct Component {
     pub span: Option<Interval>,
 }
 
+#[cfg(test)]
+impl Component {
+    /// An effect of the library, always there.
+    pub(crate) fn always(effect: &str, locality: twin::effect::Locality, theta: &[f64]) -> Self {
+        let cause = Cause {
+            effect: twin::effect::by_name(effect).expect("in the library"),
+            locality,
+            variant: 0.0,
+        };
+        let theta = theta.to_vec();
+        Component {
+            active: Active { cause, theta },
+            span: None,
+        }
+    }
+}
+
 /// The least-squares problem of a case.
 pub struct Problem<'a> {
     /// The twin along the log.

@@ -117,7 +117,7 @@ impl Believed {
 }
 
 /// Parts of one effect at several places with channels in common, such as what all plates share and what each has of its own, are
-/// fitted together and mean nothing alone: if one of them is likely enough to be said, all have its probability. One effect
+/// fitted together and mean nothing alone ([`Problem::parts`] says the same of a model): if one of them is likely enough to be said, all have its probability. One effect
 /// twice at one place is two events, of which each is there or not.
 fn one_name(causes: &mut [Cause]) {
     let said: Vec<Cause> = causes

@@ -1,8 +1,7 @@
 //! Corrections as the bench and the unit read them back.
 
-use nalgebra::DVector;
 use twin::{
-    effect::{Cause, Locality, by_name},
+    effect::Locality,
     environment::Environment,
     motion::{Attitude, Motion, Pose, Tumble},
     predict::{Scene, emems},
@@ -17,26 +16,11 @@ fn twin() -> Twin {
     Twin::new(emems(|_| 0.0), environment, scene, vec![0.0, 5.0, 10.0]).expect("a twin")
 }
 
-fn component(effect: &str, locality: Locality, theta: &[f64]) -> Component {
-    let cause = Cause {
-        effect: by_name(effect).expect("in the library"),
-        locality,
-        variant: 0.0,
-    };
-    Component {
-        active: Active {
-            cause,
-            theta: DVector::from_column_slice(theta).iter().copied().collect(),
-        },
-        span: None,
-    }
-}
-
 #[test]
 fn the_set_of_hard_iron_and_a_scale_is_read_back_by_the_bench_and_the_unit() {
     let twin = twin();
-    let iron = component("hard-iron", Locality::Common, &[1.0, -2.0, 0.5]);
-    let scale = component("gyro-scale", Locality::Channel("g2".to_owned()), &[0.01]);
+    let iron = Component::always("hard-iron", Locality::Common, &[1.0, -2.0, 0.5]);
+    let scale = Component::always("gyro-scale", Locality::Channel("g2".to_owned()), &[0.01]);
     let correction = Correction::of(&twin, &[iron, scale]).expect("correctable");
     let set = Set::parse(&correction.set(&twin).expect("text")).expect("a set");
     let of = |name: &str| {
@@ -57,8 +41,8 @@ fn the_set_of_hard_iron_and_a_scale_is_read_back_by_the_bench_and_the_unit() {
 #[test]
 fn delays_and_places_stand_in_the_set_and_are_passed_over() {
     let twin = twin();
-    let late = component("gyro-latency", Locality::Common, &[0.012]);
-    let lever = component("lever-arm", Locality::Group("plate 2".to_owned()), &[0.01, 0.0, 0.0]);
+    let late = Component::always("gyro-latency", Locality::Common, &[0.012]);
+    let lever = Component::always("lever-arm", Locality::Group("plate 2".to_owned()), &[0.01, 0.0, 0.0]);
     let correction = Correction::of(&twin, &[late, lever]).expect("correctable");
     let text = correction.set(&twin).expect("text");
     assert_eq!(text.matches("delay_s").count(), 4, "{text}");
@@ -92,7 +76,7 @@ fn a_coefficient_that_bends_enters_the_set_as_it_bends() {
     let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s).expect("a twin");
     // The last one is beyond what is possible.
     for bend in [0.01, -0.004, 0.03] {
-        let mut warm = component("gyro-bias-temperature", Locality::Channel("g2".to_owned()), &[2e-4]);
+        let mut warm = Component::always("gyro-bias-temperature", Locality::Channel("g2".to_owned()), &[2e-4]);
         warm.active.cause.variant = bend;
         let correction = Correction::of(&twin, std::slice::from_ref(&warm)).expect("correctable");
         let set = Set::parse(&correction.set(&twin).expect("text")).expect("a set");
@@ -116,8 +100,8 @@ fn a_coefficient_that_bends_enters_the_set_as_it_bends() {
 #[test]
 fn what_passes_or_is_the_references_fault_is_not_the_units_to_correct() {
     let twin = twin();
-    let mut iron = component("hard-iron", Locality::Common, &[1.0, 0.0, 0.0]);
+    let mut iron = Component::always("hard-iron", Locality::Common, &[1.0, 0.0, 0.0]);
     iron.span = Some(Span { from: 0.0, to: 5.0 }.into());
-    let tilt = component("table-tilt", Locality::Unit, &[0.01, 0.0]);
+    let tilt = Component::always("table-tilt", Locality::Unit, &[0.01, 0.0]);
     assert!(Correction::of(&twin, &[iron, tilt]).is_none());
 }

@@ -1,5 +1,5 @@
 use twin::{
-    effect::{Cause, Locality, by_name},
+    effect::Locality,
     environment::Environment,
     motion::Tumble,
     predict::{Scene, emems},
@@ -7,21 +7,6 @@ use twin::{
 
 use super::*;
 use crate::input::log::Series;
-
-fn component(effect: &str, locality: Locality, parameters: usize) -> Component {
-    let cause = Cause {
-        effect: by_name(effect).expect("in the library"),
-        locality,
-        variant: 0.0,
-    };
-    Component {
-        active: Active {
-            cause,
-            theta: vec![1.0; parameters],
-        },
-        span: None,
-    }
-}
 
 /// What all plates share and what each has of its own stand in for each other: taken away one by one, neither explains much.
 #[test]
@@ -40,11 +25,11 @@ fn parts_of_one_effect_that_share_channels_are_one_name_and_are_taken_away_toget
     let problem = Problem::new(&twin, &fit, &reference);
     let channel = |name: &str| Locality::Channel(name.to_owned());
     let model = [
-        component("hard-iron", Locality::All, 12),
-        component("gyro-scale", channel("g1"), 1),
-        component("hard-iron", Locality::Common, 3),
-        component("gyro-scale", channel("g2"), 1),
-        component("hard-iron", Locality::Common, 3),
+        Component::always("hard-iron", Locality::All, &[1.0; 12]),
+        Component::always("gyro-scale", channel("g1"), &[1.0; 1]),
+        Component::always("hard-iron", Locality::Common, &[1.0; 3]),
+        Component::always("gyro-scale", channel("g2"), &[1.0; 1]),
+        Component::always("hard-iron", Locality::Common, &[1.0; 3]),
     ];
     assert_eq!(problem.parts(&model, 0), [0, 2, 4]);
     assert_eq!(problem.parts(&model, 1), [1], "another gyro is another effect");
