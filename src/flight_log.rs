@@ -35,6 +35,8 @@ pub mod page;
 pub mod record;
 mod status;
 pub mod superblock;
+#[cfg(test)]
+mod tests;
 
 pub use self::{error::LogError, mount::Resumed, status::Status};
 use self::{

@@ -168,7 +168,8 @@ impl<N: Nand> FlightLog<N> {
     /// Saves the superblock: two pages in a block that was erased since this start and is not the one with the save
     /// before. Leaves the composed page alone.
     pub(super) async fn save(&mut self) -> Result<(), LogError> {
-        for _ in 0..2 * LOG_START {
+        // Each of the blocks fails once, and the home perhaps with room in it.
+        for _ in 0..=LOG_START {
             self.superblock.number = self.superblock.number.saturating_add(1);
             let (block, page) = match self.home {
                 (block, Some(page)) if page <= PAGES_PER_BLOCK - COPIES => (block, page),
@@ -200,8 +201,8 @@ impl<N: Nand> FlightLog<N> {
                 return Ok(());
             }
             self.remember_bad(block);
-            // A home that failed with an older save in it still has that one; one that was just erased has none.
-            self.home = if page > 0 { (block, None) } else { (self.home.0, None) };
+            // The home still has the save before, be it the one that failed; a block that was just erased has none.
+            self.home.1 = None;
         }
         Err(LogError::Worn)
     }

@@ -85,7 +85,7 @@ impl<N: Nand> FlightLog<N> {
 
     /// Whether `first` holds nothing but copies out of `before`, or what an erase that was cut left, and headers of the boot
     /// that began there.
-    fn is_only_begun(&mut self, first: u16, before: u16) -> Result<bool, LogError> {
+    pub(super) fn is_only_begun(&mut self, first: u16, before: u16) -> Result<bool, LogError> {
         let boot = self.superblock.boot;
         let there = self.lasting_keys(before, |_| true)?;
         self.all_records(first, |key| there.contains(&key) || (key.boot == boot && key.seq == 0))

@@ -22,7 +22,7 @@ use super::{
     page::{self, Kind},
     record::{CRC, RECORD_BYTES, RecordBytes},
 };
-use crate::nand::{Nand, NandError, PageAddress};
+use crate::nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress};
 
 /// Blocks at the end of the chip that the log leaves alone.
 pub(super) const SET_BLOCKS: u16 = 4;
@@ -37,6 +37,7 @@ const CHECKED: usize = RECORD_BYTES - 4;
 const PIECE: usize = CHECKED - HEAD;
 /// Twice these fit a block.
 const MOST_PIECES: usize = 16;
+const _: () = assert!(2 * MOST_PIECES <= PAGES_PER_BLOCK as usize);
 
 /// What a piece says of itself.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -172,21 +173,20 @@ impl<N: Nand> FlightLog<N> {
         Ok(None)
     }
 
-    /// The highest number in a block, whole or not.
+    /// The set in a block, whole or not: of a block that was erased before there is one only.
     fn set_in(&mut self, block: u16) -> Result<Option<Piece>, LogError> {
-        let mut highest: Option<Piece> = None;
-        for page in 0..2 * MOST_PIECES as u8 {
+        for page in 0..PAGES_PER_BLOCK {
             let at = PageAddress { block, page };
             self.chip.read(at, &mut self.back)?;
             if page::is_blank(&self.back) {
                 break;
             }
             let found = self.piece_read();
-            if found.is_some_and(|found| highest.is_none_or(|highest| highest.number < found.number)) {
-                highest = found;
+            if found.is_some() {
+                return Ok(found);
             }
         }
-        Ok(highest)
+        Ok(None)
     }
 
     /// Reads a set's pieces from either copy; whether all are there.

@@ -42,7 +42,7 @@ pub struct Resumed {
 
 /// What the superblock's blocks hold.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Found {
+pub(super) enum Found {
     /// The newest save, both copies, and nothing torn.
     Sure,
     /// A save, but a newer one may be lost.
@@ -132,7 +132,7 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Reads the superblock's blocks.
-    fn find_superblock(&mut self) -> Result<Found, LogError> {
+    pub(super) fn find_superblock(&mut self) -> Result<Found, LogError> {
         let mut found = Found::Nothing;
         let mut copies = 0_u8;
         let mut torn = [false; LOG_START as usize];
@@ -185,7 +185,7 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// The last live block, sought among those of the newest boot.
-    fn search_head(&mut self) -> Result<Option<u16>, LogError> {
+    pub(super) fn search_head(&mut self) -> Result<Option<u16>, LogError> {
         let begun = [self.superblock.first_block, self.superblock.block_before];
         let [other, first] = [begun.iter().min(), begun.iter().max()].map(|block| *block.unwrap_or(&0));
         let first = first.max(LOG_START);
@@ -239,7 +239,7 @@ impl<N: Nand> FlightLog<N> {
     }
 
     /// Looks at every block; the last one of the newest epoch. Without a superblock it makes a new one of what it finds.
-    async fn scan(&mut self, superblock: bool) -> Result<Option<u16>, LogError> {
+    pub(super) async fn scan(&mut self, superblock: bool) -> Result<Option<u16>, LogError> {
         let mut newest: Option<(u16, u16)> = None;
         let (mut foreign, mut usable) = (false, false);
         for block in 0..self.chip.blocks() {
