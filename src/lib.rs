@@ -31,6 +31,8 @@ pub mod command;
 pub mod crash;
 pub mod derived;
 pub mod discrete;
+#[cfg(test)]
+mod draws;
 pub mod estimate;
 pub mod faults;
 pub mod flight_log;

@@ -337,3 +337,6 @@ fn is_near(acc_n: &Vector3<f32>, gravity: f32, part: f32) -> bool {
     let squared = acc_n.norm_squared();
     squared > least * least && squared < most * most
 }
+
+#[cfg(test)]
+mod tests;
