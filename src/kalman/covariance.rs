@@ -345,3 +345,6 @@ fn mirror<const N: usize>(block: &mut [[f32; N]]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -217,3 +217,6 @@ impl Reference {
 
 /// Horizontal part of the field that still tells a heading.
 const LEAST_HORIZONTAL: f32 = 1e-3;
+
+#[cfg(test)]
+mod tests;

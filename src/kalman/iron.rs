@@ -158,3 +158,6 @@ impl HardIron {
             && squares.is_finite()
     }
 }
+
+#[cfg(test)]
+mod tests;

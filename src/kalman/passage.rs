@@ -148,3 +148,6 @@ impl Passage {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

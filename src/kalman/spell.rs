@@ -142,3 +142,6 @@ impl Spell {
         self.variance = 0.0;
     }
 }
+
+#[cfg(test)]
+mod tests;

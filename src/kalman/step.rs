@@ -102,3 +102,6 @@ impl Sampled {
             && self.scatter < LONGEST_SAMPLE * LONGEST_SAMPLE
     }
 }
+
+#[cfg(test)]
+mod tests;
