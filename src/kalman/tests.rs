@@ -129,8 +129,12 @@ mod force;
 mod gyros;
 mod hostile;
 mod iron;
+mod given;
 mod nose;
+mod propagated;
 mod recovery;
+mod resumed;
+mod settled;
 
 #[test]
 fn at_rest_it_aligns_within_a_window_and_stays() {

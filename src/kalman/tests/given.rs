@@ -1,0 +1,101 @@
+//! What another filter hands over is taken, and what it does not know stays.
+
+use nalgebra::SMatrix;
+
+use super::*;
+use crate::{
+    draws::Draws,
+    kalman::state::{DRIVEN, STATES},
+};
+
+/// A filter in flight, in the middle of a window, with a correction pending and everything else in motion.
+fn flying(draws: &mut Draws) -> Filter {
+    let mut world = World::new(draws.attitude(), params());
+    world.fly(3.0, draws.vector(0.5), |_, step| biased(step));
+    world.fly(2.0 * STEP_S, draws.vector(0.5), nothing);
+    let mut filter = world.filter;
+    filter.silent_s = 0.3;
+    filter.rejected_s = [2.0, 3.0];
+    filter.rested = true;
+    filter.velocity_n = Vector2::new(0.1, 0.2);
+    filter
+}
+
+fn known(draws: &mut Draws, spin: f32) -> Known {
+    let root = SMatrix::<f32, 6, 6>::from_fn(|_, _| draws.within(-0.01, 0.01));
+    Known {
+        q_nb: draws.attitude(),
+        rate_b: draws.vector(1.0),
+        bias_b: draws.vector(0.01),
+        covariance: root * root.transpose() + SMatrix::from_diagonal_element(1e-5),
+        sees_spin_b: draws.vector(0.01),
+        sees_spin_variance: Vector3::new(0.5 * spin, spin, 2.0 * spin),
+    }
+}
+
+#[test]
+fn it_goes_on_from_what_is_known() {
+    for seed in 0..20 {
+        let mut draws = Draws::of(seed);
+        let mut filter = flying(&mut draws);
+        let mut before = filter.clone();
+        before.settlements = before.settlements.wrapping_add(1);
+        // Known better than the filter knows it in the first row, as well in the second, and worse in the third.
+        let of_spin = |row: usize| DRIVEN + 3 + 3 * row;
+        let p = before.covariance.matrix();
+        let mut known = known(&mut draws, 1.0);
+        for (row, part) in [0.5, 1.0, 2.0].into_iter().enumerate() {
+            known.sees_spin_variance[row] = part * p[(of_spin(row), of_spin(row))];
+        }
+        filter.go_on(77_000_000, &known);
+        let state = (filter.q_nb, filter.rate_b, filter.bias_b, filter.last_us, filter.aligned);
+        assert_eq!(state, (known.q_nb, known.rate_b, known.bias_b, Some(77_000_000), true));
+        assert_eq!((filter.velocity_n, filter.silent_s, filter.rejected_s), (Vector2::zeros(), 0.0, [0.0; 2]));
+        assert!(!filter.rested && filter.gyro_b.is_none() && filter.going.is_none() && filter.contradicted.is_none());
+        assert_eq!(filter.window.duration_s, 0.0);
+        assert!(filter.pending.is_done() && filter.settlements == before.settlements);
+        for row in 0..3 {
+            for column in 0..3 {
+                let taken = row == 0 && column == 0;
+                let expected = if taken { known.sees_spin_b[0] } else { before.gyro_matrix[(row, column)] };
+                assert_eq!(filter.gyro_matrix[(row, column)], expected, "{row} {column}");
+            }
+        }
+        let found = filter.covariance.matrix();
+        // Attitude 0 to 2 and bias 5 to 7 are given; the velocity is bounded; the gyro matrix stands, but for its first column
+        // where that is known better.
+        let given = |k: usize| match k {
+            0..3 => Some(k),
+            5..8 => Some(k - 2),
+            _ => None,
+        };
+        for row in 0..STATES {
+            for column in 0..STATES {
+                let matrix = |k: usize| k >= DRIVEN + 3 && k != of_spin(0);
+                let expected = match (given(row), given(column)) {
+                    (Some(row), Some(column)) => known.covariance[(row, column)],
+                    (None, None) if matrix(row) && matrix(column) => p[(row, column)],
+                    (None, None) if row == column && row == of_spin(0) => known.sees_spin_variance[0],
+                    (None, None) if row == column => square(filter.params.velocity_sd),
+                    _ => 0.0,
+                };
+                assert_eq!(found[(row, column)], expected, "{row} {column}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_no_number_begins_anew_and_forgetting_does_too() {
+    let mut draws = Draws::of(1);
+    let mut filter = flying(&mut draws);
+    let mut wrong = known(&mut draws, 1.0);
+    wrong.bias_b.y = f32::NAN;
+    filter.go_on(1, &wrong);
+    assert!(!filter.aligned && filter.bias_b == Vector3::zeros());
+    let mut filter = flying(&mut draws);
+    filter.forget();
+    let fresh = Filter::new(params());
+    assert_eq!((filter.aligned, filter.q_nb, filter.last_us), (false, fresh.q_nb, None));
+    assert_eq!(filter.covariance, fresh.covariance);
+}
