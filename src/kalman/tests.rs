@@ -126,10 +126,10 @@ fn biased(step: &mut Step) {
 mod correction;
 mod disturbed;
 mod force;
+mod given;
 mod gyros;
 mod hostile;
 mod iron;
-mod given;
 mod nose;
 mod propagated;
 mod recovery;

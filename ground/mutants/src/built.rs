@@ -45,7 +45,7 @@ pub fn built(root: &Path, mutants: &[Mutant], tests: &[String]) -> Result<Built,
             } else {
                 arguments.extend(tests.iter().cloned());
             }
-            let (ok, messages, stderr) = cargo(root, &copy, &arguments)?;
+            let (ok, messages, stderr) = cargo(&copy, &arguments)?;
             if ok {
                 built.programs = programs(&messages);
                 break;
@@ -137,7 +137,7 @@ fn written(
     Ok(())
 }
 
-fn cargo(root: &Path, copy: &Path, arguments: &[String]) -> Result<(bool, Vec<Value>, String), String> {
+fn cargo(copy: &Path, arguments: &[String]) -> Result<(bool, Vec<Value>, String), String> {
     let mut cargo = Command::new("cargo");
     cargo.args(arguments).args([
         "--ignore-rust-version",
@@ -145,7 +145,9 @@ fn cargo(root: &Path, copy: &Path, arguments: &[String]) -> Result<(bool, Vec<Va
         "--offline",
         "--message-format=json",
     ]);
-    cargo.current_dir(copy).env("CARGO_TARGET_DIR", root.join("target"));
+    // Its own folder: cargo takes a crate of the copy for the repository's (same name, same place in its workspace), and the tests
+    // of the repository would be the woven ones from then on.
+    cargo.current_dir(copy).env("CARGO_TARGET_DIR", copy.join("target"));
     let output = said(copy, cargo.output())?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let messages = text

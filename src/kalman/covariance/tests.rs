@@ -174,7 +174,14 @@ fn after_a_reset_the_velocity_is_forgotten_and_the_attitude_grows() {
 #[test]
 fn the_worst_is_the_largest_of_three() {
     let mut p = drawn(1);
-    for variances in [[1.0, 2.0, 3.0], [3.0, 1.0, 2.0], [2.0, 3.0, 1.0], [3.0, 2.0, 1.0], [1.0, 3.0, 2.0], [2.0, 1.0, 3.0]] {
+    for variances in [
+        [1.0, 2.0, 3.0],
+        [3.0, 1.0, 2.0],
+        [2.0, 3.0, 1.0],
+        [3.0, 2.0, 1.0],
+        [1.0, 3.0, 2.0],
+        [2.0, 1.0, 3.0],
+    ] {
         (0..3).for_each(|k| p.driven[k][k] = variances[k]);
         assert_eq!(p.worst(), 3.0, "{variances:?}");
     }

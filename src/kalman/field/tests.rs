@@ -29,7 +29,9 @@ fn samples(draws: &mut Draws, apart: f32) -> Vec<(Vector3<f32>, Matrix3<f32>, f3
 fn sums(samples: &[(Vector3<f32>, Matrix3<f32>, f32)]) -> FieldSums {
     let mut sums = FieldSums::NONE;
     assert!(sums.if_any().is_none());
-    samples.iter().for_each(|(mag_b, dcm, variance)| sums.take(mag_b, dcm, *variance));
+    samples
+        .iter()
+        .for_each(|(mag_b, dcm, variance)| sums.take(mag_b, dcm, *variance));
     sums
 }
 
@@ -38,8 +40,16 @@ fn mean(samples: &[(Vector3<f32>, Matrix3<f32>, f32)], iron_b: &Vector3<f32>) ->
     let count = samples.len() as f64;
     let in_n = |(mag_b, dcm, _): &(Vector3<f32>, Matrix3<f32>, f32)| dcm.cast::<f64>() * (mag_b - iron_b).cast();
     let mean = samples.iter().map(in_n).fold(V::zeros(), |sum, value| sum + value) / count;
-    let apart = samples.iter().map(|sample| (in_n(sample) - mean).norm_squared()).sum::<f64>() / count;
-    (mean, apart, samples.iter().map(|sample| of(sample.2)).sum::<f64>() / count)
+    let apart = samples
+        .iter()
+        .map(|sample| (in_n(sample) - mean).norm_squared())
+        .sum::<f64>()
+        / count;
+    (
+        mean,
+        apart,
+        samples.iter().map(|sample| of(sample.2)).sum::<f64>() / count,
+    )
 }
 
 #[test]
@@ -55,7 +65,11 @@ fn the_mean_field_is_that_of_the_samples_without_the_iron() {
         let (mean, apart, noise) = mean(&samples, &iron_b);
         assert!((found.mag_n.cast::<f64>() - mean).norm() < 1e-4);
         let spread = (apart - 3.0 * noise).max(0.0);
-        assert!(near(found.spread, spread, 1e-3, 3e-3), "{seed}: {} {spread}", found.spread);
+        assert!(
+            near(found.spread, spread, 1e-3, 3e-3),
+            "{seed}: {} {spread}",
+            found.spread
+        );
         let white = (spread + noise) / samples.len() as f64;
         assert!(near(found.white, white, 1e-3, 2e-3), "{seed}: {} {white}", found.white);
         let unrest = of(params.field_spread).powi(2) * spread + white;
@@ -64,7 +78,12 @@ fn the_mean_field_is_that_of_the_samples_without_the_iron() {
         let direction = of(params.start_field_sd).powi(2)
             + of(params.disturbance).powi(2) * of(disturbance)
             + (0.2 * spread + white) / mean.norm_squared();
-        assert!(near(found.direction_sd(&params, disturbance), direction.sqrt(), 1e-3, 1e-6));
+        assert!(near(
+            found.direction_sd(&params, disturbance),
+            direction.sqrt(),
+            1e-3,
+            1e-6
+        ));
         let turned = draws.dcm();
         let mut other = sums;
         other.turn_axes(&turned);
@@ -81,7 +100,11 @@ fn the_field_is_compared_across_itself() {
     };
     for seed in 0..300 {
         let mut draws = Draws::of(seed);
-        let (norm, dip, declination) = (draws.within(20.0, 60.0), draws.within(-1.4, 1.4), draws.within(-3.0, 3.0));
+        let (norm, dip, declination) = (
+            draws.within(20.0, 60.0),
+            draws.within(-1.4, 1.4),
+            draws.within(-3.0, 3.0),
+        );
         let reference = Reference::known(norm, dip, declination);
         let known_n = reference.field_n_ut().expect("known");
         let (norm, dip, declination) = (of(norm), of(dip), of(declination));
@@ -122,12 +145,21 @@ fn the_field_is_compared_across_itself() {
         let sds = [of(params.heading_sd) * dip.cos(), of(params.dip_sd)];
         let lasts = (of(params.field_lasts_s) / of(duration_s)).max(1.0);
         for (k, scalar) in found.scalars.iter().enumerate() {
-            assert!(near(scalar.residual, residuals[k], 1e-4, 1e-5), "{seed} {k}: {scalar:?} {residuals:?}");
+            assert!(
+                near(scalar.residual, residuals[k], 1e-4, 1e-5),
+                "{seed} {k}: {scalar:?} {residuals:?}"
+            );
             for axis in 0..3 {
-                assert!(near(scalar.row_n[axis], of_turn(axis)[k], 1e-3, 1e-4), "{seed} {k} {axis}: {scalar:?}");
+                assert!(
+                    near(scalar.row_n[axis], of_turn(axis)[k], 1e-3, 1e-4),
+                    "{seed} {k} {axis}: {scalar:?}"
+                );
             }
             assert!(near(scalar.noise.alone, sds[k].powi(2) + seen, 1e-4, 0.0), "{seed} {k}");
-            assert!(near(scalar.noise.lasting, sds[k].powi(2) * lasts + seen, 1e-4, 0.0), "{seed} {k}");
+            assert!(
+                near(scalar.noise.lasting, sds[k].powi(2) * lasts + seen, 1e-4, 0.0),
+                "{seed} {k}"
+            );
         }
         assert!(near(found.disturbance, disturbance, 1e-3, 1e-6), "{seed}");
         assert!(near(found.horizontal, dip.cos(), 1e-5, 0.0), "{seed}");
@@ -138,7 +170,10 @@ fn the_field_is_compared_across_itself() {
         let down = -acc_n.cast::<f64>().normalize();
         let dip_found = core::f64::consts::FRAC_PI_2 - m.normalize().dot(&down).acos();
         let disturbance = (m.norm() / norm - 1.0).powi(2) + (dip_found - dip).powi(2);
-        assert!(near(reference.disturbance(&mean.mag_n, &acc_n), disturbance, 1e-3, 1e-5), "{seed}");
+        assert!(
+            near(reference.disturbance(&mean.mag_n, &acc_n), disturbance, 1e-3, 1e-5),
+            "{seed}"
+        );
     }
 }
 
@@ -168,7 +203,11 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
         let mut draws = Draws::of(seed);
         let at_site = draws.below(2) == 0;
         let declination = draws.within(-1.0, 1.0);
-        let mut reference = if at_site { Reference::at_site(declination) } else { Reference::unknown() };
+        let mut reference = if at_site {
+            Reference::at_site(declination)
+        } else {
+            Reference::unknown()
+        };
         let iron_b = draws.vector(3.0);
         let (mut weighted_n, mut turned, mut lasted_s, mut found_at) = (V::zeros(), Matrix3::<f64>::zeros(), 0.0, 0.0);
         for _ in 0..30 {
@@ -179,12 +218,17 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
             if learning {
                 lasted_s += of(duration_s);
                 weighted_n += mean(&samples, &Vector3::zeros()).0 * of(duration_s);
-                let dcms = samples.iter().fold(Matrix3::zeros(), |sum, sample| sum + sample.1.cast::<f64>());
+                let dcms = samples
+                    .iter()
+                    .fold(Matrix3::zeros(), |sum, sample| sum + sample.1.cast::<f64>());
                 turned += dcms * (of(duration_s) / samples.len() as f64);
             }
             let field_n = (weighted_n - turned * iron_b.cast::<f64>()) / lasted_s;
             assert!(near(reference.norm_ut, field_n.norm(), 1e-4, 1e-3), "{seed}");
-            assert!(near(reference.dip, field_n.z.atan2(field_n.xy().norm()), 1e-4, 1e-4), "{seed}");
+            assert!(
+                near(reference.dip, field_n.z.atan2(field_n.xy().norm()), 1e-4, 1e-4),
+                "{seed}"
+            );
             let points_at = field_n.y.atan2(field_n.x);
             if learning {
                 found_at = points_at;
@@ -210,7 +254,10 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
         let (norm_ut, dip) = (later.norm_ut, later.dip);
         later.have_other_iron(&params, &other_b);
         later.learn(&params, 1.0, &sums(&samples), &draws.vector(20.0));
-        assert!(near(later.norm_ut, norm_ut.into(), 1e-4, 0.0) && near(later.dip, dip.into(), 1e-4, 1e-5), "{seed}");
+        assert!(
+            near(later.norm_ut, norm_ut.into(), 1e-4, 0.0) && near(later.dip, dip.into(), 1e-4, 1e-5),
+            "{seed}"
+        );
     }
 }
 

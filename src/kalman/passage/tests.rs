@@ -31,7 +31,13 @@ fn drawn(seed: u64) -> Drawn {
     for _ in 0..10 {
         let covered_s = draws.within(0.05, 0.15);
         let gyro_b = draws.vector(0.3);
-        window.turn(&draws.dcm(), &gyro_b, covered_s, draws.within(0.0, 0.02), draws.within(0.0, 0.01));
+        window.turn(
+            &draws.dcm(),
+            &gyro_b,
+            covered_s,
+            draws.within(0.0, 0.02),
+            draws.within(0.0, 0.01),
+        );
         let acc_n = Vector3::new(0.0, 0.0, -params.gravity) + draws.vector(0.5);
         let sampled = Sampled {
             value_b: acc_n,
@@ -82,7 +88,11 @@ fn f_and_q(drawn: &Drawn) -> (Matrix, Matrix) {
         // (a + B d) x (0, 0, -1), north and east.
         f[(3, DRIVEN + k)] = -tilt * mean(1);
         f[(4, DRIVEN + k)] = tilt * mean(0);
-        let walk = if k < 3 { params.bias_walk } else { params.gyro_matrix_walk };
+        let walk = if k < 3 {
+            params.bias_walk
+        } else {
+            params.gyro_matrix_walk
+        };
         q[(DRIVEN + k, DRIVEN + k)] = of(walk) * of(walk) * of(means.duration_s);
     }
     (f[(3, 1)], f[(4, 0)]) = (-tilt, tilt);
@@ -108,7 +118,10 @@ fn is(found: &State, expected: &Column, what: &str) {
     let numbers = found.driven.iter().chain(&found.drivers);
     let scale = expected.amax();
     for (k, (found, expected)) in numbers.zip(expected.iter()).enumerate() {
-        assert!(near(*found, *expected, 1e-4, 1e-5 * scale), "{what} {k}: {found} {expected}");
+        assert!(
+            near(*found, *expected, 1e-4, 1e-5 * scale),
+            "{what} {k}: {found} {expected}"
+        );
     }
 }
 

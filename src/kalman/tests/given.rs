@@ -48,16 +48,29 @@ fn it_goes_on_from_what_is_known() {
             known.sees_spin_variance[row] = part * p[(of_spin(row), of_spin(row))];
         }
         filter.go_on(77_000_000, &known);
-        let state = (filter.q_nb, filter.rate_b, filter.bias_b, filter.last_us, filter.aligned);
+        let state = (
+            filter.q_nb,
+            filter.rate_b,
+            filter.bias_b,
+            filter.last_us,
+            filter.aligned,
+        );
         assert_eq!(state, (known.q_nb, known.rate_b, known.bias_b, Some(77_000_000), true));
-        assert_eq!((filter.velocity_n, filter.silent_s, filter.rejected_s), (Vector2::zeros(), 0.0, [0.0; 2]));
+        assert_eq!(
+            (filter.velocity_n, filter.silent_s, filter.rejected_s),
+            (Vector2::zeros(), 0.0, [0.0; 2])
+        );
         assert!(!filter.rested && filter.gyro_b.is_none() && filter.going.is_none() && filter.contradicted.is_none());
         assert_eq!(filter.window.duration_s, 0.0);
         assert!(filter.pending.is_done() && filter.settlements == before.settlements);
         for row in 0..3 {
             for column in 0..3 {
                 let taken = row == 0 && column == 0;
-                let expected = if taken { known.sees_spin_b[0] } else { before.gyro_matrix[(row, column)] };
+                let expected = if taken {
+                    known.sees_spin_b[0]
+                } else {
+                    before.gyro_matrix[(row, column)]
+                };
                 assert_eq!(filter.gyro_matrix[(row, column)], expected, "{row} {column}");
             }
         }

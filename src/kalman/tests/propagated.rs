@@ -55,11 +55,15 @@ fn a_step_turns_the_attitude_and_adds_the_variance_of_what_is_not_known() {
         let q: UnitQuaternion<f64> = before.q_nb.cast();
         let began = q * UnitQuaternion::from_scaled_axis(bridged_b);
         // The rates at both ends say how the turn bends, unless there was a gap between them.
-        let rates_b = before.gyro_b.filter(|_| gap_s < 5e-4).map(|began_b| [began_b, step.rate_b]);
+        let rates_b = before
+            .gyro_b
+            .filter(|_| gap_s < 5e-4)
+            .map(|began_b| [began_b, step.rate_b]);
         let (_, mean) = path::through(&began.cast(), &gyro_b, rates_b, covered_s);
         let wrong_b = matrix * v(&gyro_b) + bias_b * of(covered_s);
         let moved_n = mean.cast::<f64>() * wrong_b + v(&params.earth_rate_n) * of(covered_s + gap_s);
-        let expected = UnitQuaternion::from_scaled_axis(-moved_n) * began * UnitQuaternion::from_scaled_axis(v(&gyro_b));
+        let expected =
+            UnitQuaternion::from_scaled_axis(-moved_n) * began * UnitQuaternion::from_scaled_axis(v(&gyro_b));
         assert!(filter.q_nb.cast::<f64>().angle_to(&expected) < 3e-5, "{seed}");
         for axis in 0..3 {
             for k in 0..3 {
@@ -82,8 +86,16 @@ fn a_step_turns_the_attitude_and_adds_the_variance_of_what_is_not_known() {
             variance += (of(params.saturated_rate_sd) * of(covered_s)).powi(2);
         }
         assert!(near(filter.window.angle_variance, variance, 1e-4, 1e-9), "{seed}");
-        let (of_gyros, silent_s) = if rotation { (step.angle_variance, 0.0) } else { (0.0, before.silent_s + gap_s) };
-        assert_eq!((filter.window.gyro_variance, filter.silent_s), (of_gyros, silent_s), "{seed}");
+        let (of_gyros, silent_s) = if rotation {
+            (step.angle_variance, 0.0)
+        } else {
+            (0.0, before.silent_s + gap_s)
+        };
+        assert_eq!(
+            (filter.window.gyro_variance, filter.silent_s),
+            (of_gyros, silent_s),
+            "{seed}"
+        );
         assert_eq!(filter.gyro_b, rotation.then_some(step.rate_b));
         assert!(near(filter.window.duration_s, of(covered_s + gap_s), 1e-5, 0.0));
     }
@@ -105,7 +117,11 @@ fn samples_are_carried_by_the_attitude_of_their_instant() {
         let longest_us = draws.one_of([100_000, 1_100_000]);
         let at = |draws: &mut Draws, at_us: u64| {
             let off_us = draws.below(longest_us);
-            if draws.below(2) == 0 { at_us - off_us } else { at_us + off_us }
+            if draws.below(2) == 0 {
+                at_us - off_us
+            } else {
+                at_us + off_us
+            }
         };
         let mut step = World::new(UnitQuaternion::identity(), params()).step(Vector3::zeros());
         step.at_us = 9_000_000;
@@ -123,19 +139,25 @@ fn samples_are_carried_by_the_attitude_of_their_instant() {
         let dcm = crate::attitude::dcm_nb(&filter.q_nb);
         filter.gather(&step, &dcm);
         let delays = filter.params.delays;
-        let offset_s = |sampled: &Sampled, delay_s: f32| {
-            (sampled.at_us as f64 - 9e6) * 1e-6 + of(delays.gyro_s) - of(delay_s)
-        };
+        let offset_s =
+            |sampled: &Sampled, delay_s: f32| (sampled.at_us as f64 - 9e6) * 1e-6 + of(delays.gyro_s) - of(delay_s);
         let in_n = |sampled: &Sampled, offset_s: f64| {
             let turned = UnitQuaternion::from_scaled_axis(v(&filter.rate_b) * offset_s);
             filter.q_nb.cast::<f64>() * turned * v(&sampled.value_b)
         };
         let acc_n = filter.window.means(&filter.params, false).acc_n;
-        let mag_n = filter.window.field().if_any().map(|sums| sums.mean(&Vector3::zeros()).mag_n);
+        let mag_n = filter
+            .window
+            .field()
+            .if_any()
+            .map(|sums| sums.mean(&Vector3::zeros()).mag_n);
         let of_acc = offset_s(&acc, delays.acc_s);
         let of_mag = offset_s(&mag, delays.mag_s);
         let window_s = of(filter.params.window_s);
-        for (offset_s, found, sampled) in [(of_acc, Some(acc_n).filter(|acc_n| acc_n.norm() > 0.0), acc), (of_mag, mag_n, mag)] {
+        for (offset_s, found, sampled) in [
+            (of_acc, Some(acc_n).filter(|acc_n| acc_n.norm() > 0.0), acc),
+            (of_mag, mag_n, mag),
+        ] {
             assert!((offset_s.abs() - window_s).abs() > 1e-4, "no seed is on the edge");
             let Some(found) = found else {
                 left += 1;

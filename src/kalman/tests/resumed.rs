@@ -42,7 +42,13 @@ struct Missed {
     variance: f64,
 }
 
-fn missed(before: &Filter, outage: &Outage, step: &Step, first_rate_b: Option<Vector3<f64>>, bias_variance: f64) -> Missed {
+fn missed(
+    before: &Filter,
+    outage: &Outage,
+    step: &Step,
+    first_rate_b: Option<Vector3<f64>>,
+    bias_variance: f64,
+) -> Missed {
     let params = &before.params;
     let from_us = step.at_us - (step.covered_s * 1e6) as u64;
     let s = of(outage.lasted_s) + (from_us.saturating_sub(outage.ended_us)) as f64 * 1e-6;
@@ -52,7 +58,11 @@ fn missed(before: &Filter, outage: &Outage, step: &Step, first_rate_b: Option<Ve
     let fastest = first_b.norm().max(second_b.norm());
     let sd = s * ((second_b - first_b).norm() / 2.0 + 0.1 * fastest) + of(outage.sd_s) * fastest;
     let noise = of(params.angle_noise).powi(2) * (s + 2.0 * of(params.window_s));
-    let saturated = if step.saturated { (of(params.saturated_rate_sd) * s).powi(2) } else { 0.0 };
+    let saturated = if step.saturated {
+        (of(params.saturated_rate_sd) * s).powi(2)
+    } else {
+        0.0
+    };
     Missed {
         s,
         from_us,
@@ -89,7 +99,13 @@ fn an_outage_turns_the_attitude_at_the_mean_rate_and_costs_what_may_have_been_mi
         let (outage, step) = an_outage(&mut draws, longest_s);
         let mut filter = flown(seed % 6).filter;
         let before = filter.clone();
-        let missed = missed(&before, &outage, &step, Some(v(&before.rate_b)), of(before.covariance.bias().diagonal().max()));
+        let missed = missed(
+            &before,
+            &outage,
+            &step,
+            Some(v(&before.rate_b)),
+            of(before.covariance.bias().diagonal().max()),
+        );
         filter.going = Some(Going::On(outage));
         filter.bridge(&step);
         assert_eq!(filter.going, None);
@@ -118,8 +134,15 @@ fn an_outage_turns_the_attitude_at_the_mean_rate_and_costs_what_may_have_been_mi
                     3..DRIVEN => of(before.params.velocity_sd).powi(2),
                     k => of(walks[usize::from(k >= DRIVEN + 3)]),
                 };
-                let was = if velocity[0] || velocity[1] { 0.0 } else { of(p[(row, column)]) };
-                assert!(near(after[(row, column)], was + grown, 1e-4, 1e-12), "{seed} {row} {column}");
+                let was = if velocity[0] || velocity[1] {
+                    0.0
+                } else {
+                    of(p[(row, column)])
+                };
+                assert!(
+                    near(after[(row, column)], was + grown, 1e-4, 1e-12),
+                    "{seed} {row} {column}"
+                );
             }
         }
     }
@@ -171,7 +194,12 @@ fn an_attitude_from_elsewhere_waits_for_the_first_window() {
                 for row in 0..3 {
                     for column in 0..3 {
                         let turned = if row == column { 0.125 } else { 0.0 };
-                        assert!(near(p[(row, column)] as f32, expected[(row, column)] + turned, 1e-4, 1e-7));
+                        assert!(near(
+                            p[(row, column)] as f32,
+                            expected[(row, column)] + turned,
+                            1e-4,
+                            1e-7
+                        ));
                     }
                 }
                 for k in 3..DRIVEN {
@@ -199,16 +227,16 @@ fn what_is_kept_comes_back() {
     let outage = Outage::default();
     let mut after = Filter::new(world.filter.params);
     after.resume(&bytes, outage);
-    let kept = |filter: &Filter| {
-        (
-            (filter.bias_b, filter.gyro_matrix, filter.rate_b),
-            filter.reference,
-        )
-    };
+    let kept = |filter: &Filter| ((filter.bias_b, filter.gyro_matrix, filter.rate_b), filter.reference);
     assert_eq!(kept(&after), kept(&world.filter));
     assert!(after.q_nb.angle_to(&world.filter.q_nb) < 1e-6);
     assert!((after.iron.iron_b - world.filter.iron.iron_b).norm() < 1e-4);
-    assert!(after.iron.covariance.relative_eq(&world.filter.iron.covariance, 1e-4, 1e-4));
+    assert!(
+        after
+            .iron
+            .covariance
+            .relative_eq(&world.filter.iron.covariance, 1e-4, 1e-4)
+    );
     assert_eq!(after.going, Some(Going::On(outage)));
     let mut again = [0; KEPT_BYTES];
     after.covariance.go_on(0.0, 0.0);
@@ -266,14 +294,28 @@ fn bytes_that_are_no_state_are_refused() {
     // Each number by itself: bias, gyro matrix, iron, covariance. The last of the iron is the twelfth before the covariance.
     let numbers = (KEPT_BYTES - 8) / 4;
     let covariance = 6 + 3 * 12 + 12 * 13 / 2;
-    for at in [4, 8, numbers - covariance - 12, numbers - covariance - 1, numbers - covariance, numbers - 1] {
+    for at in [
+        4,
+        8,
+        numbers - covariance - 12,
+        numbers - covariance - 1,
+        numbers - covariance,
+        numbers - 1,
+    ] {
         for wrong in [f32::NAN, f32::INFINITY] {
             let mut other = bytes;
             other[8 + 4 * at..12 + 4 * at].copy_from_slice(&wrong.to_le_bytes());
             assert!(!resumes(&other), "{at}");
         }
     }
-    for (squared, is) in [(0.89, false), (0.91, true), (1.09, true), (1.11, false), (0.0, false), (f32::NAN, false)] {
+    for (squared, is) in [
+        (0.89, false),
+        (0.91, true),
+        (1.09, true),
+        (1.11, false),
+        (0.0, false),
+        (f32::NAN, false),
+    ] {
         let mut other = bytes;
         for (part, at) in (0..4).map(|k| (f32::from(u8::from(k == 3)) * ComplexField::sqrt(squared), 8 + 4 * k)) {
             other[at..at + 4].copy_from_slice(&part.to_le_bytes());

@@ -107,12 +107,22 @@ fn two(seed: u64) -> (Window, Params, [Given; 2], Means, bool) {
         }
         for _ in 0..5 + draws.below(10) {
             let covered_s = draws.within(0.05, 0.2);
-            let gap_s = if draws.below(4) == 0 { draws.within(0.01, 0.1) } else { 0.0 };
+            let gap_s = if draws.below(4) == 0 {
+                draws.within(0.01, 0.1)
+            } else {
+                0.0
+            };
             let dcm = draws.dcm();
             let gyro_b = (steady_b + draws.vector(0.2 * turning)) * covered_s;
             let of_angle = draws.within(0.0, 1e-6);
             window.turn(&dcm, &gyro_b, covered_s, gap_s, of_angle);
-            let turn = (dcm.cast(), gyro_b.cast(), covered_s.into(), gap_s.into(), of_angle.into());
+            let turn = (
+                dcm.cast(),
+                gyro_b.cast(),
+                covered_s.into(),
+                gap_s.into(),
+                of_angle.into(),
+            );
             given.turns.push(turn);
             let acc_n = Vector3::new(0.0, 0.0, -params.gravity) + off_n + draws.vector(shaken);
             let sampled = Sampled {
@@ -122,7 +132,9 @@ fn two(seed: u64) -> (Window, Params, [Given; 2], Means, bool) {
                 at_us: 0,
             };
             window.take_acc(&acc_n, &sampled, params.gravity);
-            given.acc.push((acc_n.cast(), sampled.variance.into(), sampled.scatter.into()));
+            given
+                .acc
+                .push((acc_n.cast(), sampled.variance.into(), sampled.scatter.into()));
         }
     }
     window.gyro_variance = draws.within(0.0, 1e-6);
@@ -141,7 +153,10 @@ fn means_are_those_of_the_samples() {
             assert!(near(found, expected, 1e-4, 3e-5), "{seed}: {what} {found} {expected}");
         };
         let are = |found: &[f32], expected: &[f64], what: &str| {
-            found.iter().zip(expected).for_each(|(found, expected)| is(*found, *expected, what));
+            found
+                .iter()
+                .zip(expected)
+                .for_each(|(found, expected)| is(*found, *expected, what));
         };
         let (covered, duration) = (second.covered(), second.duration());
         let rate_b = total(second.turns.iter().map(|turn| turn.1)) / covered;
@@ -149,10 +164,19 @@ fn means_are_those_of_the_samples() {
         are(found.rate_b.as_slice(), rate_b.as_slice(), "rate");
         let square = |x: f64| x * x;
         let of = |x: f32| f64::from(x);
-        assert!(near(found.rate_variance, of(window.gyro_variance) / square(covered), 1e-4, 0.0));
+        assert!(near(
+            found.rate_variance,
+            of(window.gyro_variance) / square(covered),
+            1e-4,
+            0.0
+        ));
         are(found.acc_n.as_slice(), second.mean().as_slice(), "force");
         let spread = second.spread();
-        assert!(near(found.acc_spread, spread, 1e-3, 2e-4), "{seed}: {} {spread}", found.acc_spread);
+        assert!(
+            near(found.acc_spread, spread, 1e-3, 2e-4),
+            "{seed}: {} {spread}",
+            found.acc_spread
+        );
         // Rates weighted by the time each lasted.
         let apart = |turn: &(Matrix3<f64>, V, f64, f64, f64)| (turn.1 / turn.2 - rate_b).norm_squared() * turn.2;
         let rate_spread = sum(second.turns.iter().map(apart)) / covered;
@@ -186,7 +210,10 @@ fn means_are_those_of_the_samples() {
                 + square(of(params.acc_scale_error)) * spread
                 + square(of(params.acc_excess) * excess)
                 + of_sample / second.count());
-        assert!(near(found.velocity_change_variance, variance, 2e-3, 1e-5), "{seed}: {variance} {found:?}");
+        assert!(
+            near(found.velocity_change_variance, variance, 2e-3, 1e-5),
+            "{seed}: {variance} {found:?}"
+        );
         let velocity = if rest {
             square(of(params.velocity_rest_sd))
         } else {
@@ -245,7 +272,10 @@ fn turned_axes_turn_all_that_is_kept_in_n() {
         other.turn_axes(&turned);
         let (found, expected) = (other.means(&params, false), window.means(&params, false));
         assert!((found.acc_n - turned * expected.acc_n).norm() < 1e-4);
-        for (found, expected) in [(other.drive, window.drive), (other.drive_integral, window.drive_integral)] {
+        for (found, expected) in [
+            (other.drive, window.drive),
+            (other.drive_integral, window.drive_integral),
+        ] {
             for k in 0..DRIVERS {
                 let column = |drive: &[[f32; DRIVERS]; 3]| Vector3::new(drive[0][k], drive[1][k], drive[2][k]);
                 assert!((column(&found) - turned * column(&expected)).norm() < 1e-5);
@@ -307,8 +337,14 @@ fn a_window_with_nothing_in_it_says_nothing() {
     let mut window = Window::EMPTY;
     window.turn(&Matrix3::identity(), &Vector3::zeros(), 0.0, 0.5, 0.0);
     let means = window.means(&Params::ROOM, false);
-    assert_eq!((means.duration_s, means.rest, means.vertical, means.near_one_g), (0.5, false, false, false));
-    assert_eq!((means.acc_n, means.excess, means.velocity_change_variance), (Vector3::zeros(), 0.0, 0.0));
+    assert_eq!(
+        (means.duration_s, means.rest, means.vertical, means.near_one_g),
+        (0.5, false, false, false)
+    );
+    assert_eq!(
+        (means.acc_n, means.excess, means.velocity_change_variance),
+        (Vector3::zeros(), 0.0, 0.0)
+    );
     assert_eq!(means.rate_b, Vector3::zeros());
     let still = from_rotation_vector(Vector3::zeros());
     assert!(still.angle() == 0.0);
