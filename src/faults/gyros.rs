@@ -338,3 +338,6 @@ fn across(axes_b: &[Vector3<f32>; PLATES]) -> [f32; PLATES] {
     let length = ComplexField::sqrt(across.iter().map(|part| part * part).sum::<f32>());
     across.map(|part| part / length)
 }
+
+#[cfg(test)]
+mod tests;

@@ -84,3 +84,6 @@ impl SensorHealth {
         !self.unused_channels().contains(channel)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,8 @@
 //! What motion leaves unsure of the accelerometers: each term of it, by itself.
 
+mod monitor;
+pub(super) mod reference;
+
 use nalgebra::ComplexField;
 
 use super::*;

@@ -341,3 +341,6 @@ impl Triads {
         self.last_b = Some(vector_b);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -141,3 +141,6 @@ impl VectorRate {
         (costs[best] < FITS && clear).then_some(best)
     }
 }
+
+#[cfg(test)]
+mod tests;
