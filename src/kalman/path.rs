@@ -87,13 +87,40 @@ mod tests {
         assert!(worst(false) > 5.0 * worst(true), "{}", worst(false));
     }
 
+    /// The cubic that has the turn and both its rates at the ends, in f64: its rotation halfway by Hermite's formula.
+    #[test]
+    fn halfway_the_turn_is_that_of_the_cubic() {
+        let mut draws = crate::draws::Draws::of(1);
+        for _ in 0..50 {
+            let q = draws.attitude();
+            let (angle_b, rates_b) = (
+                draws.vector(1.5) + Vector3::new(0.2, 0.0, 0.0),
+                [draws.vector(6.0), draws.vector(6.0)],
+            );
+            let (ended, found) = through(&q, &angle_b, Some(rates_b), STEP_S);
+            let phi = angle_b.cast::<f64>();
+            let [began, ends] = rates_b.map(|rate_b| rate_b.cast::<f64>());
+            // Bortz: how the rotation vector grows at the rate of the end.
+            let grows = ends + phi.cross(&ends) * 0.5 + phi.cross(&phi.cross(&ends)) / 12.0;
+            let half = phi * 0.5 + (began - grows) * (f64::from(STEP_S) / 8.0);
+            let at = |turn: Vector3<f64>| {
+                (q.cast::<f64>() * UnitQuaternion::from_scaled_axis(turn))
+                    .to_rotation_matrix()
+                    .into_inner()
+            };
+            let expected = (at(Vector3::zeros()) + at(half) * 4.0 + at(phi)) / 6.0;
+            assert!((found.cast::<f64>() - expected).norm() < 1e-5);
+            assert!((dcm_nb(&ended).cast::<f64>() - at(phi)).norm() < 1e-5);
+        }
+    }
+
     #[test]
     fn a_short_turn_has_the_mean_of_its_ends() {
         let angle_b = Vector3::new(0.0, 0.0, 0.09);
         let (_, mean) = through(&UnitQuaternion::identity(), &angle_b, None, STEP_S);
         let (_, longer) = through(&UnitQuaternion::identity(), &(angle_b * 1.2), None, STEP_S);
-        // sin(0.09)/0.09 and sin(0.108)/0.108 on the diagonal.
-        assert!((mean[(0, 0)] - 0.998_65).abs() < 1.5e-3);
+        // (1 + cos(0.09))/2 and sin(0.108)/0.108 on the diagonal.
+        assert!((mean[(0, 0)] - 0.997_976).abs() < 1e-5);
         assert!((longer[(0, 0)] - 0.998_06).abs() < 1e-5);
     }
 }

@@ -161,3 +161,6 @@ impl Pending {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

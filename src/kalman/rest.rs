@@ -105,3 +105,6 @@ impl Filter {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

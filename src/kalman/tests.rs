@@ -123,6 +123,7 @@ fn biased(step: &mut Step) {
     step.angle_b += GYRO_BIAS_B * STEP_S;
 }
 
+mod compared;
 mod correction;
 mod disturbed;
 mod force;

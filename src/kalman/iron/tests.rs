@@ -152,6 +152,85 @@ fn another_iron_takes_the_place_of_one_that_no_longer_explains_the_field() {
     }
 }
 
+/// The latest windows stand together as long as one iron explains them; another one takes the place of the present one if it leaves
+/// the field much quieter. With the least squares over both windows in f64.
+#[test]
+fn the_latest_windows_are_those_that_one_iron_explains() {
+    let params = Params::ROOM;
+    let of = |x: f32| f64::from(x);
+    let noise = of(params.iron_noise_ut).powi(2);
+    let (mut afresh, mut changed, mut went_on) = (0, 0, 0);
+    for seed in 0..300 {
+        let mut draws = Draws::of(seed);
+        let mut found = HardIron::none(&params);
+        let (first_b, moved) = (draws.vector(1.0), draws.one_of([1.0, 4.0, 7.0, 30.0]));
+        let second_b = first_b + draws.vector(moved);
+        // Turned about one axis only in half of the runs: then what is not known of the iron matters.
+        let apart = draws.one_of([0.1, 0.6]);
+        let moving = draws.one_of([0.0, 3.0, 5.0]);
+        // And a first window that says little of any iron.
+        let first_apart = draws.one_of([0.02, apart]);
+        let windows = [
+            window(&mut draws, first_apart, &first_b, 0.0),
+            window(&mut draws, apart, &second_b, moving),
+        ];
+        found.learn(&params, 1.0, &sums(&windows[0]));
+        let before = found;
+        let is_other = found.learn(&params, 1.0, &sums(&windows[1]));
+        // Four seconds are looked at: of the window before three quarters count.
+        let kept = 1.0 - 1.0 / of(params.iron_change_s);
+        let weights = [kept, 1.0];
+        let each: Vec<_> = windows
+            .iter()
+            .map(|window| eliminated(core::slice::from_ref(window), 1.0))
+            .collect();
+        let parted = each[0].0 * weights[0] + each[1].0;
+        let seen = each[0].1 * weights[0] + each[1].1;
+        let information = parted / noise + nalgebra::Matrix3::identity() / of(params.iron_change_sd_ut).powi(2);
+        let covariance = information.try_inverse().expect("definite");
+        let latest_b = covariance * (seen / noise);
+        let left = |iron_b: &nalgebra::Vector3<f64>| {
+            let of_window = |window: &Vec<Sample>| {
+                let in_n = |(mag_b, dcm): &Sample| dcm.cast::<f64>() * (mag_b.cast::<f64>() - iron_b);
+                let count = window.len() as f64;
+                let mean = window
+                    .iter()
+                    .map(in_n)
+                    .fold(nalgebra::Vector3::zeros(), |sum, m| sum + m)
+                    / count;
+                window
+                    .iter()
+                    .map(|sample| (in_n(sample) - mean).norm_squared())
+                    .sum::<f64>()
+                    / count
+            };
+            (of_window(&windows[0]) * weights[0] + of_window(&windows[1])) / (weights[0] + weights[1])
+        };
+        let (best, present) = (left(&latest_b), left(&before.iron_b.cast()));
+        if (best / (4.0 * noise) - 1.0).abs() < 0.02 || (present / (noise + 2.0 * best) - 1.0).abs() < 0.02 {
+            continue;
+        }
+        let explained = best <= 4.0 * noise;
+        let expected = explained && present > noise + 2.0 * best;
+        assert_eq!(is_other, expected, "{seed}: {best} {present}");
+        let windows = if explained { 1.0 + kept } else { 1.0 };
+        assert!((of(found.recent.windows) - windows).abs() < 1e-6, "{seed}: {best}");
+        if is_other {
+            changed += 1;
+            let off = (found.covariance.cast::<f64>() - covariance).norm() / covariance.norm();
+            assert!(off < 0.02, "{seed}: {off}");
+        } else if explained {
+            went_on += 1;
+        } else {
+            afresh += 1;
+        }
+    }
+    assert!(
+        changed > 20 && went_on > 20 && afresh > 10,
+        "{changed} {went_on} {afresh}"
+    );
+}
+
 /// What goes on moving is the world's and tells little: by how much the windows weigh.
 #[test]
 fn a_field_that_moves_tells_less() {

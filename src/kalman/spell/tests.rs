@@ -158,6 +158,9 @@ fn the_doubt_is_the_contradiction_by_the_odds() {
     let mut disturbance = spell;
     disturbance.go_on(&PARAMS, &disturbed(1.0));
     assert_eq!((disturbance.judge(false, 1.0), disturbance.doubt()), (None, 0.0));
+    let mut young = Spell::default();
+    young.go_on(&PARAMS, &disturbed(1.0));
+    assert_eq!((young.judge(false, 1.0), young.judge(true, 1.0)), (None, None));
     // The attitude is given up: the field has stood by the new one for as long as it had contradicted the old one.
     let mut given_up = spell;
     given_up.have_other_attitude(true);

@@ -158,6 +158,8 @@ fn an_attitude_from_elsewhere_waits_for_the_first_window() {
         let (outage, step) = an_outage(&mut draws, longest_s);
         let params = Params {
             earth_rate_n: draws.vector(0.01),
+            angle_noise: 0.1,
+            window_s: 0.5,
             ..params()
         };
         let mut filter = Filter::new(params);

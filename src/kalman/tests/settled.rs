@@ -121,6 +121,7 @@ fn long_steps_do_more_at_once() {
     assert_eq!(steps_until_done(0.049), (false, 6 + 4));
     // Learning and the passage with two scalars, four, and the seventh.
     assert_eq!(steps_until_done(0.1), (true, 3));
+    assert_eq!(steps_until_done(LONG_STEP_S), (true, 3));
 }
 
 /// A flipped bit of each part of the state is found when the window's work is done, and the filter begins anew.
@@ -176,6 +177,16 @@ fn a_step_covers_no_more_than_has_passed() {
         assert!((lasted_s - STEP_S).abs() < 1e-6, "{covered_s}");
         assert!((drive - covered).abs() < 1e-5, "{covered_s}: {drive}");
     }
+}
+
+/// A first step that is no rotation covers nothing: nothing is known of how long it lasted.
+#[test]
+fn a_first_step_that_is_no_rotation_covers_nothing() {
+    let mut filter = Filter::new(params());
+    let mut step = World::new(tilted(), params()).step(Vector3::zeros());
+    step.angle_b.x = 7.0;
+    assert_eq!(filter.step(&step).refusal, Some(Refusal::NotARotation));
+    assert_eq!((filter.window.duration_s, filter.last_us), (0.0, Some(step.at_us)));
 }
 
 /// At rest the gyros measure their bias and the Earth's turn.
