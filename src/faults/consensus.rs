@@ -94,3 +94,6 @@ fn held_against(solution: &Solution, axes_b: &[Vector3<f32>; 12], seen: &mut [Se
     }
     worst.1
 }
+
+#[cfg(test)]
+mod tests;

@@ -153,7 +153,72 @@ fn long_arms_count_by_what_is_not_known_of_the_angular_acceleration() {
     // 5 rad/s2 that were not there before are half an interval old.
     let lag = longest_arm() * 2.5 + arm_noise(1.0);
     assert!((difference(slow_b, fast_b, 0xF) / (lag * lag) - 1.0).abs() < ROUNDING);
-    // With two gyros a rate of four turns a second may be missing, and its square.
-    let missing = longest_arm() * UNKNOWN_RATE * UNKNOWN_RATE;
-    assert!(difference(slow_b, slow_b, 0b0011) > missing * missing);
+    // With two gyros a rate of four turns a second may be missing, and its square, beside what is known of it.
+    let axes_b: [Vector3<f32>; 2] = core::array::from_fn(|k| nominal().gyro[k].axis_b);
+    let missing_along = axes_b[0].cross(&axes_b[1]).normalize();
+    let known = (slow_b - missing_along * missing_along.dot(&slow_b)).norm();
+    let missing = longest_arm() * UNKNOWN_RATE * (known + UNKNOWN_RATE + UNKNOWN_RATE);
+    let ratio = difference(slow_b, slow_b, 0b0011) / (missing * missing);
+    assert!((ratio - 1.0).abs() < ROUNDING, "{ratio}");
+}
+
+/// An angular acceleration that goes on is no lag: the arms are as unsure as their noise makes them.
+#[test]
+fn a_steady_angular_acceleration_has_no_lag() {
+    let centred = Set {
+        place_b: [Vector3::zeros(); PLATES],
+        place_sigma: 0.0,
+        ..nominal()
+    };
+    let placed = Set {
+        place_sigma: 0.0,
+        ..nominal()
+    };
+    let spun_up = |set: &Set| {
+        let mut monitor = Monitor::new(set);
+        let acceleration_b = Vector3::new(0.0, 0.0, 2.0);
+        let mut last = None;
+        for n in 0..4_i16 {
+            let mut reading = Reading::unread(n as u16);
+            reading.acc_p = [[n; 3]; PLATES];
+            reading.mag_p = [[n; 3]; PLATES];
+            reading.gyro = [n; PLATES];
+            let rate_b = acceleration_b * (DT_S * f32::from(n));
+            let given = measured(set, rate_b, acceleration_b, 0xF);
+            last = Some(monitor.step(set, &reading, &given, DT_S).force_b);
+        }
+        last.expect("a cycle")
+    };
+    let difference = apart(&spun_up(&placed), &spun_up(&centred));
+    // What it was a cycle before, in both: scale and timing of the gyros by the change of the rate, and no half of a change of 2 rad/s2.
+    let lag = longest_arm() * 1.0;
+    assert!(difference < 0.2 * lag * lag, "{difference} {lag}");
+}
+
+/// Sampling instants are unsure by milliseconds: at a rate each sensor has seen the force from where it was then.
+#[test]
+fn a_rate_makes_the_force_as_unsure_as_its_instants() {
+    let centred = Set {
+        place_b: [Vector3::zeros(); PLATES],
+        place_sigma: 0.0,
+        ..nominal()
+    };
+    let still = force(&centred, Vector3::zeros(), Vector3::zeros(), 0xF);
+    let at = |rate: f32, read: u16| {
+        let rate_b = Vector3::new(0.0, 0.0, rate);
+        apart(&force(&centred, rate_b, rate_b, read), &still)
+    };
+    for rate in [0.5, 2.0] {
+        let unsure = ACC_TIMING_S * rate * FORCE_B.norm();
+        let ratio = at(rate, 0xF) / (unsure * unsure);
+        assert!((ratio - 1.0).abs() < ROUNDING, "{rate}: {ratio}");
+    }
+    // What may be missing of the rate counts as well.
+    let axes_b: [Vector3<f32>; 2] = core::array::from_fn(|k| nominal().gyro[k].axis_b);
+    let missing_along = axes_b[0].cross(&axes_b[1]).normalize();
+    let rate_b = Vector3::new(0.0, 0.0, 2.0);
+    let known = (rate_b - missing_along * missing_along.dot(&rate_b)).norm();
+    let unsure = ACC_TIMING_S * (known + UNKNOWN_RATE) * FORCE_B.norm();
+    let ratio = at(2.0, 0b0011) / (unsure * unsure);
+    assert!((ratio - 1.0).abs() < ROUNDING, "{ratio}");
 }

@@ -192,3 +192,6 @@ impl Watch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -227,3 +227,29 @@ fn without_each_gyro_the_rate_is_that_of_the_others() {
         assert!((gyros.across.iter().map(|part| part * part).sum::<f32>() - 1.0).abs() < 1e-6);
     }
 }
+
+/// A gyro that is out is watched for its return, and no other.
+#[test]
+fn only_the_gyro_that_is_out_is_watched() {
+    let uncertainty = Uncertainty {
+        bias: 0.01,
+        scale: 0.001,
+        direction: 0.001,
+    };
+    for out in 0..PLATES {
+        let mut gyros = Gyros::new(&axes(&mut Draws::of(1)), uncertainty, 0.0);
+        gyros.blame(out, Verdict::Disagreeing);
+        for _ in 0..26 {
+            gyros.step(&Cycle {
+                values: &[0.5; 4],
+                present: ALL,
+                frozen: 0,
+                dt_s: Some(0.2),
+                watched_later: false,
+            });
+        }
+        for (k, watch) in gyros.watches.iter().enumerate() {
+            assert_eq!(watch.seen_long(), k == out, "{out} {k}");
+        }
+    }
+}
