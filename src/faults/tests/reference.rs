@@ -424,7 +424,7 @@ impl TriadsModel {
         let counted = (systematic + offsets) / self.least;
         self.of_all.push(counted.sqrt());
         let (mut alarms, mut doubted) = ([0.0; 12], 0);
-        for k in 0..12 {
+        for (k, alarm) in alarms.iter_mut().enumerate() {
             let disagreement = self.disagreement(k).filter(|_| is_in(present, k));
             let watch = &mut self.watches[k];
             match disagreement {
@@ -438,12 +438,12 @@ impl TriadsModel {
                 }
             } else if let (Some((by, share)), true) = (disagreement, is_in(self.used, k)) {
                 watch.strike(false);
-                alarms[k] = watch.learn(by, share * self.seen[k].1, OF_TRIADS, &self.of_all);
+                *alarm = watch.learn(by, share * self.seen[k].1, OF_TRIADS, &self.of_all);
             } else {
                 if disagreement.is_some() {
                     watch.strike(true);
                 }
-                alarms[k] = watch.alarm(OF_TRIADS, &self.of_all);
+                *alarm = watch.alarm(OF_TRIADS, &self.of_all);
             }
         }
         if doubted != 0 {

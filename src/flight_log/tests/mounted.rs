@@ -3,7 +3,7 @@
 use core::{
     future::Future,
     pin::pin,
-    task::{Context, Poll, Waker},
+    task::{Context, Waker},
 };
 
 use super::*;
@@ -277,7 +277,7 @@ fn a_mount_that_takes_long_gives_way() {
         let mut scan = pin!(log.scan(false));
         let (mut before, mut chances) = (reads.get(), 0);
         let mut context = Context::from_waker(Waker::noop());
-        while let Poll::Pending = scan.as_mut().poll(&mut context) {
+        while scan.as_mut().poll(&mut context).is_pending() {
             chances += 1;
             assert!(reads.get() - before <= 2 * 16, "{} reads", reads.get() - before);
             before = reads.get();

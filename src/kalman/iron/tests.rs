@@ -241,11 +241,10 @@ fn a_field_that_moves_tells_less() {
         let window = window(&mut draws, 0.4, &Vector3::zeros(), moving);
         let sums = sums(&window);
         found.learn(&params, 1.0, &sums);
-        let (parted, _) = eliminated(&[window.clone()], 1.0);
+        let (parted, seen) = eliminated(core::slice::from_ref(&window), 1.0);
         // Moved by what no iron explains: the smaller of what none and the best one leave.
         let noise = f64::from(params.iron_noise_ut).powi(2);
         let unknown = nalgebra::Matrix3::identity() / f64::from(params.iron_change_sd_ut).powi(2);
-        let (_, seen) = eliminated(&[window.clone()], 1.0);
         let best = (parted / noise + unknown).try_inverse().expect("definite") * (seen / noise);
         let left = |iron_b: &nalgebra::Vector3<f64>| {
             let in_n = |(mag_b, dcm): &Sample| dcm.cast::<f64>() * (mag_b.cast::<f64>() - iron_b);

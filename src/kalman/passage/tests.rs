@@ -49,7 +49,7 @@ fn drawn(seed: u64) -> Drawn {
     }
     let mut means = window.means(&params, false);
     assert!(means.vertical);
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         (means.vertical, means.vertical_s) = (false, 0.0);
     }
     let mut passage = Passage::default();

@@ -199,6 +199,44 @@ fn a_nose_is_compared_across_itself() {
     assert!(doubts > 20);
 }
 
+/// A nose beyond the gate is refused with the angle it is off by, and so is one behind.
+#[test]
+fn a_nose_that_is_refused_says_how_far_it_is_off() {
+    for seed in 0..40 {
+        let mut draws = Draws::of(seed);
+        let mut filter = Filter::resumed(params(), draws.attitude(), Matrix3::from_diagonal_element(1e-6));
+        let before = filter.q_nb;
+        let forward: Vector3<f64> = before.cast::<f64>() * Vector3::x();
+        let nose = Nose {
+            azimuth: draws.within(-3.0, 3.0),
+            elevation: draws.within(-1.5, 1.5),
+            azimuth_sd: 1e-3,
+            elevation_sd: 1e-3,
+        };
+        let (azimuth, elevation) = (f64::from(nose.azimuth), f64::from(nose.elevation));
+        let horizontal = elevation.cos();
+        let along = Vector3::new(horizontal * azimuth.cos(), horizontal * azimuth.sin(), -elevation.sin());
+        let off = forward.angle(&along);
+        let found = filter.know_nose(&nose).expect_err("both are known to a milliradian");
+        assert!(near(found, off, 1e-4, 1e-5), "{seed}: {found} {off}");
+        assert_eq!(filter.q_nb, before);
+    }
+    // Behind, where nothing across it shows.
+    let mut filter = Filter::resumed(
+        params(),
+        UnitQuaternion::identity(),
+        Matrix3::from_diagonal_element(1e-6),
+    );
+    let behind = Nose {
+        azimuth: PI,
+        elevation: 0.0,
+        azimuth_sd: 1e-3,
+        elevation_sd: 1e-3,
+    };
+    let found = filter.know_nose(&behind).expect_err("behind");
+    assert!(near(found, core::f64::consts::PI, 1e-4, 0.0), "{found}");
+}
+
 #[test]
 fn a_nose_waits_for_an_attitude_and_for_its_correction() {
     let mut world = World::new(tilted(), params());
