@@ -52,7 +52,7 @@ pub(super) enum Found {
 }
 
 /// What a record says of the mode: its key, FLIGHT, recording.
-type Told = (record::Key, bool, bool);
+pub(super) type Told = (record::Key, bool, bool);
 
 impl<N: Nand> FlightLog<N> {
     /// Finds out what the chip holds. Nothing is changed on it.
@@ -300,7 +300,7 @@ impl<N: Nand> FlightLog<N> {
     /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
     /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
     /// may be torn too. Out: what the newest record says of the mode.
-    fn find_newest(&mut self, head: u16) -> Result<Option<Told>, LogError> {
+    pub(super) fn find_newest(&mut self, head: u16) -> Result<Option<Told>, LogError> {
         let mut newest = [record::Key::default(); 2];
         let mut told = None;
         // Two blocks may take turns, and which of them is newer need not be known.

@@ -26,6 +26,7 @@ mod started;
 const BLOCKS: u16 = 24;
 
 /// A chip in memory.
+#[derive(Clone)]
 struct Chip {
     blocks: u16,
     pages: BTreeMap<(u16, u8), PageBytes>,
