@@ -89,6 +89,7 @@ mod tests {
             (1.0, 0.270_9),
             (1.53, 0.181_2),
             (2.7, 0.103_9),
+            (10.0, 0.028_2),
         ] {
             assert!((repeat(sigma) - expected).abs() < 2e-3, "{sigma}: {}", repeat(sigma));
         }

@@ -59,7 +59,8 @@ fn two_wild_axes_on_two_plates_are_both_out() {
 #[test]
 fn an_axis_that_explains_itself_is_not_out() {
     let mut variances = [1.0; 12];
-    variances[0] = 1e-6;
+    // Others say a third of what it says itself, and of that a hundredth.
+    variances[0] = 0.01;
     let mut seen = seen(variances, &[(0, 20.0)]);
     let mut solution = Solution::NOTHING;
     agreed(&triad_axes_b(), &mut seen, 0xFFF, &mut solution);

@@ -56,12 +56,12 @@ fn the_two_newest_records_are_found_wherever_the_head_is() {
                 // The newest page has lost what it repeats: the page before has it. The first pages of a boot have the only copies.
                 if head > COPIES_AND_TWO {
                     let mut lost = chip.clone();
-                    let last = lost.pages.range((LOG_START, 0)..(BLOCKS - 4, 0));
+                    let pages = lost.pages.range((LOG_START, 0)..(BLOCKS - 4, 0));
                     let newest = packet_of(chip.packets(0).last().copied());
-                    let at = last
+                    let mut of_it = pages
                         .filter(|(_, bytes)| *page::record(bytes, 0) == newest)
-                        .map(|(at, _)| *at)
-                        .last();
+                        .map(|(at, _)| *at);
+                    let at = of_it.next_back();
                     lost.pages.get_mut(&at.expect("its page")).expect("is there")[256..512].fill(0);
                     finds_the_two_newest(&mut lost, "after a loss");
                 }
