@@ -219,3 +219,29 @@ fn an_interval_that_is_none_is_a_gap() {
         assert!((found - expected).norm() < 1e-3, "{dt_s}: {found}");
     }
 }
+
+/// And of a unit that turns steadily: its directions are the less sure the faster it turns, and still tell. Force alone, field alone.
+#[test]
+fn the_vectors_name_the_gyro_that_creeps_of_a_unit_that_turns() {
+    let mut set = nominal();
+    set.uncertainty[2].bias = 0.002;
+    for by_force in [true, false] {
+        let turns_b = Vector3::new(0.3, 0.2, 0.4);
+        let change = |n: i16, measured: &mut Measured| {
+            // Where it has turned to since the beginning.
+            let turned = nalgebra::Rotation3::from_scaled_axis(turns_b * (-DT_S * f32::from(n)));
+            let (force_b, field_b) = (turned * FORCE_B, turned * Vector3::new(18.0, 0.0, -14.0));
+            let force_b = if by_force { force_b } else { FORCE_B * 3.0 };
+            measured.acc = core::array::from_fn(|k| set.acc[k].axis_b.dot(&force_b));
+            measured.mag = core::array::from_fn(|k| set.mag[k].axis_b.dot(&field_b));
+            if by_force {
+                measured.present = Channels(measured.present.0 & !(0xFFF << 12));
+            }
+            for (value, axis) in measured.gyro.iter_mut().zip(&set.gyro) {
+                *value += axis.axis_b.dot(&turns_b);
+            }
+        };
+        let named = named_after(&set, 1, 0.1, Some(1e-4), change);
+        assert!(named.is_some_and(|after| after < 400), "{by_force}: {named:?}");
+    }
+}
