@@ -196,6 +196,8 @@ fn a_change_of_mode_says_what_it_was_given() {
         (Mode::Flight, true, Cause::LiftOff),
         (Mode::Wait, false, Cause::Command),
         (Mode::Flight, false, Cause::Log),
+        (Mode::Wait, false, Cause::EraseArmed),
+        (Mode::Wait, true, Cause::Erased),
         (Mode::Wait, false, Cause::Rail),
         (
             Mode::Wait,

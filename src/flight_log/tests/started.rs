@@ -156,3 +156,44 @@ fn a_start_that_fails_uses_no_less() {
     assert_eq!(block_on(log.append(&entry())), Err(LogError::Nand(NandError::Timeout)));
     assert_eq!(log.status().used, used);
 }
+
+/// A boot begins with its header, twice where there is no record before it; nothing else than records is ever written. A unit that
+/// is described anew says so before its next record.
+#[test]
+fn a_boot_begins_with_its_header_and_a_new_description_comes_before_the_next_record() {
+    let mut chip = Chip::new(BLOCKS);
+    let mut log = chip.mounted();
+    assert!(!log.is_begun());
+    block_on(log.append(&entry())).expect("there is room");
+    assert!(log.is_begun());
+    let other = BootHeader {
+        period_us: 77,
+        ..BootHeader::default()
+    };
+    log.describe(other);
+    for _ in 0..2 {
+        block_on(log.append(&entry())).expect("there is room");
+    }
+    let mut headers = Vec::new();
+    for (page, bytes) in chip.pages.range((LOG_START, 0)..(BLOCKS - 4, 0)) {
+        for half in 0..2 {
+            let (key, content) = record::decode(page::record(bytes, half)).expect("a record");
+            if let record::Content::Header(header) = content {
+                headers.push((page.1, half, key.seq, header.period_us));
+            }
+        }
+    }
+    // Its page and the repetition in the second and third; then the new one after the first record, and its repetition.
+    assert_eq!(
+        headers,
+        [
+            (0, 0, 0, 0),
+            (0, 1, 0, 0),
+            (1, 0, 0, 0),
+            (1, 1, 0, 0),
+            (2, 1, 0, 0),
+            (3, 0, 2, 77),
+            (4, 1, 2, 77)
+        ]
+    );
+}
