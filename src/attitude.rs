@@ -23,6 +23,8 @@
 //! Refuses a matrix that is no rotation ([`from_dcm_bn`]); an attitude that came from storage goes through
 //! [`from_parts`].
 
+use core::f32::consts::FRAC_2_PI;
+
 use nalgebra::{ComplexField, Matrix3, Quaternion, RealField, UnitQuaternion, Vector3};
 
 /// Euler angles 3-2-1.
@@ -74,19 +76,32 @@ fn series(square: f32) -> (f32, f32) {
     (sum(SINE), sum(COSINE))
 }
 
-/// Sine and cosine of an angle \[rad\]; up to four times that of [`SERIES`] by doubling a quarter of it twice.
+/// A quarter of a turn \[rad\] in three parts: of the first two as few digits that a product with up to 32,768 quarters is exact
+/// (W. J. Cody, W. Waite, Software Manual for the Elementary Functions, 1980).
+const QUARTER: [f32; 3] = [1.570_312_5, 0.000_483_512_88, 3.139_164_8e-7];
+
+/// Sine and cosine of an angle \[rad\]: by the series up to [`SERIES`], of others without their quarters of a turn. Beyond 50,000 rad,
+/// where f32 has no digit left below 0.004 rad, both are only numbers up to one; NaN of what is no angle.
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
     let square = angle * angle;
     if square < SERIES * SERIES {
         let (sinc, cos) = series(square);
         return (angle * sinc, cos);
     }
-    if square < 16.0 * SERIES * SERIES {
-        let (sinc, cos) = series(square * (1.0 / 16.0));
-        let doubled = |(sin, cos): (f32, f32)| (2.0 * sin * cos, 1.0 - 2.0 * sin * sin);
-        return doubled(doubled((angle * 0.25 * sinc, cos)));
+    if !angle.is_finite() {
+        return (f32::NAN, f32::NAN);
     }
-    ComplexField::sin_cos(angle)
+    let quarters = (angle * FRAC_2_PI + if angle < 0.0 { -0.5 } else { 0.5 }) as i32;
+    let rest = QUARTER.into_iter().fold(angle, |rest, part| rest - quarters as f32 * part);
+    let rest = rest.clamp(-SERIES, SERIES);
+    let (sinc, cos) = series(rest * rest);
+    let sin = rest * sinc;
+    match quarters & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
 }
 
 /// Quaternion of a rotation vector: exact for any angle, `(cos a/2, sin(a/2)/a v)`.
@@ -99,7 +114,7 @@ pub fn from_rotation_vector(angle: Vector3<f32>) -> UnitQuaternion<f32> {
         series(square)
     } else {
         let norm = ComplexField::sqrt(square);
-        let (sin, cos) = ComplexField::sin_cos(norm);
+        let (sin, cos) = sin_cos(norm);
         (sin / norm, cos)
     };
     UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, half * sinc))

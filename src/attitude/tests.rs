@@ -155,3 +155,24 @@ fn sines_and_cosines_are_those_of_f64_through_more_than_a_turn() {
         close(cos, ComplexField::cos(f64::from(angle)) as f32, ROUNDING);
     }
 }
+
+/// Against f64, a whole degree at a time: in every quarter and far out.
+#[test]
+fn sine_and_cosine_hold_for_any_number_of_turns() {
+    for turns in [0, 1, 2, 100, 8_000] {
+        for degrees in -360_i32..=360 {
+            let angle = (degrees + 360 * turns * degrees.signum()) as f32 * DEG;
+            let (sin, cos) = sin_cos(angle);
+            let (exact_sin, exact_cos) = ComplexField::sin_cos(f64::from(angle));
+            assert!(
+                (f64::from(sin) - exact_sin).abs() < 2e-7 && (f64::from(cos) - exact_cos).abs() < 2e-7,
+                "{angle}: {sin} {cos}, not {exact_sin} {exact_cos}"
+            );
+        }
+    }
+    for angle in [6e4, 1e9, 1e20, f32::MAX, -f32::MAX] {
+        let (sin, cos) = sin_cos(angle);
+        assert!((sin * sin + cos * cos - 1.0).abs() < ROUNDING, "{angle}: {sin} {cos}");
+    }
+    assert!(sin_cos(f32::NAN).0.is_nan() && sin_cos(f32::INFINITY).1.is_nan());
+}

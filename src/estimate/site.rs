@@ -8,9 +8,10 @@
 //! What is the unit's own, beside [`Params::ROOM`]: its gyros are as far off as its calibration says, and its sensors are
 //! late by their filters and by the age of what they hold when they are asked.
 
-use nalgebra::{ComplexField, Vector3};
+use nalgebra::Vector3;
 
 use crate::{
+    attitude::sin_cos,
     calibration::Set,
     kalman::{Delays, Params, Reference},
 };
@@ -91,7 +92,7 @@ impl Site {
     /// The filter's parameters for a unit with this set.
     pub fn params(&self, set: &Set) -> Params {
         let [acc, _, gyro] = set.uncertainty;
-        let (sin, cos) = ComplexField::sin_cos(self.latitude_deg.to_radians());
+        let (sin, cos) = sin_cos(self.latitude_deg.to_radians());
         let site = match &self.launch {
             Some(launch) => self.at_launch(launch),
             None => Params {

@@ -84,7 +84,7 @@ pub async fn run<B: Board>(
     switch: &Switch<B::SensorBus>,
     gyros: &Gyros<'_, B::Gyro>,
     memory: &B::Retained,
-) {
+) -> ! {
     let period = Duration::from_millis(shared.settings.period_ms);
     let mut acquisition = Acquisition::<B> {
         shared,

@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Derives for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &B::Retained) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estimator, memory: &B::Retained) -> ! {
     let Some(mut cycles) = shared.cycle_reader() else {
         never().await
     };

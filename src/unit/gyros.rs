@@ -164,7 +164,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
 }
 
 /// Samples fast for ever, and leaves in retained memory that the unit is alive: after a reset it tells when that struck.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>, memory: &B::Retained) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, gyros: &Gyros<'_, B::Gyro>, memory: &B::Retained) -> ! {
     let interval = Duration::from_hz(shared.settings.gyro_hz);
     // A cycle starts on the grid of the period and asks the gyros 3 ms later. Three quarters of an interval off the grid
     // the two do not meet, and there is a conversion (3.9 ms) between them: a part that has nothing new may send what a

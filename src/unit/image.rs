@@ -14,7 +14,7 @@ const PIECE: usize = 128;
 const PIECES: usize = 32;
 
 /// Reads for ever.
-pub async fn run(shared: &Shared, read: ReadImage) {
+pub async fn run(shared: &Shared, read: ReadImage) -> ! {
     let period = Duration::from_millis(shared.settings.period_ms);
     // Of a period of 200 ms: after the cycle and its estimation, between two readings of the accelerometers and two fast samples.
     let phase = Duration::from_ticks(period.as_ticks().saturating_mul(2) / 3);

@@ -17,7 +17,7 @@ use crate::{
 const PHASE: Duration = Duration::from_millis(12);
 
 /// Polls for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discretes) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, mut lines: B::Discretes) -> ! {
     let (mut lift_off, mut micro_g) = (Debounce::default(), Debounce::default());
     let interval = Duration::from_micros(POLL_US);
     let mut poll = next_on_grid(interval, PHASE);

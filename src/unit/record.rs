@@ -43,7 +43,7 @@ const RETRY: Duration = Duration::from_secs(2);
 const DIP: Duration = Duration::from_millis(10);
 
 /// Serves the recorder for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory: &B::Retained) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, bus: B::Nand, memory: &B::Retained) -> ! {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         never().await
     };

@@ -33,7 +33,7 @@ enum Outcome {
 }
 
 /// Tests whenever asked.
-pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros: &Gyros<'_, B::Gyro>) {
+pub async fn run<B: Board>(shared: &Shared, switch: &Switch<B::SensorBus>, gyros: &Gyros<'_, B::Gyro>) -> ! {
     loop {
         shared.self_test_ordered.wait().await;
         let mut passed = 0_u8;

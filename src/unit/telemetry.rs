@@ -19,7 +19,7 @@ const SLOWEST_BAUD: u64 = 9600;
 const SPARE_MS: u64 = 20;
 
 /// Sends for ever.
-pub async fn run<B: Board>(shared: &Shared, votes: &Votes, line: B::Telemetry) {
+pub async fn run<B: Board>(shared: &Shared, votes: &Votes, line: B::Telemetry) -> ! {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         never().await
     };

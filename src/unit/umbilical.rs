@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Sends for ever.
-pub async fn send<B: Board>(shared: &Shared, votes: &Votes, line: B::UmbilicalTx) {
+pub async fn send<B: Board>(shared: &Shared, votes: &Votes, line: B::UmbilicalTx) -> ! {
     let (Some(mut cycles), Some(mut frames)) = (shared.cycle_reader(), shared.derived_reader()) else {
         never().await
     };
@@ -87,7 +87,7 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, line: B::UmbilicalTx
 }
 
 /// Listens for ever.
-pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx, memory: &B::Retained) {
+pub async fn listen<B: Board>(shared: &Shared, votes: &Votes, mut line: B::UmbilicalRx, memory: &B::Retained) -> ! {
     let (mut parser, mut arriving) = (Parser::default(), Arriving::default());
     let mut lost = 0_u32;
     let mut bytes = [0; 32];

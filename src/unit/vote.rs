@@ -92,7 +92,7 @@ impl<F: Future> Future for Waiting<'_, F> {
 ///
 /// The question needs no wake of its own: this part's alarm polls the whole unit, and with it every part that waits.
 /// `fed_us` is when that last was.
-pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog, fed_us: &Cell<u64>) {
+pub async fn run<B: Board>(clock: &Clock, votes: &Votes, mut watchdog: B::Watchdog, fed_us: &Cell<u64>) -> ! {
     let interval = Duration::from_millis(ASK_MS);
     let mut ask = next_on_grid(interval, PHASE);
     loop {
