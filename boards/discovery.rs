@@ -22,8 +22,8 @@ use embassy_stm32::peripherals::{PB7, PB8};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, read_image, stack_use, start,
-    telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, VoltageDetector, gyros, read_image,
+    stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -36,7 +36,7 @@ pub fn init() -> Parts<Discovery> {
         watchdog,
         reset,
         oscillator,
-        brown_out,
+        options,
     } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PD8, p.PD9, p.DMA1_CH3);
     Parts {
@@ -57,7 +57,8 @@ pub fn init() -> Parts<Discovery> {
         nand: NandPort::absent(),
         reset,
         oscillator,
-        brown_out,
+        options,
+        supply: VoltageDetector::new(),
         stack_use,
         read_image,
     }

@@ -23,8 +23,8 @@ use embassy_stm32::peripherals::{PB6, PB7};
 use emems::board::Parts;
 
 use self::stm32f407::{
-    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, gyros, read_image, stack_use, start,
-    telemetry, umbilical,
+    NandPort, ResetSafeRam, SensorBus, Started, Stm32f407, VehicleInputs, VoltageDetector, gyros, read_image,
+    stack_use, start, telemetry, umbilical,
 };
 
 /// The types of this board.
@@ -37,7 +37,7 @@ pub fn init() -> Parts<Obc> {
         watchdog,
         reset,
         oscillator,
-        brown_out,
+        options,
     } = start();
     let (umbilical_tx, umbilical_rx) = umbilical(p.USART3, p.PB10, p.PB11, p.DMA1_CH3);
     Parts {
@@ -75,7 +75,8 @@ pub fn init() -> Parts<Obc> {
         ),
         reset,
         oscillator,
-        brown_out,
+        options,
+        supply: VoltageDetector::new(),
         stack_use,
         read_image,
     }

@@ -92,7 +92,9 @@ pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
         return (f32::NAN, f32::NAN);
     }
     let quarters = (angle * FRAC_2_PI + if angle < 0.0 { -0.5 } else { 0.5 }) as i32;
-    let rest = QUARTER.into_iter().fold(angle, |rest, part| rest - quarters as f32 * part);
+    let rest = QUARTER
+        .into_iter()
+        .fold(angle, |rest, part| rest - quarters as f32 * part);
     let rest = rest.clamp(-SERIES, SERIES);
     let (sinc, cos) = series(rest * rest);
     let sin = rest * sinc;

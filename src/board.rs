@@ -26,6 +26,8 @@ pub trait Board {
     type Retained: Retained;
     /// The flight recorder's memory.
     type Nand: NandBus;
+    /// What watches the supply.
+    type Supply: Supply;
 
     /// A checksum of the bytes that a value stands in, those between its fields too, on top of the one `before`: it is another if a
     /// bit of the RAM has flipped. The same where the RAM does not flip, as on a host.
@@ -56,8 +58,10 @@ pub struct Parts<B: Board> {
     pub reset: ResetCause,
     /// What its time comes from.
     pub oscillator: Oscillator,
-    /// What the chip's brown-out reset is set to.
-    pub brown_out: BrownOut,
+    /// What the chip's option bytes say.
+    pub options: OptionBytes,
+    /// What watches the supply.
+    pub supply: B::Supply,
     /// How much of the stack has been used; may take as long as a packet's encoding.
     pub stack_use: fn() -> StackUse,
     /// Reads the firmware's own image.
@@ -79,6 +83,12 @@ pub trait Discretes {
 pub trait Watchdog {
     /// Restarts its count.
     fn feed(&mut self);
+}
+
+/// What watches the supply.
+pub trait Supply {
+    /// How often, since this start, it fell below what the recorder's memory needs.
+    fn dips(&self) -> u16;
 }
 
 /// Memory that survives a reset: [`RETAINED_BYTES`](crate::retained::RETAINED_BYTES) bytes, of which nobody knows what they are
@@ -146,6 +156,16 @@ impl Oscillator {
     }
 }
 
+/// What a flight depends on in the chip's option bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct OptionBytes {
+    /// The brown-out reset.
+    pub brown_out: BrownOut,
+    /// Level of the read-out protection: 0 open, 1 for a flight, 2 for good.
+    pub read_out: u8,
+}
+
 /// The supply voltage below which the processor is held in reset: what its option bytes say, beside what the board asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
@@ -154,6 +174,13 @@ pub struct BrownOut {
     pub set_mv: u16,
     /// \[mV\] asked for.
     pub asked_mv: u16,
+}
+
+impl BrownOut {
+    /// Whether the processor may run on at a voltage at which the board cannot answer for it.
+    pub fn falls_short(&self) -> bool {
+        self.set_mv < self.asked_mv
+    }
 }
 
 /// How deep the stack has grown since the start. Both are zero where nobody knows, as on a host.

@@ -4,7 +4,7 @@
 //!
 //! | content | bytes |
 //! |---|---|
-//! | [`Resume`] | 0 mode (1 WAIT, 2 FLIGHT), 1 flags (1 recording, 2 derived frames, 4 the log was not heard yet), 2-3 counter of the next packet |
+//! | [`Resume`] | 0 mode (1 WAIT, 2 FLIGHT), 1 flags (1 recording, 2 derived frames, 4 the log was not heard yet), 2-3 counter of the next packet, 4-5 dips of the supply since power-on |
 //! | [`Starts`] | 0-1 since power-on, 2-3 without health between them |
 //! | [`Pulse`] | 0-7 last alive, 8-15 watchdog last fed \[us since the unit's clock started\] |
 //!
@@ -36,6 +36,8 @@ pub struct Resume {
     pub awaits_log: bool,
     /// Counter of the next packet.
     pub next_counter: u16,
+    /// Dips of the supply since power-on.
+    pub dips: u16,
 }
 
 impl Resume {
@@ -47,13 +49,13 @@ impl Resume {
         };
         let flag = |bit: u8, set: bool| if set { bit } else { 0 };
         let flags = flag(RECORDING, self.recording) | flag(DERIVED, self.derived) | flag(AWAITS_LOG, self.awaits_log);
-        let [low, high] = self.next_counter.to_le_bytes();
-        STATE.keep(memory, &[mode, flags, low, high]);
+        let ([a, b], [c, d]) = (self.next_counter.to_le_bytes(), self.dips.to_le_bytes());
+        STATE.keep(memory, &[mode, flags, a, b, c, d]);
     }
 
     /// What was kept.
     pub fn recall(memory: &impl Retained) -> Option<Self> {
-        let [mode, flags, low, high] = recall(STATE, memory)?;
+        let [mode, flags, a, b, c, d] = recall(STATE, memory)?;
         if flags & !(RECORDING | DERIVED | AWAITS_LOG) != 0 {
             return None;
         }
@@ -66,7 +68,8 @@ impl Resume {
             recording: flags & RECORDING != 0,
             derived: flags & DERIVED != 0,
             awaits_log: flags & AWAITS_LOG != 0,
-            next_counter: u16::from_le_bytes([low, high]),
+            next_counter: u16::from_le_bytes([a, b]),
+            dips: u16::from_le_bytes([c, d]),
         })
     }
 }
@@ -235,6 +238,7 @@ mod tests {
             derived: true,
             awaits_log: false,
             next_counter: 0x1234,
+            dips: 0x0506,
         };
         let awaiting = Resume {
             awaits_log: true,

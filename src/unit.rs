@@ -120,7 +120,7 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
         resume: Resume::recall(&memory),
         crash: CrashRecord::recall(&memory),
         oscillator: parts.oscillator,
-        brown_out: parts.brown_out,
+        options: parts.options,
         stack_use: parts.stack_use,
     };
     let shared = Shared::new(settings, start);
@@ -137,7 +137,7 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
         inputs::run::<B>(&shared, &votes, parts.discretes),
     );
     let data = join::join4(
-        acquire::run::<B>(&shared, &votes, &switch, &gyros, &memory),
+        acquire::run::<B>(&shared, &votes, &switch, &gyros, parts.supply, &memory),
         gyros::run::<B>(&shared, &votes, &gyros, &memory),
         estimate::run::<B>(&shared, &votes, &mut estimator, &memory),
         record::run::<B>(&shared, &votes, parts.nand, &memory),

@@ -14,7 +14,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
-use emems::board::{BrownOut, Oscillator};
+use emems::board::{BrownOut, OptionBytes, Oscillator};
 
 /// Reads of RCC_CR until the crystal is given up: at least four cycles of the 16 MHz HSI each, so at least 100 ms, as
 /// long as ST's own start-up code waits. A healthy crystal needs 2 ms (STM32F407 datasheet, tSU(HSE)).
@@ -24,24 +24,25 @@ const HSE_READS: u32 = 400_000;
 /// states the chip needs 2.7 V (RM0090 table 10). The factory leaves it off; a programmer sets it (BOR_LEV = 00).
 const BROWN_OUT_MV: u16 = 2700;
 
-/// What the option bytes say of the brown-out reset: the lower end of each level's range (RM0090 section 3.6.1, BOR_LEV).
-pub fn brown_out() -> BrownOut {
-    let set_mv = match FLASH.optcr().read().bor_lev() {
-        0b00 => 2700,
-        0b01 => 2400,
-        0b10 => 2100,
-        _ => 0,
-    };
-    if set_mv < BROWN_OUT_MV {
-        defmt::warn!(
-            "brown-out reset at {=u16} mV, the board asks for {=u16}",
-            set_mv,
-            BROWN_OUT_MV
-        );
-    }
-    BrownOut {
-        set_mv,
-        asked_mv: BROWN_OUT_MV,
+/// What the option bytes say: of the brown-out reset the lower end of its level's range (RM0090 section 3.6.1, BOR_LEV), and of the
+/// read-out protection its level (section 3.6.3, RDP).
+pub fn option_bytes() -> OptionBytes {
+    let options = FLASH.optcr().read();
+    OptionBytes {
+        brown_out: BrownOut {
+            set_mv: match options.bor_lev() {
+                0b00 => 2700,
+                0b01 => 2400,
+                0b10 => 2100,
+                _ => 0,
+            },
+            asked_mv: BROWN_OUT_MV,
+        },
+        read_out: match options.rdp() {
+            0xAA => 0,
+            0xCC => 2,
+            _ => 1,
+        },
     }
 }
 

@@ -32,13 +32,13 @@ use core::task::Poll;
 
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peripherals, bind_interrupts, dma, i2c, peripherals, usart};
-use emems::board::{Board, BrownOut, Oscillator, ResetCause, Watchdog};
+use emems::board::{Board, OptionBytes, Oscillator, ResetCause, Watchdog};
 
 pub use self::bus::SensorBus;
 pub use self::flash::read_image;
 pub use self::gyros::gyros;
 pub use self::lines::{VehicleInputs, telemetry, umbilical};
-pub use self::nand::NandPort;
+pub use self::nand::{NandPort, VoltageDetector};
 pub use self::retained::ResetSafeRam;
 pub use self::stack::stack_use;
 
@@ -72,6 +72,7 @@ impl<Scl: bus::Scl, Sda: bus::Sda> Board for Stm32f407<Scl, Sda> {
     type Watchdog = Iwdg;
     type Retained = ResetSafeRam;
     type Nand = NandPort;
+    type Supply = VoltageDetector;
 
     fn ram_sum<T>(value: &T, before: u32) -> u32 {
         ram::sum(value, before)
@@ -102,8 +103,8 @@ pub struct Started {
     pub reset: ResetCause,
     /// What its clocks come from.
     pub oscillator: Oscillator,
-    /// What its brown-out reset is set to.
-    pub brown_out: BrownOut,
+    /// What its option bytes say.
+    pub options: OptionBytes,
 }
 
 /// Starts the watchdog, then the clocks and the time driver.
@@ -122,6 +123,6 @@ pub fn start() -> Started {
         watchdog: Iwdg(watchdog),
         reset,
         oscillator,
-        brown_out: clock::brown_out(),
+        options: clock::option_bytes(),
     }
 }

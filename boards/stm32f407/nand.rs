@@ -15,9 +15,10 @@
 //!
 //! The supply is watched by the programmable voltage detector at 2.9 V (PLS 7), above the chip's 2.7 V (RM0090 section
 //! 5.2.3). Its interrupt draws WP#, whatever is under way: below 2.7 V nobody says what an operation does, and a page that
-//! was given up is one that the log knows how to do without. WP# is not lifted before the supply is back.
+//! was given up is one that the log knows how to do without. WP# is not lifted before the supply is back. Each such fall is counted.
 
 use core::cell::Cell;
+use core::sync::atomic::{AtomicU16, Ordering};
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
@@ -25,6 +26,7 @@ use embassy_stm32::interrupt::typelevel::{self, Handler, Interrupt};
 use embassy_stm32::pac;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use emems::board::Supply;
 use emems::nand::k9f1208::NandBus;
 
 /// The bank's common memory space (RM0090 section 36.4.2).
@@ -68,7 +70,37 @@ pub struct SupplyInterrupt;
 impl Handler<typelevel::PVD> for SupplyInterrupt {
     unsafe fn on_interrupt() {
         protect(true);
+        DIPS.store(DIPS.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
         pac::EXTI.pr(0).write(|w| w.set_line(DETECTOR, true));
+    }
+}
+
+/// Interrupts of the voltage detector since the start. Only its handler writes it.
+static DIPS: AtomicU16 = AtomicU16::new(0);
+
+/// The voltage detector, at work.
+pub struct VoltageDetector(());
+
+impl VoltageDetector {
+    /// Switches it on.
+    pub fn new() -> Self {
+        pac::RCC.apb1enr().modify(|w| w.set_pwren(true));
+        pac::PWR.cr1().modify(|w| {
+            w.set_pls(THRESHOLD);
+            w.set_pvde(true);
+        });
+        // Its output rises when the supply falls (RM0090 section 5.2.3).
+        pac::EXTI.rtsr(0).modify(|w| w.set_line(DETECTOR, true));
+        pac::EXTI.imr(0).modify(|w| w.set_line(DETECTOR, true));
+        // SAFETY: `Irqs` binds the handler, and what it needs is static.
+        unsafe { typelevel::PVD::enable() };
+        VoltageDetector(())
+    }
+}
+
+impl Supply for VoltageDetector {
+    fn dips(&self) -> u16 {
+        DIPS.load(Ordering::Relaxed)
     }
 }
 
@@ -84,16 +116,6 @@ impl NandPort {
         let write_protect = Output::new(write_protect, Level::Low, Speed::Medium);
         WRITE_PROTECT.lock(|shared| shared.set(Some(write_protect)));
         pac::RCC.ahb3enr().modify(|w| w.set_fsmcen(true));
-        pac::RCC.apb1enr().modify(|w| w.set_pwren(true));
-        pac::PWR.cr1().modify(|w| {
-            w.set_pls(THRESHOLD);
-            w.set_pvde(true);
-        });
-        // The detector's output rises when the supply falls (RM0090 section 5.2.3).
-        pac::EXTI.rtsr(0).modify(|w| w.set_line(DETECTOR, true));
-        pac::EXTI.imr(0).modify(|w| w.set_line(DETECTOR, true));
-        // SAFETY: `Irqs` binds the handler, and what it needs is static.
-        unsafe { typelevel::PVD::enable() };
         for pin in pins {
             let mut pin = Flex::new(pin);
             pin.set_as_af_unchecked(

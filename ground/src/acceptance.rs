@@ -94,7 +94,7 @@ pub enum AcceptanceError {
     #[error("{0} is no serial port; name one as /dev/ttyUSB0 or COM3")]
     NoPort(String),
     /// A defect that only the emulated board can have.
-    #[error("no-crystal and no-brown-out are of the board: use --emulated")]
+    #[error("no-crystal is of the board: use --emulated")]
     OnlyEmulated,
     /// The board.
     #[error(transparent)]
@@ -198,8 +198,7 @@ fn heard_from(arguments: &Arguments) -> Result<Run, AcceptanceError> {
     } else {
         Board::Host
     };
-    let only_emulated = |wrong: &Wrong| matches!(wrong, Wrong::NoCrystal | Wrong::NoBrownOut);
-    if board == Board::Host && arguments.defect.iter().any(only_emulated) {
+    if board == Board::Host && arguments.defect.contains(&Wrong::NoCrystal) {
         return Err(AcceptanceError::OnlyEmulated);
     }
     let mut tell = |at_s: f64, text: &str| eprintln!("{at_s:6.1} s  {text}");

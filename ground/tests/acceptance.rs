@@ -54,6 +54,9 @@ fn faults_of_wiring_are_named_on_the_image() {
             ("turned:m2", "magnetometer 2", "x is y, y is -x"),
             ("silent:t4@0s", "thermometer 4", "nothing at 0x48"),
             ("lift-off:low@0s", "lift-off line", "PC6 to the connector"),
+            ("no-brown-out", "option bytes", "BOR_LEV = 00"),
+            ("no-read-out", "option bytes", "RDP = 0xBB"),
+            ("supply@1s..1.02s", "supply", "the regulator"),
         ],
         &["gyro 1", "gyro 4", "magnetometer 1", "accelerometer 2", "recorder"],
     );

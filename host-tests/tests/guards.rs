@@ -353,3 +353,36 @@ fn c10_a_line_that_is_stuck_with_derived_frames_on_does_not_let_the_watchdog_bit
     assert_eq!(flown.report.resets, []);
     assert_eq!(flown.second(11).len(), 5);
 }
+
+/// `BrownOut::falls_short`, at the start of `umbilical::send`.
+#[test]
+fn a_brown_out_level_below_what_the_board_asks_is_said_at_the_start() {
+    for (set_mv, said) in [(0, true), (2_400, true), (2_700, false)] {
+        let mut flight = still();
+        flight.plant.options.brown_out.set_mv = set_mv;
+        let flown = flight.fly(S);
+        let line = format!("brown-out reset at {set_mv} mV, the board asks for 2700");
+        assert_eq!(flown.replied(&line), said, "{:?}", flown.replies());
+    }
+}
+
+/// `Resume::dips`: a reset does not make a bad supply a good one.
+#[test]
+fn dips_of_the_supply_are_counted_over_resets() {
+    let dip = |flight: Flight, at| {
+        let flight = flight.fault(at, Fault::SupplyFailing(true));
+        flight.fault(at + 20 * MS, Fault::SupplyFailing(false))
+    };
+    let flight = dip(dip(still(), S), 2 * S).fault(3 * S, Fault::Reset);
+    let flown = dip(flight, 4 * S)
+        .say(2_900 * MS, b"G_ST")
+        .say(5 * S, b"G_ST")
+        .fly(6 * S);
+    for dips in ["dips 2 ", "dips 3 "] {
+        assert!(
+            flown.replies().iter().any(|line| line.contains(dips)),
+            "{:?}",
+            flown.replies()
+        );
+    }
+}

@@ -25,7 +25,7 @@ use super::{
     vote::{Voter, Votes},
 };
 use crate::{
-    board::{Board, ResetCause},
+    board::{Board, ResetCause, Supply as _},
     budget::Budget,
     derived::Health,
     geometry::PLATES,
@@ -83,6 +83,7 @@ pub async fn run<B: Board>(
     votes: &Votes,
     switch: &Switch<B::SensorBus>,
     gyros: &Gyros<'_, B::Gyro>,
+    supply: B::Supply,
     memory: &B::Retained,
 ) -> ! {
     let period = Duration::from_millis(shared.settings.period_ms);
@@ -130,12 +131,15 @@ pub async fn run<B: Board>(
         shared.publish_cycle(cycle);
         shared.mend();
         let state = shared.state.get();
+        let dips = resume.dips.saturating_add(supply.dips());
+        shared.supply_dips.set(dips);
         let resume = Resume {
             mode: state.mode,
             recording: state.recording,
             derived: state.derived,
             awaits_log: state.awaits_log,
             next_counter: counter,
+            dips,
         };
         resume.keep(memory);
         if !healthy && start >= HEALTHY {

@@ -15,7 +15,7 @@ use super::{
     clock::{Clock, now},
 };
 use crate::{
-    board::{BrownOut, Oscillator, ResetCause, StackUse},
+    board::{OptionBytes, Oscillator, ResetCause, StackUse},
     calibration::{Ranges, Set},
     crash::CrashRecord,
     derived::{self, DERIVED_BYTES, Derived, Health},
@@ -84,8 +84,8 @@ pub struct Start {
     pub crash: Option<CrashRecord>,
     /// What its time comes from.
     pub oscillator: Oscillator,
-    /// What the chip's brown-out reset is set to.
-    pub brown_out: BrownOut,
+    /// What the chip's option bytes say.
+    pub options: OptionBytes,
     /// How much of the stack has been used.
     pub stack_use: fn() -> StackUse,
 }
@@ -149,6 +149,8 @@ pub struct Shared {
     pub errors: Cell<Errors>,
     /// Lines for the console that found no room.
     pub lines_lost: Cell<u32>,
+    /// Dips of the supply since power-on; those of the latest packet's time before a reset are missing.
+    pub supply_dips: Cell<u16>,
     /// Bytes lost or passed over on the umbilical.
     pub umbilical_noise: Cell<u32>,
     /// The calibration set in use.
@@ -214,6 +216,7 @@ impl Shared {
             bus_wanted: Signal::new(),
             errors: Cell::default(),
             lines_lost: Cell::default(),
+            supply_dips: Cell::default(),
             umbilical_noise: Cell::default(),
             calibration: Cell::new(set),
             set_name: Cell::new(settings.calibration.chars().take(16).collect()),

@@ -47,6 +47,13 @@ pub async fn send<B: Board>(shared: &Shared, votes: &Votes, line: B::UmbilicalTx
         env!("CARGO_PKG_VERSION"),
         shared.start.reset
     ));
+    let brown_out = shared.start.options.brown_out;
+    if brown_out.falls_short() {
+        shared.say(format_args!(
+            "brown-out reset at {} mV, the board asks for {}",
+            brown_out.set_mv, brown_out.asked_mv
+        ));
+    }
     if shared.safe.get() {
         let starts = shared.start.starts.without_health;
         shared.say(format_args!(
@@ -253,14 +260,16 @@ fn status(shared: &Shared) {
             crash.uptime_us / 1000
         ));
     }
-    let stack = (shared.start.stack_use)();
+    let (stack, options) = ((shared.start.stack_use)(), &shared.start.options);
     shared.say(format_args!(
-        "G_ST clock {} stack {} of {} bytes brown-out {} mV of {} image {:08X}",
+        "G_ST clock {} stack {} of {} bytes brown-out {} mV of {} read-out {} dips {} image {:08X}",
         shared.start.oscillator.name(),
         stack.used,
         stack.size,
-        shared.start.brown_out.set_mv,
-        shared.start.brown_out.asked_mv,
+        options.brown_out.set_mv,
+        options.brown_out.asked_mv,
+        options.read_out,
+        shared.supply_dips.get(),
         shared.image.get().unwrap_or_default()
     ));
 }

@@ -52,8 +52,6 @@ pub struct Options {
     pub framing_errors_per_million: u32,
     /// The board lacks its 8 MHz crystal.
     pub no_crystal: bool,
-    /// What the option bytes have in BOR_LEV; 3 from the factory.
-    pub brown_out_level: Option<u32>,
     /// Statics of the firmware, by symbol and size in bytes, read when the run ends.
     pub statics: Vec<(String, usize)>,
 }
@@ -151,15 +149,14 @@ pub fn fly_keeping(
         .map(|(name, bytes)| Ok((image.symbol(name)?, *bytes)))
         .collect::<Result<Vec<_>, ImageError>>()?;
     let emulator = |error: &dyn std::fmt::Display| Error::Emulator(error.to_string());
+    let chip_options = plant.options;
     let plant = SharedPlant::new(plant);
     let mut stand = Stand::new(plant.clone(), options.covers).map_err(|error| emulator(&error))?;
     stand.mcu.garble_umbilical(options.framing_errors_per_million);
     if options.no_crystal {
         stand.mcu.remove_crystal();
     }
-    if let Some(level) = options.brown_out_level {
-        stand.mcu.set_brown_out(level);
-    }
+    stand.mcu.set_option_bytes(chip_options);
     // The first stop, one instruction in: the bench's first commands have to be known from the start.
     let session = Session::new(Box::new(stand), 0, VirtualNanos(1)).map_err(|error| emulator(&error))?;
     let mut faults = faults.to_vec();

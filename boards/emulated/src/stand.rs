@@ -8,6 +8,7 @@
 
 use std::num::{NonZeroU32, NonZeroU64};
 
+use emems::board::OptionBytes;
 use rigless::{
     chip::uart::Rate,
     device::{ErasedDevice, Level, ResetCause},
@@ -80,6 +81,8 @@ pub struct Wired {
     dma_hung: bool,
     /// The reset to come is one of switching on.
     power_cut: bool,
+    /// What the option bytes say; the model's register forgets it in a reset.
+    options: OptionBytes,
 }
 
 impl Wired {
@@ -127,6 +130,7 @@ impl Wired {
             crystal: true,
             dma_hung: false,
             power_cut: false,
+            options: OptionBytes::default(),
         })
     }
 
@@ -182,11 +186,23 @@ impl Wired {
         sagging && unmasked >> VOLTAGE_DETECTOR & 1 == 1
     }
 
-    /// Sets the option bytes' BOR_LEV.
-    pub fn set_brown_out(&mut self, level: u32) {
+    /// Sets the option bytes: BOR_LEV and RDP (RM0090 section 3.9.10).
+    pub fn set_option_bytes(&mut self, options: OptionBytes) {
+        self.options = options;
+        let level = match options.brown_out.set_mv {
+            2700.. => 0b00,
+            2400.. => 0b01,
+            2100.. => 0b10,
+            _ => 0b11,
+        };
+        let protection = match options.read_out {
+            0 => 0xAA,
+            2 => 0xCC,
+            _ => 0xBB,
+        };
         let registers = self.part.bus_mut().slot_mut(self.slots.flash).registers_mut();
-        let options = flash::optcr::BOR_LEV.set(registers.get(flash::Register::Optcr), level.into());
-        registers.set(flash::Register::Optcr, options);
+        let value = flash::optcr::BOR_LEV.set(registers.get(flash::Register::Optcr), level);
+        registers.set(flash::Register::Optcr, flash::optcr::RDP.set(value, protection));
     }
 
     /// EN of a stream stays set until the item under way is through (RM0090 section 10.3.17), and here it never is.
@@ -217,6 +233,7 @@ impl Mcu for Wired {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.part.reset(at, cause);
+        self.set_option_bytes(self.options);
         self.dma_hung = false;
         self.sensor_port.plant.lock().controller_reset();
         let mut i2c = I2c::with_clock(rcc::HSI_HZ);

@@ -195,25 +195,49 @@ fn a_static_is_read_by_its_name_and_a_wrong_name_is_refused() {
 }
 
 #[test]
-fn a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said() {
-    for (level, said) in [(None, "brown-out 0 mV of 2700"), (Some(0), "brown-out 2700 mV of 2700")] {
-        let options = Options {
-            brown_out_level: level,
-            ..Options::default()
-        };
+fn option_bytes_are_told_and_a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said_at_the_start() {
+    for (set_mv, read_out) in [(0, 0), (2100, 1), (2400, 2), (2700, 1)] {
+        let mut plant = Plant::ideal(world("still"));
+        plant.options.brown_out.set_mv = set_mv;
+        plant.options.read_out = read_out;
         let mut tape = Tape {
             script: vec![(400 * MS, b"G_ST".to_vec())],
             ..Tape::default()
         };
-        flown(&options, &[], 600, &mut tape);
-        assert!(tape.said().contains(said), "{}", tape.said());
-        assert_eq!(
-            tape.log.iter().any(|line| line.contains("brown-out reset at")),
-            level.is_none(),
-            "{:?}",
-            tape.log
-        );
+        fly_with(&Options::default(), image(), plant, &[], 600 * MS, &mut tape).expect("it flies");
+        let status = format!("brown-out {set_mv} mV of 2700 read-out {read_out} dips 0");
+        assert!(tape.said().contains(&status), "{}", tape.said());
+        let warning = format!("brown-out reset at {set_mv} mV, the board asks for 2700");
+        assert_eq!(tape.said().contains(&warning), set_mv < 2700, "{}", tape.said());
     }
+}
+
+/// The voltage detector's interrupt counts; a reset in between loses none.
+#[test]
+fn dips_of_the_supply_are_counted_since_power_on() {
+    let supply = |at: u64, failing: bool| Scheduled {
+        at: at * MS,
+        fault: Fault::SupplyFailing(failing),
+    };
+    let reset = Scheduled {
+        at: 900 * MS,
+        fault: Fault::Reset,
+    };
+    let faults = [
+        supply(400, true),
+        supply(420, false),
+        supply(600, true),
+        supply(620, false),
+        reset,
+        supply(1_400, true),
+        supply(1_420, false),
+    ];
+    let mut tape = Tape {
+        script: vec![(1_700 * MS, b"G_ST".to_vec())],
+        ..Tape::default()
+    };
+    flown(&Options::default(), &faults, 1_900, &mut tape);
+    assert!(tape.said().contains("read-out 1 dips 3 "), "{}", tape.said());
 }
 
 /// \[bytes\] what the stack may have grown to: 60 % of its place. Most is the estimator's, while it is being built.

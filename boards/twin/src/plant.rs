@@ -16,6 +16,7 @@ mod tests;
 use std::sync::Arc;
 
 use emems::{
+    board::{BrownOut, OptionBytes},
     nand::K9F1208_BLOCKS,
     sample::{Kind, SENSORS},
 };
@@ -118,8 +119,12 @@ pub struct Plant {
     pub gyro: [Gyro; PLATES],
     /// The recorder's memory.
     pub nand: K9f1208,
+    /// What the processor's option bytes say: from the start as for a flight.
+    pub options: OptionBytes,
     /// The supply is above what the NAND needs.
     supply_good: bool,
+    /// How often it fell below that.
+    dips: u16,
     /// What drives the vehicle's two lines.
     lift_off: Level,
     micro_g: Level,
@@ -152,7 +157,15 @@ impl Plant {
             i2c: SensorBus::new(Tca9548a::new(plates)),
             gyro: core::array::from_fn(|plate| views.gyro(plate, seeds.stream((PLATES + plate) as u64), quality)),
             nand: K9f1208::new(Cells::formatted(K9F1208_BLOCKS, seed)),
+            options: OptionBytes {
+                brown_out: BrownOut {
+                    set_mv: 2700,
+                    asked_mv: 2700,
+                },
+                read_out: 1,
+            },
             supply_good: true,
+            dips: 0,
             lift_off: Level::World,
             micro_g: Level::World,
             struck: [0; 3],
@@ -176,6 +189,11 @@ impl Plant {
     pub fn power_good(&mut self) -> bool {
         self.struck[0] += u64::from(!self.supply_good);
         self.supply_good
+    }
+
+    /// How often the supply fell below that, since the plant was made.
+    pub fn supply_dips(&self) -> u16 {
+        self.dips
     }
 
     /// How often each fault did something since power-on, by its name.
@@ -266,7 +284,10 @@ impl Plant {
             Fault::NandFlips(per_thousand) => self.nand.cells.befalls.flips_per_thousand = per_thousand,
             Fault::LiftOff(level) => self.lift_off = level,
             Fault::MicroG(level) => self.micro_g = level,
-            Fault::SupplyFailing(failing) => self.supply_good = !failing,
+            Fault::SupplyFailing(failing) => {
+                self.dips = self.dips.saturating_add(u16::from(failing && self.supply_good));
+                self.supply_good = !failing;
+            }
             Fault::PowerCut(tear) => {
                 self.nand.power_cut(now, tear);
                 self.supply_good = true;

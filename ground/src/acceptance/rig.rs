@@ -43,8 +43,10 @@ pub enum Wrong {
     Fault(Planned),
     /// The board lacks its crystal. Emulated board only.
     NoCrystal,
-    /// The option bytes are as from the factory. Emulated board only.
+    /// The brown-out level is as from the factory.
     NoBrownOut,
+    /// The read-out protection is as from the factory.
+    NoReadOut,
 }
 
 impl std::str::FromStr for Wrong {
@@ -54,12 +56,13 @@ impl std::str::FromStr for Wrong {
         match text {
             "no-crystal" => Ok(Wrong::NoCrystal),
             "no-brown-out" => Ok(Wrong::NoBrownOut),
+            "no-read-out" => Ok(Wrong::NoReadOut),
             _ if text.contains('@') => text
                 .parse()
                 .map(Wrong::Fault)
                 .map_err(|error: twin::fault::BadFault| error.to_string()),
             _ => text.parse().map(Wrong::Defect).map_err(|error: String| {
-                format!("{error}; no-crystal no-brown-out; or a fault with its time, as silent:a2@0s")
+                format!("{error}; no-crystal no-brown-out no-read-out; or a fault with its time, as silent:a2@0s")
             }),
         }
     }
@@ -102,7 +105,13 @@ pub fn run(board: Board, wrong: &[Wrong], seed: u64, tell: &mut dyn FnMut(f64, &
         _ => None,
     });
     let faults: Vec<Planned> = faults.collect();
-    let plant = Plant::assembled(source, seed, Quality::NOMINAL, &defects);
+    let mut plant = Plant::assembled(source, seed, Quality::NOMINAL, &defects);
+    if wrong.contains(&Wrong::NoBrownOut) {
+        plant.options.brown_out.set_mv = 0;
+    }
+    if wrong.contains(&Wrong::NoReadOut) {
+        plant.options.read_out = 0;
+    }
     let faults: Vec<Scheduled> = schedule(&faults, seed);
     let mut rig = Rig {
         procedure: Procedure::new(Patience::TWIN),
@@ -120,8 +129,6 @@ pub fn run(board: Board, wrong: &[Wrong], seed: u64, tell: &mut dyn FnMut(f64, &
         Board::Emulated => {
             let options = Options {
                 no_crystal: wrong.contains(&Wrong::NoCrystal),
-                // As a programmer leaves it (docs/boards.md).
-                brown_out_level: (!wrong.contains(&Wrong::NoBrownOut)).then_some(0),
                 ..Options::default()
             };
             let image = image::build()?;

@@ -42,6 +42,10 @@ pub struct Status {
     pub stack: Option<(u32, u32)>,
     /// \[mV\] brown-out level set and asked for.
     pub brown_out_mv: Option<(u32, u32)>,
+    /// Level of the read-out protection.
+    pub read_out: Option<u32>,
+    /// Dips of the supply since power-on.
+    pub dips: Option<u32>,
 }
 
 impl Status {
@@ -97,6 +101,8 @@ impl Status {
                 };
                 self.stack = number("stack", 1).zip(number("stack", 3));
                 self.brown_out_mv = number("brown-out", 1).zip(number("brown-out", 4));
+                self.read_out = number("read-out", 1);
+                self.dips = number("dips", 1);
             }
             _ => {}
         }
@@ -173,7 +179,7 @@ mod tests {
             "G_ST recorder 12 of 130816 pages, 4 bad blocks, 5 bits corrected, 6 halves lost, 436 min left",
             "G_ST recorder: empty",
             "G_ST started PowerOn resets 2 up 17 s, starts without a minute of health 1",
-            "G_ST clock crystal stack 9000 of 24000 bytes brown-out 2700 mV of 2700",
+            "G_ST clock crystal stack 9000 of 24000 bytes brown-out 2700 mV of 2700 read-out 1 dips 7",
         ]));
         let expected = Status {
             mode: Some("WAIT".into()),
@@ -193,6 +199,8 @@ mod tests {
             clock: Some("crystal".into()),
             stack: Some((9000, 24_000)),
             brown_out_mv: Some((2700, 2700)),
+            read_out: Some(1),
+            dips: Some(7),
         };
         assert_eq!(all, [expected]);
     }

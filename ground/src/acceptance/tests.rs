@@ -139,6 +139,9 @@ const FAULTS: &[(&str, &str, &str, &[&str])] = &[
     ("nand-absent@0s", "recorder", "answers", &[]),
     ("nand-dead@0s", "recorder", "answers", &[]),
     ("lift-off:low@0s", "lift-off line", "PC6 to the connector", &[]),
+    ("no-brown-out", "option bytes", "BOR_LEV = 00", &[]),
+    ("no-read-out", "option bytes", "RDP = 0xBB", &[]),
+    ("supply@1s..1.02s", "supply", "the regulator", &[]),
 ];
 
 /// Whether a part is one of these, or all of a kind ("accelerometers") where one of it may fail.

@@ -2,11 +2,11 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use emems::board::{Board, BrownOut, Oscillator, Parts, ResetCause, StackUse};
+use emems::board::{Board, Oscillator, Parts, ResetCause, StackUse};
 
 use super::{
     bus::{Gyro, SensorBus},
-    lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter},
+    lines::{Fed, Inputs, Kept, Receiver, Sent, Spoken, Transmitter, Watched},
     nand::NandPins,
     plight::{self, Plight},
 };
@@ -25,6 +25,7 @@ impl Board for Host {
     type Watchdog = Fed;
     type Retained = Kept;
     type Nand = NandPins;
+    type Supply = Watched;
 
     fn ram_sum<T>(_: &T, before: u32) -> u32 {
         before
@@ -62,10 +63,8 @@ pub fn parts(plant: &Rc<RefCell<Plant>>, ends: &Ends, reset: ResetCause) -> Part
         nand: NandPins(plant.clone(), ends.plight.clone()),
         reset,
         oscillator: Oscillator::Crystal,
-        brown_out: BrownOut {
-            set_mv: 2700,
-            asked_mv: 2700,
-        },
+        options: plant.borrow().options,
+        supply: Watched::new(plant),
         stack_use: StackUse::default,
         read_image: plight::read_image,
     }

@@ -12,7 +12,7 @@ use std::{
 use embassy_time::{Duration, Timer};
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
 use emems::{
-    board::{Discretes, Retained, Watchdog},
+    board::{Discretes, Retained, Supply, Watchdog},
     retained::RETAINED_BYTES,
 };
 
@@ -158,6 +158,29 @@ impl Discretes for Inputs {
 
     fn micro_g(&mut self) -> bool {
         self.0.borrow_mut().discretes(clock::since_power_on()).1
+    }
+}
+
+/// What watches the supply.
+pub struct Watched {
+    plant: Rc<RefCell<Plant>>,
+    /// Dips before this start.
+    before: u16,
+}
+
+impl Watched {
+    /// It counts from now on.
+    pub fn new(plant: &Rc<RefCell<Plant>>) -> Self {
+        Watched {
+            plant: plant.clone(),
+            before: plant.borrow().supply_dips(),
+        }
+    }
+}
+
+impl Supply for Watched {
+    fn dips(&self) -> u16 {
+        self.plant.borrow().supply_dips().saturating_sub(self.before)
     }
 }
 

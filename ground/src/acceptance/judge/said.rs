@@ -68,6 +68,14 @@ pub fn unit(evidence: &Evidence) -> Vec<Finding> {
         brown_out.is_some_and(|(set, asked)| set >= asked),
         "program BOR_LEV = 00 with the debugger (docs/boards.md): from the factory it is off",
     ));
+    found.push(finding(
+        "option bytes",
+        "read-out protection",
+        said(first.read_out.map(|level| format!("level {level}"))),
+        "level 1",
+        first.read_out == Some(1),
+        "level 0 is the bench's: program RDP = 0xBB as the last of the option bytes, then cut the power (docs/threats.md); level 2 has no way back",
+    ));
     let clock = first.clock.as_deref();
     found.push(finding(
         "clock",
@@ -90,6 +98,14 @@ pub fn unit(evidence: &Evidence) -> Vec<Finding> {
         "0",
         resets.0.is_some() && resets.0 == resets.1,
         "supply (dips at load), NRST, the watchdog: G_ST says why it started",
+    ));
+    found.push(finding(
+        "supply",
+        "dips below 2.9 V since power-on",
+        said(last.dips),
+        "0",
+        last.dips == Some(0),
+        "the regulator and its capacitors, the plug and the cable, what else draws from the line when sensors and NAND begin to work",
     ));
     if let Some((used, size)) = last.stack.filter(|(_, size)| *size > 0) {
         let good = f64::from(used) <= limits::STACK * f64::from(size);
