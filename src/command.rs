@@ -80,6 +80,8 @@ pub enum Command {
     Status,
     /// Report firmware version and board.
     Version,
+    /// Report how the unit lies on its pad.
+    Alignment,
     /// Leave safe mode: estimate again, take every command.
     LeaveSafeMode,
     /// List the words.
@@ -107,7 +109,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 22] = [
+pub const COMMANDS: [Entry; 23] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(
@@ -153,6 +155,11 @@ pub const COMMANDS: [Entry; 22] = [
     entry(b"G_MG", Command::Record, "FLIGHT: record packets (send twice)"),
     entry(b"G_ST", Command::Status, "status"),
     entry(b"G_VE", Command::Version, "version"),
+    entry(
+        b"G_PA",
+        Command::Alignment,
+        "azimuth, elevation, roll and sigmas; sensors in use",
+    ),
     entry(b"G_XN", Command::LeaveSafeMode, "leave safe mode"),
     entry(b"G_HE", Command::Help, "this list"),
     entry(b"G_DL", Command::DerivedOn, "derived frames on"),

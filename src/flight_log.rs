@@ -236,11 +236,12 @@ impl<N: Nand> FlightLog<N> {
             flight,
             recording,
             derived,
+            rail,
         } = mode;
-        if (kept.flight, kept.recording, kept.derived) == (flight, recording, derived) {
+        if (kept.flight, kept.recording, kept.derived, kept.rail) == (flight, recording, derived, rail) {
             return Ok(());
         }
-        (kept.flight, kept.recording, kept.derived) = (flight, recording, derived);
+        (kept.flight, kept.recording, kept.derived, kept.rail) = (flight, recording, derived, rail);
         let outcome = self.save().await;
         self.stop_if_unsure(&outcome);
         outcome

@@ -42,6 +42,7 @@ pub mod kalman;
 pub mod mode;
 pub mod nand;
 pub mod packet;
+pub mod pad;
 pub mod quest;
 pub mod rail;
 pub mod redundancy;

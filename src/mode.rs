@@ -136,6 +136,8 @@ pub enum Refusal {
     NothingToConfirm,
     /// The lift-off line is asserted.
     LiftOff,
+    /// A number of it cannot be: why.
+    Number(&'static str),
 }
 
 /// What became of a command.
@@ -256,7 +258,9 @@ impl State {
             Command::Flight | Command::Wait if !confirmed => self.confirm(command, command, now_us),
             Command::Flight => self.enter(Mode::Flight),
             Command::Wait => self.enter(Mode::Wait),
-            Command::Status | Command::Version | Command::Help => Verdict::Done(Action::Report(command)),
+            Command::Status | Command::Version | Command::Alignment | Command::Help => {
+                Verdict::Done(Action::Report(command))
+            }
             Command::LeaveSafeMode => Verdict::Done(Action::None),
             Command::DerivedOn | Command::DerivedOff => {
                 self.derived = command == Command::DerivedOn;
@@ -296,7 +300,11 @@ impl State {
             Command::SetWord { .. } | Command::ReadSet => {
                 self.only_in(Mode::Wait, |_| Verdict::Done(Action::Calibration(command)))
             }
-            Command::LoadSet | Command::ForgetSet | Command::Rail(_) => {
+            Command::Rail(rail) => self.only_in(Mode::Wait, |state| match rail.fault() {
+                Some(why) => Verdict::Refused(Refusal::Number(why)),
+                None => state.confirm(command, Command::ConfirmSet, now_us),
+            }),
+            Command::LoadSet | Command::ForgetSet => {
                 self.only_in(Mode::Wait, |state| state.confirm(command, Command::ConfirmSet, now_us))
             }
             Command::ConfirmSet => self.only_in(Mode::Wait, |_| match armed {

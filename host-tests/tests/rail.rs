@@ -99,11 +99,69 @@ fn a_rail_lasts_over_a_reset_and_a_wrong_number_changes_nothing() {
         (b"G_RA1B5821340003G_CK", "a sigma is zero"),
     ] {
         let flown = on_pad().say(5 * S, word).fly(9 * S);
-        assert!(flown.replied(&format!("G_RA no: {why}")), "{:?}", flown.replies());
+        let replies = flown.replies();
+        assert!(flown.replied(&format!("G_RA no: {why}")), "{replies:?}");
+        // Refused when it comes: nothing is armed.
+        assert!(
+            !flown.replied("send G_CK") && flown.replied("G_CK no: nothing to confirm"),
+            "{replies:?}"
+        );
         assert!(!flown.replied("rail taken"));
     }
     let flying = on_pad().say(4 * S, b"G_MVG_MV").say(6 * S, RAIL).fly(9 * S);
     assert!(flying.replied("G_RA no: only in WAIT"), "{:?}", flying.replies());
+}
+
+/// The superblock has it. A command knows better, even one that comes before the log is heard.
+#[test]
+fn a_rail_lasts_over_a_power_cut_unless_another_was_told_since() {
+    let cut = || on_pad().say(5 * S, RAIL).fault(10 * S, Fault::PowerCut(0));
+    let flown = cut().fly(20 * S);
+    let before = "rail as before the power cut: azimuth 70.00 elevation 85.00 sigma 0.5 0.3 deg";
+    assert!(flown.replied(before), "{:?}", flown.replies());
+    let replies = flown.replies();
+    let taken = replies.iter().filter(|line| line.contains("rail taken")).count();
+    assert_eq!(taken, 2, "{replies:?}");
+    // Kept again: a reset after it, and another cut, change nothing; twelve zeros forget it.
+    let again = cut().fault(14 * S, Fault::Reset).fault(18 * S, Fault::PowerCut(0));
+    let replies = again
+        .say(21 * S, b"G_RA000000000000G_CK")
+        .fault(24 * S, Fault::PowerCut(0));
+    let replies = replies.fly(28 * S).replies();
+    let found = replies.iter().filter(|line| line.contains(before)).count();
+    assert_eq!(found, 2, "{replies:?}");
+
+    let silent = cut()
+        .fault(10 * S + MS / 10, Fault::NandDead(true))
+        .say(12 * S, b"G_RA1B5821340A0AG_CK");
+    let flown = silent.fault(14 * S, Fault::NandDead(false)).fly(20 * S);
+    assert!(flown.replied("G_RA ok: azimuth 70.00 elevation 85.00 sigma 1.0 1.0 deg"));
+    assert!(!flown.replied("rail as before"), "{:?}", flown.replies());
+}
+
+/// The answer is the newest frame's attitude; without one it says so.
+#[test]
+fn the_pad_alignment_is_said_with_sigmas_and_sensors() {
+    let early = on_pad().say(300 * MS, b"G_PA").fly(S);
+    assert!(early.replied("G_PA no attitude"), "{:?}", early.replies());
+    let flown = on_pad()
+        .say(5 * S, RAIL)
+        .fault(6 * S, Fault::Silent(5))
+        .say(15 * S - 50 * MS, b"G_PA")
+        .fly(15 * S);
+    let replies = flown.replies();
+    let line = replies
+        .iter()
+        .find_map(|line| line.split("G_PA ").nth(1))
+        .expect("an answer");
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let number = |at: usize| words[at].parse::<f64>().unwrap_or_else(|_| panic!("{line}"));
+    for (name, at, truth) in [("azimuth", 0, 70.0), ("elevation", 4, 85.0)] {
+        let (value, sd) = (number(at + 1), number(at + 3));
+        assert_eq!(words[at], name);
+        assert!(sd > 0.0 && sd < 2.0 && (value - truth).abs() < 3.0 * sd, "{line}");
+    }
+    assert!(flown.replied("G_PA plates 1 amgt 2 a-gt 3 amgt 4 amgt"), "{replies:?}");
 }
 
 /// Cycles whose frame is not, bit for bit, what the estimation makes of it with rails taken at these times \[us\], each before the next

@@ -73,6 +73,7 @@ fn f17_the_mode_of_an_older_save_gives_way_to_that_of_the_newest_record() {
             flight,
             recording: flight,
             derived: false,
+            ..Resumed::default()
         };
         let in_mode = |flight, id| Entry { flight, ..entry(id) };
         block_on(async {

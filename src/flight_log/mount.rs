@@ -13,7 +13,10 @@ use super::{
     record,
     superblock::{self, Superblock, SuperblockError},
 };
-use crate::nand::{Nand, PAGES_PER_BLOCK, PageAddress};
+use crate::{
+    nand::{Nand, PAGES_PER_BLOCK, PageAddress},
+    rail::Rail,
+};
 
 /// Blocks below the newest boot's first that are looked at for the boot before: boots that left nothing but a torn page
 /// used the same block again, so that the next one below is live unless it was retired.
@@ -38,6 +41,8 @@ pub struct Resumed {
     pub recording: bool,
     /// Derived frames were on.
     pub derived: bool,
+    /// The launch rail it lay on.
+    pub rail: Rail,
 }
 
 /// What the superblock's blocks hold.
@@ -68,6 +73,7 @@ impl<N: Nand> FlightLog<N> {
             flight: self.superblock.flight,
             recording: self.superblock.recording,
             derived: self.superblock.derived,
+            rail: self.superblock.rail,
         })
     }
 
@@ -89,6 +95,7 @@ impl<N: Nand> FlightLog<N> {
         if found != Found::Sure {
             // A newer save may say otherwise.
             self.superblock.block_before = 0;
+            self.superblock.rail = Rail::default();
         }
         let head = match found {
             Found::Sure => match self.search_head()? {

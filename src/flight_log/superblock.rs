@@ -3,7 +3,8 @@
 //! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
 //! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording, 4 derived frames), `6-7` epoch, `8-11` its own number,
 //! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-243` their numbers ascending,
-//! `244-245` the block with the newest records before that boot (0: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
+//! `244-245` the block with the newest records before that boot (0: none), `246-251` the launch rail ([`Rail::bytes`], big endian; zeros in saves of
+//! older firmware: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
 
 use heapless::Vec;
 
@@ -11,6 +12,7 @@ use super::{
     LOG_START,
     record::{CRC, RECORD_BYTES, RecordBytes},
 };
+use crate::rail::{RAIL_BYTES, Rail};
 
 /// The version this code writes and the newest it reads.
 pub const VERSION: u8 = 1;
@@ -23,6 +25,9 @@ const MAGIC: [u8; 4] = *b"eMSB";
 const CHECKED: usize = RECORD_BYTES - 4;
 const LIST: usize = 20;
 const BLOCK_BEFORE: usize = 244;
+const RAIL: usize = 246;
+
+const _: () = assert!(RAIL + RAIL_BYTES == CHECKED);
 
 /// Blocks that are not used, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -83,6 +88,8 @@ pub struct Superblock {
     pub recording: bool,
     /// Derived frames are on.
     pub derived: bool,
+    /// The launch rail.
+    pub rail: Rail,
     /// Blocks that are not used.
     pub bad: BadBlocks,
 }
@@ -116,6 +123,7 @@ pub fn encode(superblock: &Superblock) -> RecordBytes {
     put(12, &superblock.boot.to_le_bytes());
     put(16, &superblock.first_block.to_le_bytes());
     put(BLOCK_BEFORE, &superblock.block_before.to_le_bytes());
+    put(RAIL, &superblock.rail.bytes());
     put(18, &(superblock.bad.0.len() as u16).to_le_bytes());
     let mut at = LIST;
     for block in &superblock.bad.0 {
@@ -157,6 +165,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<Superblock, SuperblockError> {
         flight: bytes[5] & 1 != 0,
         recording: bytes[5] & 2 != 0,
         derived: bytes[5] & 4 != 0,
+        rail: Rail::of_bytes(bytes[RAIL..CHECKED].first_chunk().copied().unwrap_or_default()),
         bad,
     })
 }
@@ -179,6 +188,7 @@ mod tests {
             flight: true,
             recording: false,
             derived: true,
+            rail: Rail::of_bytes([1, 2, 3, 4, 5, 6]),
             bad,
         }
     }

@@ -325,6 +325,7 @@ fn the_log_is_believed_once_and_only_before_anybody_else_has_spoken() {
         flight: true,
         recording: true,
         derived: true,
+        ..Resumed::default()
     };
     let mut after_power_on = State::resumed(None);
     after_power_on.recovered(flying);

@@ -1,6 +1,7 @@
 //! The launch rail over the umbilical: G_RA with G_CK.
 //!
-//! A rail in use lasts over a reset, in retained memory; after a power cut it must be said again. In WAIT the filter takes it once for
+//! A rail in use lasts over a reset, in retained memory, and over a power cut, in the recorder's superblock: that one is taken at the first
+//! mount after power-on and never after a command. In WAIT the filter takes it once for
 //! each attitude that is found, and the log keeps its numbers and when. One that contradicts the attitude is announced and left out. In
 //! FLIGHT it is not looked at.
 
@@ -12,11 +13,8 @@ use crate::{
     retained::RAIL,
 };
 
-/// Uses a rail from now on.
+/// Uses a rail from now on, whose numbers were looked at when it was armed.
 pub fn set(shared: &Shared, memory: &impl Retained, rail: Rail) {
-    if let Some(fault) = rail.fault() {
-        return shared.say(format_args!("G_RA no: {fault}"));
-    }
     RAIL.keep(memory, &rail.bytes());
     take(shared, rail);
     shared.note(Cause::Rail);
@@ -31,8 +29,19 @@ pub fn recall(shared: &Shared, memory: &impl Retained) {
     }
 }
 
+/// Takes the rail that was in use before a power cut, unless another is known.
+pub fn found(shared: &Shared, memory: &impl Retained, rail: Rail) {
+    if shared.rail_known.replace(true) || rail.is_none() || rail.fault().is_some() {
+        return;
+    }
+    RAIL.keep(memory, &rail.bytes());
+    take(shared, rail);
+    shared.say(format_args!("rail as before the power cut: {rail}"));
+}
+
 fn take(shared: &Shared, rail: Rail) {
     shared.rail.set(rail);
+    shared.rail_known.set(true);
     shared.rail_is_new.set(true);
 }
 

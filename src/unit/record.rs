@@ -5,7 +5,7 @@
 //! of every derived frame, and it is tried again every [`RETRY`]. After a dip of the supply it is tried again at once, and
 //! again after twice as long each time; the newest record waits for it. So a dip costs the records of its own duration at most.
 //!
-//! What the log says of the time before power-on (mode, attitude, the calibration set it keeps) is taken once, at the first mount,
+//! What the log says of the time before power-on (mode, attitude, rail, the calibration set it keeps) is taken once, at the first mount,
 //! and where neither retained memory nor a command knows better. A crash record is forgotten when a boot header with it is in the log.
 
 use embassy_time::{Duration, Instant};
@@ -13,6 +13,7 @@ use embassy_time::{Duration, Instant};
 use super::{
     calibration,
     clock::{after, never, now},
+    rail,
     shared::{Cycle, Shared},
     vote::{Voter, Votes},
 };
@@ -123,6 +124,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
                 if self.missed.is_none() {
                     self.forgive();
                 }
+                rail::found(self.shared, self.memory, resumed.rail);
                 if self.shared.state.get().awaits_log {
                     self.find_attitude(resumed.flight);
                     let shared = self.shared;
@@ -250,6 +252,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             flight: state.mode == Mode::Flight,
             recording: state.recording,
             derived: state.derived,
+            rail: self.shared.rail.get(),
         };
         self.log.keep_mode(mode).await?;
         let calibration = self.shared.set_name();

@@ -26,6 +26,7 @@ use crate::{
     increments::{Force, Increments, Integrator},
     mode::{Cause, Change, Copies, State, Task},
     packet::PACKET_BYTES,
+    pad::Pad,
     rail::Rail,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
@@ -175,8 +176,12 @@ pub struct Shared {
     pub set_sum: Cell<u32>,
     /// Changes of mode that are not in the log yet.
     changes: Cell<Deque<Change, CHANGES>>,
+    /// How the unit lies, as of the newest derived frame.
+    pub pad: Cell<Pad>,
     /// The launch rail.
     pub rail: Cell<Rail>,
+    /// It is known to be the one: it was ordered, or kept over a reset. Otherwise the recorder is asked.
+    pub rail_known: Cell<bool>,
     /// The attitude has not been held against it.
     pub rail_is_new: Cell<bool>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
@@ -226,7 +231,9 @@ impl Shared {
             attitude_found: Cell::default(),
             fed_us: Cell::default(),
             changes: Cell::default(),
+            pad: Cell::default(),
             rail: Cell::default(),
+            rail_known: Cell::default(),
             rail_is_new: Cell::default(),
             force: Signal::new(),
             cycles: PubSubChannel::new(),
@@ -271,6 +278,7 @@ impl Shared {
 
     /// Gives a derived frame to every reader.
     pub fn publish_derived(&self, derived: Derived) {
+        self.pad.set(Pad::of(&derived));
         self.derived.immediate_publisher().publish_immediate(derived);
     }
 

@@ -162,6 +162,7 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         )),
         Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
         Verdict::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
+        Verdict::Refused(Refusal::Number(why)) => shared.say(format_args!("{word} no: {why}")),
         Verdict::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
         Verdict::Done(Action::None) => {
             let mode = shared.state.get().mode.name();
@@ -184,6 +185,7 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         Verdict::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
         }
+        Verdict::Done(Action::Report(Command::Alignment)) => alignment(shared),
         Verdict::Done(Action::Report(_)) => status(shared),
     }
 }
@@ -194,6 +196,15 @@ async fn help(shared: &Shared) {
             .tell(format_args!("{} {}", Printable(entry.word), entry.meaning))
             .await;
     }
+}
+
+fn alignment(shared: &Shared) {
+    let pad = shared.pad.get();
+    match pad.alignment() {
+        Some(alignment) => shared.say(format_args!("G_PA {alignment}")),
+        None => shared.say(format_args!("G_PA no attitude")),
+    }
+    shared.say(format_args!("G_PA {}", pad.plates()));
 }
 
 fn status(shared: &Shared) {

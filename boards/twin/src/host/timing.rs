@@ -18,7 +18,7 @@ pub const I2C_OVERHEAD: Nanos = 1_650;
 /// \[ns\] what a transaction that reads takes more of it.
 pub const I2C_READ: Nanos = 6_750;
 /// \[ns\] its work at each change of direction inside one.
-pub const I2C_TURN: Nanos = 12_000;
+pub const I2C_TURN: Nanos = 11_750;
 /// \[ns\] a 16-bit word on the gyro bus at 84 MHz / 64.
 pub const SPI_WORD: Nanos = 12_190;
 /// \[ns\] the firmware's work around one word.
