@@ -209,6 +209,7 @@ fn starts_or_stops(command: Command) -> bool {
         | Record
         | Status
         | Version
+        | Alignment
         | LeaveSafeMode
         | Help
         | DerivedOn
