@@ -304,7 +304,12 @@ mod tests {
     #[test]
     fn a_mode_a_flag_or_a_length_that_does_not_exist_is_refused_whatever_its_checksum() {
         let memory = Memory(RefCell::new(vec![0; RETAINED_BYTES]));
-        for content in [&[3, 0, 0, 0][..], &[1, 8, 0, 0], &[1, 0, 0], &[1, 0, 0, 0, 0]] {
+        for content in [
+            &[3, 0, 0, 0, 0, 0][..],
+            &[1, 8, 0, 0, 0, 0],
+            &[1, 0, 0, 0, 0],
+            &[1, 0, 0, 0, 0, 0, 0],
+        ] {
             STATE.keep(&memory, content);
             assert_eq!(Resume::recall(&memory), None, "{content:?}");
         }
