@@ -92,7 +92,7 @@ impl Recorded {
     fn of(table: &Table) -> Result<Self, FileError> {
         let quaternions = continuous(table.series(ATTITUDE)?).map_err(|fault| table.error(fault))?;
         let position = match POSITION.iter().any(|column| table.has(column)) {
-            true => Some(Spline::natural(table.series(POSITION)?.series)),
+            true => Some(Spline::natural(about_the_middle(table.series(POSITION)?.series))),
             false => None,
         };
         let temperature_c = match table.has(TEMPERATURE) {
@@ -128,6 +128,13 @@ impl Motion for Recorded {
             .as_ref()
             .map_or(Vector3::zeros(), |position| position.at(t_s).value)
     }
+}
+
+/// Positions about their mean. Where an instrument has its zero says nothing: a field that differs from place to place is as told where the
+/// unit was, and not where a laboratory has its corner.
+fn about_the_middle(position: Series<3>) -> Series<3> {
+    let middle = position.values().iter().sum::<Vector3<f64>>() / position.values().len() as f64;
+    position.map(|value| value - middle)
 }
 
 /// The quaternions at unit norm, each with the sign that is nearer to the one before: q and -q are one attitude, but not
@@ -247,6 +254,20 @@ mod tests {
         let expected = Vector3::new(-1.005_f64.sin(), 0.0, -18.0 * 3.015_f64.cos());
         assert!((pose.acc_n - expected).norm() < 0.01, "{}", pose.acc_n);
         assert!((pose.temperature_c.unwrap() - 21.005).abs() < 1e-9);
+    }
+
+    #[test]
+    fn positions_are_about_their_mean_wherever_an_instrument_has_its_zero() {
+        let rows = |corner: f64| {
+            let of = |t: f64| format!("{t},1,0,0,0,{},{},{}\n", corner + t, -corner, 0.5 * t * t);
+            let rows: String = [0.0, 1.0, 2.0, 3.0].map(of).concat();
+            read(&format!("t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n{rows}")).unwrap()
+        };
+        let (here, elsewhere) = (rows(0.0), rows(-1.25));
+        for t_s in [0.0, 0.5, 2.0, 3.0] {
+            assert!((here.position_n(t_s) - elsewhere.position_n(t_s)).norm() < 1e-12);
+        }
+        assert!((elsewhere.position_n(2.0) - Vector3::new(0.5, 0.0, 0.25)).norm() < 1e-12);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The gradient of the field where the body moves: what magnetometers feel of it.
 //!
 //! In: the twin, how fields err ([`SlowErrors`]). Out: a column for each of its five components, for it is symmetric and
-//! has no trace, about the place where the log begins. None of a field that is stated as exact. It is
+//! has no trace, about the middle of the places where the unit was. None of a field that is stated as exact. It is
 //! that at the centre of the body; what the places of the sensors about it add is not in them.
 
 use nalgebra::Matrix3;
@@ -16,17 +16,14 @@ pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
     let magnetometers: Vec<(usize, Vec<Feel>)> = (all.filter(|(_, own)| own.sensor == Kind::Magnetometer))
         .map(|(channel, _)| (channel, twin.feels(channel)))
         .collect();
-    let Some(middle) = (magnetometers.first())
-        .and_then(|(_, feels)| {
-            feels
-                .iter()
-                .find(|feel| feel.position_n.iter().all(|value| value.is_finite()))
-        })
-        .map(|feel| feel.position_n)
-        .filter(|_| sigma > 0.0)
-    else {
-        return Vec::new();
+    let is_told = |(_, feels): &(usize, Vec<Feel>)| {
+        feels
+            .iter()
+            .any(|feel| feel.position_n.iter().all(|value| value.is_finite()))
     };
+    if sigma <= 0.0 || !magnetometers.iter().any(is_told) {
+        return Vec::new();
+    }
     let parts = [
         ("xx", [(0, 0, 1.0), (2, 2, -1.0)]),
         ("yy", [(1, 1, 1.0), (2, 2, -1.0)]),
@@ -39,7 +36,7 @@ pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
         (part.iter()).for_each(|(row, column, value)| gradient[(*row, *column)] = *value);
         let of_channel = |(channel, feels): &(usize, Vec<Feel>)| {
             let axis_b = twin.unit().channels[*channel].axis_b;
-            let felt = |feel: &Feel| axis_b.dot(&feel.to_b(gradient * (feel.position_n - middle)));
+            let felt = |feel: &Feel| axis_b.dot(&feel.to_b(gradient * feel.position_n));
             (*channel, feels.iter().map(felt).collect())
         };
         Column {
