@@ -8,7 +8,7 @@ use twin::effect::{Beneath, Effect, LIBRARY, Nature, Texture, View, logged_step,
 
 use super::{
     Scatter, blocks,
-    screen::{Oddness, are_odd, is_coloured, is_odd, is_unsteady, oddness, own_clock},
+    screen::{Oddness, are_odd, is_coloured, is_odd, is_unsteady, louder_by_stretch, oddness, own_clock},
 };
 use crate::{
     null::{model::Model, problem::Problem},
@@ -83,7 +83,9 @@ struct Search<'a> {
     measured: Vec<Vec<f64>>,
     /// Predicted, or nearer to what was measured where the reference may err.
     near: Vec<Vec<f64>>,
-    /// The same with the calibration as described, where that was dragged far.
+    /// The same for what stands out of its own time.
+    standing_out: Vec<Vec<f64>>,
+    /// The first with the calibration as described, where that was dragged far.
     described: Vec<Option<Vec<f64>>>,
     steps: Vec<f64>,
     odd: Vec<Oddness>,
@@ -108,17 +110,21 @@ impl<'a> Search<'a> {
             model,
             instants: channels.clone().map(|index| twin.instants_s(index)).collect(),
             near: Vec::new(),
+            standing_out: Vec::new(),
             described: Vec::new(),
             steps: measured.iter().map(|measured| logged_step(measured)).collect(),
             measured,
             odd: Vec::new(),
             own_clock: Vec::new(),
         };
-        let near = |channel: usize| search.near(channel, &model.predicted[channel]);
-        search.near = channels.clone().map(near).collect();
+        let near = |texture: Texture| -> Vec<Vec<f64>> {
+            let of = |channel: usize| search.near(channel, &model.predicted[channel], texture);
+            channels.clone().map(of).collect()
+        };
+        (search.near, search.standing_out) = (near(Texture::Louder), near(Texture::Outliers));
         let described = |channel: usize| {
             let is_dragged = model.fitted.nuisance[channel].amax() > DRAGGED;
-            is_dragged.then(|| search.near(channel, &as_described(problem, model, channel)))
+            is_dragged.then(|| search.near(channel, &as_described(problem, model, channel), Texture::Louder))
         };
         search.described = channels.clone().map(described).collect();
         search.odd = channels.clone().map(|channel| oddness(&search.view(channel))).collect();
@@ -127,8 +133,8 @@ impl<'a> Search<'a> {
     }
 
     /// What is predicted of a channel, as far as it may be held against it: effects know the sensor's own noise, and a reference
-    /// that errs as well must not look like more of it.
-    fn near(&self, channel: usize, predicted: &[f64]) -> Vec<f64> {
+    /// that errs as well must not look like more of it, nor its worse times like blows.
+    fn near(&self, channel: usize, predicted: &[f64], texture: Texture) -> Vec<f64> {
         let problem = self.problem;
         let (own, is_limited) = (
             problem.twin.unit().channels[channel].sigma(),
@@ -140,11 +146,29 @@ impl<'a> Search<'a> {
             false => problem.own_part(channel, row),
         };
         let (mut near, measured) = (predicted.to_vec(), &self.measured[channel]);
-        let rows = problem.frames[channel].series.rows.iter().map(|row| *row as usize);
-        rows.filter(|row| part(*row) < 1.0).for_each(|row| {
-            near[row] = measured[row] - part(row) * (measured[row] - predicted[row]);
-        });
+        let rows: Vec<usize> = (problem.frames[channel].series.rows.iter())
+            .map(|row| *row as usize)
+            .collect();
+        let mut held: Vec<f64> = rows
+            .iter()
+            .map(|row| part(*row) * (measured[*row] - predicted[*row]))
+            .collect();
+        if is_limited && texture == Texture::Outliers {
+            // How much a reference errs is not alike at all times, and a blow stands out of its own time.
+            let louder = louder_by_stretch(&held);
+            held.iter_mut().zip(louder).for_each(|(held, louder)| *held /= louder);
+        }
+        rows.iter()
+            .zip(held)
+            .for_each(|(row, held)| near[*row] = measured[*row] - held);
         near
+    }
+
+    fn near_of(&self, effect: &dyn Effect, channel: usize) -> &Vec<f64> {
+        match effect.page().texture {
+            Texture::Outliers => &self.standing_out[channel],
+            _ => &self.near[channel],
+        }
     }
 
     fn view(&self, channel: usize) -> View<'_> {
@@ -169,7 +193,7 @@ impl<'a> Search<'a> {
     /// An effect in every block that gains by it, about the model's calibration; if strictly, where it may be.
     fn seek(&self, effect: &'static dyn Effect, variant: f64, price: f64, is_strict: bool) -> Option<Scatter> {
         let judged = |block: &[usize]| {
-            let views = self.views(block, |channel| &self.near[channel]);
+            let views = self.views(block, |channel| self.near_of(effect, channel));
             let sought = |views: &[View], open: f64| {
                 let is_possible = !is_strict || self.is_possible(effect, views);
                 let (theta, gain) = is_possible.then(|| most_likely(effect, variant, views))?;
@@ -182,7 +206,11 @@ impl<'a> Search<'a> {
             if block.iter().all(|channel| self.described[*channel].is_none()) {
                 return found;
             }
-            let near = |channel: usize| self.described[channel].as_ref().unwrap_or(&self.near[channel]);
+            let near = |channel: usize| {
+                self.described[channel]
+                    .as_ref()
+                    .unwrap_or(self.near_of(effect, channel))
+            };
             let described = self.views(block, near);
             let dragged = block.iter().filter(|channel| self.described[**channel].is_some());
             let open: f64 = dragged
@@ -208,7 +236,7 @@ impl<'a> Search<'a> {
         let judged = |block: &[usize]| {
             let place = |channel: &usize| found.channels.iter().position(|own| own == channel);
             let mut theta = found.thetas[block.first().and_then(place).unwrap_or(0)].clone();
-            let before = self.views(block, |channel| &self.near[channel]);
+            let before = self.views(block, |channel| self.near_of(effect, channel));
             let places: Option<Vec<usize>> = block.iter().map(place).collect();
             let mut beneath = match places.filter(|_| variant == found.variant) {
                 Some(places) => places.iter().map(|place| found.beneath[*place].clone()).collect(),
@@ -221,7 +249,7 @@ impl<'a> Search<'a> {
                     .collect();
                 let open: f64 = refits.iter().map(|refit| refit.gain).sum();
                 let near: Vec<(usize, Vec<f64>)> = (block.iter().zip(&refits))
-                    .map(|(channel, refit)| (*channel, self.near(*channel, &refit.predicted)))
+                    .map(|(channel, refit)| (*channel, self.near(*channel, &refit.predicted, effect.page().texture)))
                     .collect();
                 let views: Vec<View> = near
                     .iter()

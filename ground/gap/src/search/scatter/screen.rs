@@ -84,6 +84,30 @@ pub fn is_unsteady(view: &View) -> bool {
     stretches.map(about).sum::<f64>() > freedom + 2.0 * (freedom * REFUSED).sqrt() + 2.0 * REFUSED
 }
 
+/// Samples whose median says how loud a log is there: that is known to a seventh, and a blow, which rings for a few samples, is not heard.
+const STRETCH: usize = 64;
+
+/// Per sample, how much louder residuals are about it than on the whole, and nothing where they are quieter: by the medians of their
+/// absolute values, of which a few that are far off are no part.
+pub fn louder_by_stretch(residuals: &[f64]) -> Vec<f64> {
+    if residuals.len() < 2 * STRETCH {
+        return vec![1.0; residuals.len()];
+    }
+    let whole = median(residuals).max(f64::MIN_POSITIVE);
+    let last = residuals.len() - STRETCH;
+    let about = |sample: usize| {
+        let from = sample.saturating_sub(STRETCH / 2).min(last);
+        (median(&residuals[from..from + STRETCH]) / whole).max(1.0)
+    };
+    (0..residuals.len()).map(about).collect()
+}
+
+fn median(of: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = of.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// Whether neighbouring residuals are alike.
 pub fn is_coloured(view: &View) -> bool {
     let mut rest: Vec<f64> = view.residuals().map(|(_, residual)| residual).collect();
@@ -119,6 +143,24 @@ mod tests {
             measured: &measured,
             step: 0.0,
         })
+    }
+
+    #[test]
+    fn a_louder_time_is_heard_and_a_blow_is_not() {
+        let noise = Noise::new(3);
+        let of = |k: usize| {
+            let louder = if (1000..1600).contains(&k) { 5.0 } else { 1.0 };
+            let blow = if (400..406).contains(&k) { 30.0 } else { 0.0 };
+            louder * noise.normal(k as u64) + blow
+        };
+        let residuals: Vec<f64> = (0..3000).map(of).collect();
+        let louder = louder_by_stretch(&residuals);
+        assert!(louder[300..500].iter().all(|louder| *louder < 1.6), "a blow");
+        // The median of all is of the quiet time, which four fifths of it are.
+        let middle = louder[1032..1568].iter().sum::<f64>() / 536.0;
+        assert!((3.5..5.5).contains(&middle), "{middle}");
+        assert!(louder.iter().all(|louder| *louder >= 1.0));
+        assert_eq!(louder_by_stretch(&residuals[..100]), vec![1.0; 100]);
     }
 
     #[test]
