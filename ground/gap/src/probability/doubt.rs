@@ -10,6 +10,8 @@
 //! weighed with what is left over what the cause explained, in the channels of the cause: energy that stands out in some octave, or
 //! that of the surest aspect of what is left, whichever is more. Whether it matters decides the alarm ([`super::outcome`]) and nothing here.
 
+use twin::effect::Texture;
+
 use crate::{
     holdout::{
         cross_validation::{self, Key},
@@ -100,9 +102,12 @@ impl<'a> Belief<'a> {
     /// effects on readings.
     pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
+        let everywhere: Vec<usize> = (0..self.loud.len()).collect();
         for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
             let trust = match self.courses.filter(|_| index < on_readings) {
                 Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
+                // What shakes some sensors shakes the unit, and answers for all of it.
+                None if is_line(cause) => self.trust(Some(cause.effect), &everywhere, *explained),
                 None => self.trust(Some(cause.effect), &cause.channels, *explained),
             };
             let is_no_chance = above_doubt(cause.gain);
@@ -135,12 +140,17 @@ pub fn beyond_reference(
         return Vec::new();
     };
     let weighed = causes.iter_mut().enumerate().map(|(index, cause)| {
-        let slow = importance.map_or(0.0, |importance| importance.worth[index]);
+        let slow = importance.map_or(0.0, |importance| importance.effects[index].worth);
         let nats = beyond.nats(&model.components, index).max(slow);
         cause.probability *= above_doubt(nats);
         nats
     });
     weighed.collect()
+}
+
+/// Whether a cause is something that shakes.
+fn is_line(cause: &Cause) -> bool {
+    twin::effect::by_name(cause.effect).is_some_and(|effect| effect.page().texture == Texture::Line)
 }
 
 /// How far so many nats are no chance.

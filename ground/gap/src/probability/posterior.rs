@@ -60,7 +60,8 @@ impl Believed {
         let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
         let loud = loud(problem, explanation, floor);
         if let Some(importance) = &importance {
-            (causes.iter_mut().zip(&importance.matters)).for_each(|(cause, matters)| cause.probability *= matters);
+            (causes.iter_mut().zip(&importance.effects))
+                .for_each(|(cause, weight)| cause.probability *= weight.counts());
         }
         let courses = importance.as_ref().map(|importance| importance.courses.as_slice());
         let belief = Belief::of(left, courses, &loud, &promises);

@@ -189,6 +189,14 @@ impl Beside {
         let fixed = self.sums.without(&self.of_effect[effect]);
         fixed.map_or(0.0, |fixed| 0.5 * (fixed.energy(effect + 1) - fixed.energy(0)))
     }
+
+    /// \[nats\] that its parameters cost, which were sought within their prior sigmas and found within less (Schwarz 1978).
+    pub fn price(&self, effect: usize) -> f64 {
+        let both = self.sums.without(&[]).zip(self.sums.without(&self.of_effect[effect]));
+        both.map_or(0.0, |(all, fixed)| {
+            0.5 * (all.log_determinant() - fixed.log_determinant())
+        })
+    }
 }
 
 /// Of each stretch of the log, how far the courses have run there, 0 to 1, and how many stretches have samples: a course runs over the time

@@ -88,6 +88,11 @@ impl Marginal<'_> {
         self.sums.energies[residual] - pull.dot(&self.factor.solve(&pull))
     }
 
+    /// ln of the determinant of what is open.
+    pub fn log_determinant(&self) -> f64 {
+        self.factor.ln_determinant()
+    }
+
     /// Information and score of one that was tried, against one residual.
     pub fn of(&self, tried: usize, residual: usize) -> (DMatrix<f64>, DVector<f64>) {
         let (own, with_open, pull) = &self.sums.own[tried];
