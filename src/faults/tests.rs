@@ -49,13 +49,8 @@ fn measured(set: &Set, rate_b: Vector3<f32>, acceleration_b: Vector3<f32>, read:
 fn force(set: &Set, from_b: Vector3<f32>, to_b: Vector3<f32>, read: u16) -> Solution {
     let mut monitor = Monitor::new(set);
     let mut step = |n: i16, rate_b: Vector3<f32>, acceleration_b: Vector3<f32>| {
-        let mut reading = Reading::unread(n as u16);
-        // What repeats itself is frozen.
-        reading.acc_p = [[n; 3]; PLATES];
-        reading.mag_p = [[n; 3]; PLATES];
-        reading.gyro = [n; PLATES];
         monitor
-            .step(set, &reading, &measured(set, rate_b, acceleration_b, read), DT_S)
+            .step(set, &distinct(n), &measured(set, rate_b, acceleration_b, read), DT_S)
             .force_b
     };
     step(1, from_b, Vector3::zeros());
@@ -120,6 +115,28 @@ fn longest_arm() -> f32 {
         .fold(0.0, f32::max)
 }
 
+/// The nominal set with every plate at the centre, and with the plates at their known places.
+fn without_and_with_arms() -> (Set, Set) {
+    let placed = Set {
+        place_sigma: 0.0,
+        ..nominal()
+    };
+    let centred = Set {
+        place_b: [Vector3::zeros(); PLATES],
+        ..placed
+    };
+    (centred, placed)
+}
+
+/// A reading of a cycle in which no sensor repeats what it sent in the one before: what repeats itself is frozen.
+fn distinct(cycle: i16) -> Reading {
+    let mut reading = Reading::unread(cycle as u16);
+    reading.acc_p = [[cycle; 3]; PLATES];
+    reading.mag_p = [[cycle; 3]; PLATES];
+    reading.gyro = [cycle; PLATES];
+    reading
+}
+
 /// [m/s2] what the errors of two rates make of the longest arm, the rate having changed by `change` [rad/s] in a cycle.
 fn arm_noise(change: f32) -> f32 {
     let (noise, gyro) = (nominal().gyro[0].noise, nominal().uncertainty[2]);
@@ -132,15 +149,7 @@ fn arm_noise(change: f32) -> f32 {
 
 #[test]
 fn long_arms_count_by_what_is_not_known_of_the_angular_acceleration() {
-    let centred = Set {
-        place_b: [Vector3::zeros(); PLATES],
-        place_sigma: 0.0,
-        ..nominal()
-    };
-    let placed = Set {
-        place_sigma: 0.0,
-        ..nominal()
-    };
+    let (centred, placed) = without_and_with_arms();
     let (slow_b, fast_b) = (Vector3::new(0.0, 0.0, 1.0), Vector3::new(0.0, 0.0, 2.0));
     let difference = |from_b, to_b, read| {
         apart(
@@ -165,24 +174,13 @@ fn long_arms_count_by_what_is_not_known_of_the_angular_acceleration() {
 /// An angular acceleration that goes on is no lag: the arms are as unsure as their noise makes them.
 #[test]
 fn a_steady_angular_acceleration_has_no_lag() {
-    let centred = Set {
-        place_b: [Vector3::zeros(); PLATES],
-        place_sigma: 0.0,
-        ..nominal()
-    };
-    let placed = Set {
-        place_sigma: 0.0,
-        ..nominal()
-    };
+    let (centred, placed) = without_and_with_arms();
     let spun_up = |set: &Set| {
         let mut monitor = Monitor::new(set);
         let acceleration_b = Vector3::new(0.0, 0.0, 2.0);
         let mut last = None;
         for n in 0..4_i16 {
-            let mut reading = Reading::unread(n as u16);
-            reading.acc_p = [[n; 3]; PLATES];
-            reading.mag_p = [[n; 3]; PLATES];
-            reading.gyro = [n; PLATES];
+            let reading = distinct(n);
             let rate_b = acceleration_b * (DT_S * f32::from(n));
             let given = measured(set, rate_b, acceleration_b, 0xF);
             last = Some(monitor.step(set, &reading, &given, DT_S).force_b);

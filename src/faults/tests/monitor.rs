@@ -13,10 +13,7 @@ const RATE_B: Vector3<f32> = Vector3::new(0.1, -0.2, 0.3);
 fn fly(monitor: &mut Monitor, set: &Set, cycles: i16, change: impl Fn(i16, &mut Reading, &mut Measured)) -> Vectors {
     let mut last = None;
     for n in 0..cycles {
-        let mut reading = Reading::unread(n as u16);
-        reading.acc_p = [[n; 3]; PLATES];
-        reading.mag_p = [[n; 3]; PLATES];
-        reading.gyro = [n; PLATES];
+        let mut reading = distinct(n);
         let mut measured = measured(set, RATE_B, Vector3::zeros(), 0xF);
         change(n, &mut reading, &mut measured);
         last = Some(monitor.step(set, &reading, &measured, DT_S));
@@ -124,10 +121,7 @@ fn named_after(
     // What a filter knows of the bias of the rate is not held against a gyro.
     let bias_b = known.map_or_else(Vector3::zeros, |_| Vector3::new(0.02, -0.01, 0.015));
     for n in 0..600 {
-        let mut reading = Reading::unread(n as u16);
-        reading.acc_p = [[n; 3]; PLATES];
-        reading.mag_p = [[n; 3]; PLATES];
-        reading.gyro = [n; PLATES];
+        let reading = distinct(n);
         let mut measured = measured(set, bias_b, Vector3::zeros(), 0xF);
         // At rest the force is that at the centre.
         let still = self::measured(set, Vector3::zeros(), Vector3::zeros(), 0xF);
@@ -206,10 +200,7 @@ fn an_interval_that_is_none_is_a_gap() {
     ] {
         let mut monitor = Monitor::new(&set);
         let step = |monitor: &mut Monitor, n: i16, rate_b: Vector3<f32>, dt_s: f32| {
-            let mut reading = Reading::unread(n as u16);
-            reading.acc_p = [[n; 3]; PLATES];
-            reading.mag_p = [[n; 3]; PLATES];
-            reading.gyro = [n; PLATES];
+            let reading = distinct(n);
             monitor.step(&set, &reading, &measured(&set, rate_b, Vector3::zeros(), 0xF), dt_s)
         };
         step(&mut monitor, 1, Vector3::zeros(), DT_S);

@@ -2,6 +2,7 @@
 //!
 //! Without currents or iron inside the volume the gradient is symmetric and traceless (div B = 0, curl B = 0): five numbers. A
 //! description tells where accelerometers are; a magnetometer is somewhere on the same plate, on all plates at the same place.
+//! The place p of a recorded motion counts from the middle of the record ([`crate::motion::Recorded`]): there the field is as told.
 
 use nalgebra::{Matrix3, Vector3};
 
