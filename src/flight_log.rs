@@ -352,7 +352,8 @@ impl<N: Nand> FlightLog<N> {
         };
         if !self.opened || self.superblock.first_block != first {
             self.open();
-            self.superblock.block_before = self.newest_block.unwrap_or(0);
+            // Not the newest block: a start that was cut while it copied may have left that one half of what is here.
+            self.superblock.block_before = course.from.unwrap_or(0);
             self.superblock.first_block = first;
             self.save().await?;
         }
@@ -360,9 +361,9 @@ impl<N: Nand> FlightLog<N> {
             self.next_block = self.next_block.max(block.saturating_add(1));
             self.ahead = self.erase(block).await?.then_some(block);
         }
-        let copied = match course.source {
-            Some(block) => self.copy(block).await?,
-            None => false,
+        let copied = match course.from {
+            Some(block) if course.copies => self.copy(block).await?,
+            _ => false,
         };
         self.header.opened_us = now_us;
         let key = self.next_key();

@@ -1,7 +1,7 @@
 //! Short starts carried on: a start costs pages of the log and no block.
 //!
-//! In: the blocks that the mount found. Out: the [`Course`] of this start: the block whose records it copies in front of
-//! its own, and the block it begins in, where that is one with records.
+//! In: the blocks that the mount found. Out: the [`Course`] of this start: the block it goes on from, whether it copies the
+//! records of that in front of its own, and the block it begins in, where that is one with records.
 //!
 //! A block belongs to one boot, so each start would take one, and a unit that restarts every two seconds would fill the
 //! log in two hours. So the newest block is carried on while it is short: the next start copies its records to where it
@@ -40,8 +40,10 @@ type Keys = Vec<Key, { 2 * PAGES_PER_BLOCK as usize }>;
 /// Where a start goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Course {
-    /// The block whose records are copied.
-    pub source: Option<u16>,
+    /// The block with the newest records: nothing in it is superseded before this start has copied it.
+    pub from: Option<u16>,
+    /// It is short, so its records are copied.
+    pub copies: bool,
     /// The block to begin in: it may be erased. Without one it is the next free block.
     pub into: Option<u16>,
 }
@@ -57,15 +59,18 @@ impl<N: Nand> FlightLog<N> {
             && (newest == first || newest == before)
             && self.may_be_written(first)?
             && self.may_be_written(before)?;
-        let (source, into) = if take_turns && newest == first && self.is_superseded(before, first)? {
+        let (from, into) = if take_turns && newest == first && self.is_superseded(before, first)? {
             (newest, Some(before))
         } else if take_turns && self.is_only_begun(first, before)? {
             (before, Some(first))
         } else {
             (newest, None)
         };
-        let source = (self.used_pages(source)? <= SHORT).then_some(source);
-        Ok(Course { source, into })
+        Ok(Course {
+            from: Some(from),
+            copies: self.used_pages(from)? <= SHORT,
+            into,
+        })
     }
 
     /// Whether it is a block of the log, neither failed nor marked by the maker.

@@ -29,7 +29,7 @@ const COPIES_OF_OLDER: u8 = 2;
 const STRIDE: u16 = 16;
 
 /// Boots that a lost superblock may have counted without leaving a record.
-const UNSEEN_BOOTS: u32 = 16;
+pub(super) const UNSEEN_BOOTS: u32 = 16;
 
 /// What the unit was doing, as the chip tells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -103,23 +103,25 @@ impl<N: Nand> FlightLog<N> {
                 None if self.superblock.first_block <= LOG_START => None,
                 None => self.scan(true).await?,
             },
-            found => {
-                let head = self.scan(found == Found::Doubtful).await?;
-                if found == Found::Doubtful || head.is_some() {
-                    self.superblock.boot = self.superblock.boot.saturating_add(UNSEEN_BOOTS);
-                }
-                head
+            found => self.scan(found == Found::Doubtful).await?,
+        };
+        if let Some(head) = head {
+            self.next_block = head.saturating_add(1);
+            // Which boot is the newest only a sure superblock tells.
+            self.newest_block = Some(match found {
+                Found::Sure => self.find_newest_block(head)?,
+                _ => head,
+            });
+            let told = self.find_newest(head, found)?;
+            // A save that is left may be an older one; what was recorded since tells the mode better.
+            if let Some((_, flight, recording)) = told.filter(|(key, ..)| found != Found::Sure && key.boot >= saved_in)
+            {
+                (self.superblock.flight, self.superblock.recording) = (flight, recording);
             }
-        };
-        let Some(head) = head else {
-            return Ok(());
-        };
-        self.next_block = head.saturating_add(1);
-        self.newest_block = Some(self.find_newest_block(head)?);
-        let told = self.find_newest(head)?;
-        // A save that is left may be an older one; what was recorded since tells the mode better.
-        if let Some((_, flight, recording)) = told.filter(|(key, ..)| found != Found::Sure && key.boot >= saved_in) {
-            (self.superblock.flight, self.superblock.recording) = (flight, recording);
+        }
+        // Counted from the highest number in a save or a record, so that no key is used twice.
+        if found == Found::Doubtful || found == Found::Nothing && head.is_some() {
+            self.superblock.boot = self.superblock.boot.saturating_add(UNSEEN_BOOTS);
         }
         Ok(())
     }
@@ -307,7 +309,7 @@ impl<N: Nand> FlightLog<N> {
     /// The two newest packet records, which the next boot copies: the newest may be torn, and then the one before has
     /// one copy left. From the last block backwards, until a block gives both by itself and not as such copies, which
     /// may be torn too. Out: what the newest record says of the mode.
-    pub(super) fn find_newest(&mut self, head: u16) -> Result<Option<Told>, LogError> {
+    pub(super) fn find_newest(&mut self, head: u16, found: Found) -> Result<Option<Told>, LogError> {
         let mut newest = [record::Key::default(); 2];
         let mut told = None;
         // Two blocks may take turns, and which of them is newer need not be known.
@@ -317,13 +319,18 @@ impl<N: Nand> FlightLog<N> {
                 self.find_newest_in(block, &mut newest, &mut told)?;
             }
         }
+        // Where the superblock is not sure of those two, the newer one is not the last, nor always the one before it.
+        let least = match found {
+            Found::Sure => turns.len(),
+            _ => usize::from(LOOK_BACK),
+        };
         let mut looked_at = 0_usize;
         for block in (head.saturating_sub(LOOK_BACK).max(LOG_START)..=head).rev() {
             if self.superblock.bad.contains(block) {
                 continue;
             }
             looked_at = looked_at.wrapping_add(1);
-            if self.find_newest_in(block, &mut newest, &mut told)? && looked_at >= turns.len() {
+            if self.find_newest_in(block, &mut newest, &mut told)? && looked_at >= least {
                 break;
             }
         }

@@ -7,7 +7,10 @@ use core::{
 };
 
 use super::*;
-use crate::flight_log::superblock::BAD_BLOCKS;
+use crate::flight_log::{
+    mount::{Found, UNSEEN_BOOTS},
+    superblock::BAD_BLOCKS,
+};
 
 /// What a mount has found: the two newest packet records, newest first, and the newest block.
 fn found(chip: &mut Chip) -> ([Option<Key>; 2], Option<u16>) {
@@ -30,7 +33,7 @@ fn finds_the_two_newest(chip: &mut Chip, what: &str) {
     let expected = [newest.next(), newest.next()];
     let (found, newest_block) = found(chip);
     let mut log = chip.mounted();
-    let copies = newest_block.is_some() && log.course().expect("reads").source.is_some();
+    let copies = newest_block.is_some() && log.course().expect("reads").copies;
     assert_eq!(found[0], expected[0], "{what}");
     assert_eq!(usize::from(log.carried), packets.len().min(2), "{what}");
     assert!(
@@ -96,7 +99,7 @@ fn the_mode_is_that_of_the_newest_record_in_either_block() {
         }
         let mut log = chip.log();
         log.find_superblock().expect("reads");
-        let told = log.find_newest(5).expect("reads");
+        let told = log.find_newest(5, Found::Sure).expect("reads");
         assert_eq!(
             told.map(|(key, flight, _)| (key.seq, flight)),
             Some((3, true)),
@@ -125,6 +128,36 @@ fn the_two_newest_records_are_found_after_starts_that_were_cut() {
                 let last = chip.packets(0).last().copied().expect("a record");
                 assert!(last.boot > boots, "a boot has a number of its own: {last:?}");
             }
+        }
+    }
+}
+
+/// With its superblock lost, whole or but for an old save, a log goes on counting from its highest boot: no key comes twice.
+#[test]
+fn without_its_superblock_a_log_counts_on_from_its_highest_boot() {
+    for boots in 1..=60 {
+        for old_save in [false, true] {
+            let mut chip = Chip::new(BLOCKS);
+            chip.start(1);
+            let saved: Vec<_> = chip
+                .pages
+                .range(..(LOG_START, 0))
+                .map(|(at, page)| (*at, *page))
+                .collect();
+            (1..boots).for_each(|_| chip.start(1));
+            let before = chip.packets(0);
+            chip.pages.retain(|(block, _), _| *block >= LOG_START);
+            if old_save {
+                chip.pages.extend(saved);
+                // What is torn behind it may have been a newer one.
+                chip.at(0, 0).fill(0);
+            }
+            assert_eq!(found(&mut chip).0[0], before.last().copied(), "{boots} {old_save}");
+            chip.start(1);
+            let after = chip.packets(0);
+            assert_eq!(after.len(), before.len() + 1, "{boots}");
+            let [newest, last] = [&before, &after].map(|keys| keys.last().map_or(0, |key| key.boot));
+            assert_eq!((newest, last), (boots, boots + UNSEEN_BOOTS + 1), "{boots} {old_save}");
         }
     }
 }

@@ -15,9 +15,10 @@ fn course(chip: &mut Chip) -> Course {
     chip.mounted().course().expect("reads")
 }
 
-fn from(source: u16, into: Option<u16>) -> Course {
+fn from(block: u16, into: Option<u16>) -> Course {
     Course {
-        source: Some(source),
+        from: Some(block),
+        copies: true,
         into,
     }
 }
@@ -38,6 +39,26 @@ fn the_start_after_one_that_was_cut_goes_on_in_its_block() {
         chip.start_cut(1, 3 + start % 2);
     }
     assert!(chip.mounted().status().used <= 2 * 32);
+}
+
+/// However many starts are cut while they copy, and wherever: the block with the records stays the one to go on from, and no other
+/// is taken. But for the second operation, which leaves one copy of a save: that is doubtful, and ends the turns.
+#[test]
+fn starts_cut_while_they_copy_cost_no_block() {
+    let sure = || (0..=7).filter(|after| *after != 2);
+    for first in sure() {
+        for second in sure() {
+            for third in sure() {
+                let mut chip = begun(3, first);
+                chip.start_cut(1, second);
+                chip.start_cut(1, third);
+                assert_eq!(course(&mut chip).from, Some(4), "{first} {second} {third}");
+                chip.start(1);
+                assert!(chip.mounted().status().used <= 2 * 32, "{first} {second} {third}");
+                assert_eq!(chip.packets(0).len(), 4);
+            }
+        }
+    }
 }
 
 /// Only copies and the header of the boot that began there may be in it: a record of its own, or a header of another boot, is
