@@ -10,9 +10,9 @@
 //! - packets come every 200 ms, to 2 ms where nothing befalls the unit, so that time does not drift; and while something does,
 //!   no later than the deadline of a cycle allows;
 //! - at the end, a minute after the last fault, all sensors are read, there is an attitude, the console answers, the recorder
-//!   takes packets, and no queue holds anything back: a packet comes as soon after its cycle as at the beginning.
-//!
-//! What the unit has of memory is static and its stack is not the host's: the image's own test looks at that.
+//!   takes packets, and no queue holds anything back: a packet comes as soon after its cycle as at the beginning;
+//! - the image's stack is at most three fifths of its place, asked every ten minutes and at the end. The mark begins anew with each
+//!   start. All other memory of the unit is static, and the host board has no stack of the unit's.
 
 use host_tests::{Flown, MS, S, recorder::draws, world};
 use twin::{
@@ -35,6 +35,9 @@ const QUIET_S: u64 = 90;
 const BACK: Nanos = 2_500 * MS;
 /// \[ns\] beyond its period a packet may be while something befalls the unit: the deadline of a cycle that takes 10 ms otherwise.
 const LATE: Nanos = 185 * MS;
+
+/// Of its place the stack may take at most this many hundredths: what no flight has met yet needs the rest.
+const STACK_PER_CENT: u64 = 60;
 
 /// Faults that befall a sensor, an I2C sensor, the unit for a while, and the unit once.
 const OF_SENSORS: [&str; 3] = ["silent", "garbage", "frozen"];
@@ -141,7 +144,8 @@ pub fn fly(board: &Board<'_>, seed: u64, seconds: u64) -> Told {
     say(S, b"G_MVG_MV");
     say(2 * S, b"G_MGG_MG");
     for at_s in (LEAVES_SAFE_MODE_S..seconds - QUIET_S).step_by(LEAVES_SAFE_MODE_S as usize) {
-        say(at_s * S, b"G_XN");
+        say(at_s * S, b"G_ST");
+        say((at_s + 1) * S, b"G_XN");
     }
     for at_s in (BEGINS_ANEW_S..seconds - QUIET_S).step_by(BEGINS_ANEW_S as usize) {
         say((at_s + 1) * S, b"G_MEG_ME");
@@ -221,21 +225,38 @@ fn judged(plan: &[Arriving], flown: &Flown) -> Result<String, String> {
             frame.estimate.q_nb
         ));
     }
-    if !flown.replied("G_ST FLIGHT task none recording 1") {
-        return Err(format!(
-            "at the end {:?}",
-            flown.replies().iter().rev().take(8).collect::<Vec<_>>()
-        ));
+    let replies = flown.replies();
+    let state = replies.iter().rfind(|reply| reply.contains(" task "));
+    if !state.is_some_and(|reply| reply.contains("G_ST FLIGHT task none recording 1")) {
+        return Err(format!("at the end {state:?}"));
     }
+    let stack = stack(&replies).ok_or("no status tells of the stack")?;
     Ok(format!(
-        "{} faults in {:.1} h, {} resets; {} packets, none missing without excuse; {quiet} periods undisturbed, at most {:.1} us off; all \
+        "{} faults in {:.1} h, {} resets; {} packets, none missing without excuse; {quiet} periods undisturbed, at most {:.1} us off; {}all \
          well at the end",
         plan.len(),
         flown.report.flown as f64 / 3600e9,
         flown.report.resets.len(),
         flown.packets.len(),
-        worst as f64 * 1e-3
+        worst as f64 * 1e-3,
+        stack?
     ))
+}
+
+/// The most that a status said of the stack, or that it is too much; nothing where the board has none. `None`: no status came.
+fn stack(replies: &[String]) -> Option<Result<String, String>> {
+    let used = |reply: &String| {
+        let (_, rest) = reply.split_once(" stack ")?;
+        let (used, rest) = rest.split_once(" of ")?;
+        let (size, _) = rest.split_once(" bytes")?;
+        Some((used.parse::<u64>().ok()?, size.parse::<u64>().ok()?))
+    };
+    let (used, size) = replies.iter().filter_map(used).max()?;
+    Some(match size {
+        0 => Ok(String::new()),
+        _ if used * 100 > size * STACK_PER_CENT => Err(format!("{used} of {size} bytes of stack")),
+        _ => Ok(format!("stack at most {used} of {size} bytes; ")),
+    })
 }
 
 #[cfg(test)]
@@ -268,6 +289,24 @@ mod tests {
                 flown.report.struck
             );
         }
+    }
+
+    /// The largest of a flight counts, and three fifths are the most.
+    #[test]
+    fn a_stack_that_grows_is_found() {
+        let said = |used: &[u64]| -> Vec<String> {
+            let reply = |used: &u64| format!("G_ST clock crystal stack {used} of 1000 bytes brown-out 2700 mV");
+            used.iter().map(reply).collect()
+        };
+        assert_eq!(stack(&[]), None);
+        assert_eq!(
+            stack(&said(&[300, 600, 20])),
+            Some(Ok("stack at most 600 of 1000 bytes; ".into()))
+        );
+        assert_eq!(
+            stack(&said(&[300, 601, 20])),
+            Some(Err("601 of 1000 bytes of stack".into()))
+        );
     }
 
     /// What is not excused is found.
