@@ -43,6 +43,9 @@ pub struct Arguments {
     /// Where the page goes
     #[arg(long, value_name = "FILE", default_value = "compare.html")]
     pub page: PathBuf,
+    /// Print the figures as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Why two flights cannot be compared.
@@ -99,6 +102,10 @@ pub fn compare(arguments: &Arguments) -> Result<(), CompareError> {
         path: arguments.page.clone(),
         source,
     })?;
+    if arguments.json {
+        println!("{:#}", listed(&rows(&flown), &arguments.page));
+        return Ok(());
+    }
     for [name, a, b] in rows(&flown) {
         match a.chars().count() < COLUMN {
             true => println!("{name:28}{a:COLUMN$}{b}"),
@@ -164,6 +171,22 @@ fn rows([a, b]: &[Flown; 2]) -> Vec<[String; 3]> {
         .into_iter()
         .map(|name| [name.to_owned(), value(&ours, name), value(&theirs, name)]);
     [head].into_iter().chain(each).collect()
+}
+
+/// The figures for programs, as the text has them, and where the page is.
+fn listed(rows: &[[String; 3]], page: &Path) -> serde_json::Value {
+    let (head, figures) = rows.split_first().map_or((["", "", ""], rows), |(head, rows)| {
+        (head.each_ref().map(String::as_str), rows)
+    });
+    let figures = figures
+        .iter()
+        .map(|[name, a, b]| serde_json::json!({"name": name, "a": a, "b": b}));
+    serde_json::json!({
+        "a": head[1],
+        "b": head[2],
+        "figures": serde_json::Value::from_iter(figures),
+        "page": page,
+    })
 }
 
 fn page(flown: &[Flown; 2]) -> Result<String, ChartError> {
@@ -314,6 +337,15 @@ mod tests {
         ];
         let table = rows(&flown);
         assert_eq!(table[1], ["packets", "100", "80"].map(str::to_owned));
+        let listed = listed(&table, Path::new("both.html"));
+        assert_eq!(
+            listed["figures"][0],
+            serde_json::json!({"name": "packets", "a": "100", "b": "80"})
+        );
+        assert_eq!(
+            (&listed["b"], &listed["page"]),
+            (&"two.txt".into(), &"both.html".into())
+        );
         let page = page(&flown).expect("a page");
         assert!(page.contains("plate 1, one") && page.contains("plate 1, two.txt"));
         assert!(page.contains("time since lift-off [s]"));

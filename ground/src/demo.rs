@@ -71,6 +71,9 @@ pub struct Arguments {
     /// Where the demo's folder goes; an existing one is never overwritten
     #[arg(long, value_name = "DIR", default_value = "flights")]
     pub out: PathBuf,
+    /// Print what came out as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Why the demo did not come to its page.
@@ -214,8 +217,36 @@ pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
     let page = place.join("index.html");
     put(&page, &chart::html("From a flight to a verdict", ABOUT, &blocks))?;
     say("done");
-    println!("{sentence}\n\n{}\n{}", compared.text("flight 2"), page.display());
+    if arguments.json {
+        println!("{:#}", listed(&verdict, &told, &compared, &page));
+    } else {
+        println!("{sentence}\n\n{}\n{}", compared.text("flight 2"), page.display());
+    }
     Ok(())
+}
+
+/// What came out, for programs.
+fn listed(verdict: &Verdict, answer: &Answer, compared: &Against, page: &Path) -> serde_json::Value {
+    let withheld =
+        (answer.effect.iter()).map(|done| serde_json::json!({"effect": done.name, "channels": done.channels}));
+    let named = verdict.causes.iter().map(|cause| {
+        serde_json::json!({
+            "effect": cause.effect, "channels": cause.channels, "probability": cause.probability,
+        })
+    });
+    let second = compared.pairs.iter().map(|pair| {
+        serde_json::json!({
+            "name": pair.name, "unit": pair.unit, "described": pair.before, "corrected": pair.after,
+        })
+    });
+    serde_json::json!({
+        "withheld": serde_json::Value::from_iter(withheld),
+        "named": serde_json::Value::from_iter(named),
+        "is_right": is_right(verdict, answer),
+        "first_flight": {"gap_sigma": verdict.gap.before},
+        "second_flight": serde_json::Value::from_iter(second),
+        "page": page,
+    })
 }
 
 /// Flies quietly; the folder.
@@ -285,16 +316,20 @@ fn found(verdict: &Verdict) -> String {
     names(found.into_iter())
 }
 
-/// The outcome in plain words.
-fn sentence(verdict: &Verdict, answer: &Answer, compared: &Against) -> String {
+/// Whether all that was withheld is named, and nothing else.
+fn is_right(verdict: &Verdict, answer: &Answer) -> bool {
     let is_found = |done: &Done| {
         let mut causes = verdict.causes.iter();
         causes.any(|cause| cause.effect == done.name && cause.probability > SURE)
     };
     // An effect may be found in parts, what all plates share and what each has of its own.
     let is_there = |cause: &Cause| answer.effect.iter().any(|done| done.name == cause.effect);
-    let is_right = answer.effect.iter().all(is_found) && verdict.causes.iter().all(is_there);
-    let outcome = match (is_right, verdict.causes.is_empty()) {
+    answer.effect.iter().all(is_found) && verdict.causes.iter().all(is_there)
+}
+
+/// The outcome in plain words.
+fn sentence(verdict: &Verdict, answer: &Answer, compared: &Against) -> String {
+    let outcome = match (is_right(verdict, answer), verdict.causes.is_empty()) {
         (true, _) => "The diagnosis named it",
         (false, true) => "The diagnosis named nothing",
         (false, false) => "The diagnosis named something else",
@@ -451,6 +486,7 @@ mod tests {
             seed: 1,
             host: true,
             out: place.path().into(),
+            json: false,
         };
         demo(&arguments).expect("a demo");
         let page = read(&place.path().join("demo-1/index.html")).expect("a page");

@@ -18,8 +18,7 @@ struct Words {
 #[derive(clap::Subcommand)]
 enum Command {
     Fly(ground::fly::plan::Arguments),
-    /// Lists the motions that can be flown
-    Sources,
+    Sources(ground::fly::source::List),
     /// Makes a gap case of a real unit's log, and says what a case lacks
     #[command(subcommand)]
     Case(ground::case::Step),
@@ -79,7 +78,10 @@ fn main() -> ExitCode {
 fn prints_what_was_asked_for(command: &Command) -> bool {
     match command {
         // A flight has its own word for it.
-        Command::Fly(_) | Command::Sources | Command::Sbom(_) | Command::Xtce(_) | Command::Completions(_) => true,
+        Command::Fly(_) | Command::Sources(_) | Command::Sbom(_) | Command::Xtce(_) | Command::Completions(_) => true,
+        Command::Compare(arguments) => arguments.json,
+        Command::Demo(arguments) => arguments.json,
+        Command::Drill(arguments) => arguments.json,
         Command::Decode(arguments) => arguments.out.is_none() || arguments.json,
         Command::Recover(arguments) => arguments.table.is_none() || arguments.json,
         Command::Size(arguments) => arguments.json,
@@ -99,7 +101,7 @@ fn prints_what_was_asked_for(command: &Command) -> bool {
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
         Command::Fly(arguments) => ground::fly::fly(&arguments)?,
-        Command::Sources => print!("{}", ground::fly::source::list()),
+        Command::Sources(arguments) => print!("{}", ground::fly::source::list(arguments)),
         Command::Case(step) => ground::case::case(&step)?,
         Command::Compare(arguments) => ground::compare::compare(&arguments)?,
         Command::Demo(arguments) => ground::demo::demo(&arguments)?,

@@ -186,6 +186,44 @@ fn what_prints_a_report_speaks_json_too() {
         size["flash"].as_u64().expect("flash"),
         size["text"].as_u64().unwrap_or(0) + size["data"].as_u64().unwrap_or(0)
     );
+    let sources = json(&["sources", "--json", "--quiet"]);
+    let rocket = sources
+        .as_array()
+        .and_then(|all| all.iter().find(|one| one["name"] == "rocket"));
+    assert_eq!(
+        rocket.map(|rocket| &rocket["duration_s"]),
+        Some(&600.0.into()),
+        "{sources}"
+    );
+    let folder = std::path::Path::new(flown["page"].as_str().expect("a page")).parent();
+    let folder = folder.and_then(|folder| folder.to_str()).expect("its folder");
+    let both = json(&["compare", folder, folder, "--page", &path("both.html"), "--json"]);
+    assert_eq!(
+        both["figures"][0],
+        serde_json::json!({"name": "packets", "a": "24", "b": "24"}),
+        "{both}"
+    );
+    let drill = json(&["drill", "C6", "--json"]);
+    assert_eq!(
+        (&drill["rows"][0]["row"], &drill["not accepted"]),
+        (&"C6".into(), &0.into()),
+        "{drill}"
+    );
+    std::fs::write(path("scale.csv"), "rate,output\n-1,-2\n0,0\n1,2\n2,4.001\n").expect("written");
+    let drift = json(&[
+        "calibrate",
+        "drift",
+        "--scale",
+        &path("scale.csv"),
+        "--out",
+        &path("drift"),
+        "--json",
+    ]);
+    assert_eq!(
+        (&drift["tests"][0]["test"], &drift["good"]),
+        (&"Scale factor".into(), &true.into()),
+        "{drift}"
+    );
     let refused = run(&["recover", "nowhere.bin", "--json"]);
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
     assert!(said(&refused).contains("--table"));

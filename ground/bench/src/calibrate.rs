@@ -31,7 +31,7 @@ impl Arguments {
             What::RateTable(arguments) => arguments.json(),
             What::MultiPosition(arguments) => arguments.json(),
             What::Ellipsoid(arguments) => arguments.json(),
-            What::Drift(_) => false,
+            What::Drift(arguments) => arguments.json,
         }
     }
 }

@@ -63,6 +63,9 @@ pub struct Arguments {
     /// Folder for the page
     #[arg(long, value_name = "FOLDER", default_value = "reports/drift")]
     out: PathBuf,
+    /// Print the figures as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Why there is no report.
@@ -134,9 +137,10 @@ pub fn run(arguments: &Arguments) -> Result<bool, DriftError> {
     if let Some(file) = &arguments.rest {
         sections.push(rest(file)?);
     }
-    for section in &sections {
-        print!("{}", section.text());
+    if !arguments.json {
+        sections.iter().for_each(|section| print!("{}", section.text()));
     }
+    let tests = serde_json::Value::from_iter(sections.iter().map(Section::json));
     let good = !sections.iter().any(Section::is_wrong);
     let blocks: Vec<chart::Block> = sections.into_iter().flat_map(Section::into_blocks).collect();
     let page = arguments.out.join("index.html");
@@ -150,7 +154,11 @@ pub fn run(arguments: &Arguments) -> Result<bool, DriftError> {
         file: page.clone(),
         error,
     })?;
-    println!("{}", page.display());
+    if arguments.json {
+        println!("{:#}", serde_json::json!({"good": good, "tests": tests, "page": page}));
+    } else {
+        println!("{}", page.display());
+    }
     Ok(good)
 }
 

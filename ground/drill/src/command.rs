@@ -48,6 +48,9 @@ pub struct Arguments {
     /// parts of guards' names [default: all]
     #[arg(long)]
     pub guards: bool,
+    /// Print the table as JSON, when all is flown
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Why a drill was not made, or found something.
@@ -94,6 +97,13 @@ pub fn run(
     arguments: &Arguments,
     image: impl FnOnce() -> Result<Box<OnImage<'static>>, String>,
 ) -> Result<(), DrillError> {
+    if arguments.faults && arguments.json {
+        let each = WORDS
+            .iter()
+            .map(|word| serde_json::json!({"name": word.name, "places": word.places, "meaning": word.meaning}));
+        println!("{:#}", serde_json::Value::from_iter(each));
+        return Ok(());
+    }
     if arguments.faults {
         for word in &WORDS {
             println!("{:16} {} {}", word.name, word.places, word.meaning);
@@ -101,7 +111,7 @@ pub fn run(
         return Ok(());
     }
     if arguments.guards {
-        return Ok(guards::run(&guards::sources()?, &arguments.rows)?);
+        return Ok(guards::run(&guards::sources()?, &arguments.rows, arguments.json)?);
     }
     let (rows, a_day) = chosen(&arguments.rows)?;
     let image = if arguments.image {
@@ -113,12 +123,14 @@ pub fn run(
     let mut lines = Vec::new();
     for row in rows {
         let line = drilled(row, &board, arguments.seed, arguments.long);
-        line.print();
+        if !arguments.json {
+            line.print();
+        }
         lines.push(line);
     }
     let count = |begin: &str| lines.iter().filter(|line| line.verdict.starts_with(begin)).count();
     let refused = count("not accepted");
-    if !lines.is_empty() {
+    if !lines.is_empty() && !arguments.json {
         println!(
             "{} rows: {} accepted ({} by a drill, {} by the tests they name), {refused} not accepted",
             lines.len(),
@@ -127,17 +139,30 @@ pub fn run(
             count("by test"),
         );
     }
-    let mut not_accepted = refused;
+    let (mut not_accepted, mut day) = (refused, None);
     if a_day || arguments.long && arguments.rows.is_empty() {
         let seconds = if arguments.image { IMAGE_DAY_S } else { DAY_S };
         let told = endurance::fly(&board, arguments.seed, seconds);
         not_accepted += usize::from(told.did.is_err());
         let (Ok(did) | Err(did)) = &told.did;
         let verdict = if told.did.is_ok() { "accepted" } else { "not accepted" };
+        let hours = seconds / 3600;
+        if arguments.json {
+            day = Some(serde_json::json!({
+                "hours": hours, "struck": told.struck, "what the unit did": did, "verdict": verdict,
+            }));
+        } else {
+            println!(
+                "{hours} h with faults at random  [{verdict}]\n     struck {}; {did}",
+                told.struck
+            );
+        }
+    }
+    if arguments.json {
+        let rows = serde_json::Value::from_iter(lines.iter().map(Line::json));
         println!(
-            "{} h with faults at random  [{verdict}]\n     struck {}; {did}",
-            seconds / 3600,
-            told.struck
+            "{:#}",
+            serde_json::json!({"rows": rows, "day": day, "not accepted": not_accepted})
         );
     }
     if let Some(path) = &arguments.write {

@@ -176,11 +176,12 @@ fn cargo(root: &Path, copy: &Path, arguments: &[String], removed: Option<usize>)
     cargo.output()
 }
 
-/// Tries every guard of the repository at `root`, those whose name contains `only` if it is given.
+/// Tries every guard of the repository at `root`, those whose name contains `only` if it is given; prints what
+/// became of each, as text or as JSON.
 ///
 /// # Errors
 /// See [`GuardError`]; a guard that no test holds is one.
-pub fn run(root: &Path, only: &[String]) -> Result<(), GuardError> {
+pub fn run(root: &Path, only: &[String], json: bool) -> Result<(), GuardError> {
     let copy: PathBuf = root.join("target/guards");
     let io = |what: &str| {
         let what = what.to_string();
@@ -198,7 +199,7 @@ pub fn run(root: &Path, only: &[String]) -> Result<(), GuardError> {
         let text = fs::read_to_string(&path).map_err(io(library))?;
         fs::write(&path, text + REMOVED).map_err(io(library))?;
     }
-    let (mut loose, mut tried) = (0, 0);
+    let (mut loose, mut tried, mut told) = (0, 0, Vec::new());
     for (number, guard) in guards.iter().enumerate() {
         if !only.is_empty() && !only.iter().any(|only| guard.guard.contains(only)) {
             continue;
@@ -220,9 +221,19 @@ pub fn run(root: &Path, only: &[String]) -> Result<(), GuardError> {
             (false, _) => "NOT HELD: the test does not pass with it",
         };
         loose += usize::from(!(passes && fails));
-        println!("{verdict:6} {} ({})", guard.guard, guard.test);
+        if json {
+            told.push(serde_json::json!({
+                "guard": guard.guard, "file": guard.file, "test": guard.test, "verdict": verdict,
+            }));
+        } else {
+            println!("{verdict:6} {} ({})", guard.guard, guard.test);
+        }
     }
-    println!("{tried} guards: {} held by a test that fails without it", tried - loose);
+    if json {
+        println!("{:#}", serde_json::Value::from(told));
+    } else {
+        println!("{tried} guards: {} held by a test that fails without it", tried - loose);
+    }
     if loose > 0 {
         Err(GuardError::Loose(loose, tried))
     } else {

@@ -35,6 +35,15 @@ impl Line {
         ]
     }
 
+    /// For programs, under the names of [`HEAD`].
+    pub fn json(&self) -> serde_json::Value {
+        let cells = HEAD.into_iter().zip(self.cells());
+        cells
+            .map(|(name, cell)| (name.to_string(), cell.into()))
+            .collect::<serde_json::Map<_, _>>()
+            .into()
+    }
+
     /// Prints it.
     pub fn print(&self) {
         let struck = if self.struck.is_empty() { "-" } else { &self.struck };

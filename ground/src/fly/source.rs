@@ -146,15 +146,31 @@ fn recording(path: &Path, units: &Units) -> Result<Recording, SourceError> {
     }))
 }
 
-/// `ground sources`: the motions, a line each.
-pub fn list() -> String {
-    let line = |named: &motion::Named| {
-        let lasts = motion::by_name(named.name).and_then(|truth| truth.duration_s());
-        let lasts = lasts.map_or("no end".into(), |lasts_s| format!("{lasts_s:.0} s"));
-        format!("{:12}{lasts:>8}  {}\n", named.name, named.about)
+/// Lists the motions that can be flown
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct List {
+    /// Print them as JSON; a motion without end has no duration_s
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ground sources`: the motions, a line each, or as JSON.
+pub fn list(arguments: List) -> String {
+    let named = LIST.iter().map(|named| {
+        let lasts_s = motion::by_name(named.name).and_then(|truth| truth.duration_s());
+        (named.name, lasts_s, named.about)
+    });
+    let all = named.chain([(HAND.0, Some(HAND_S), HAND.1)]);
+    if arguments.json {
+        let each =
+            all.map(|(name, lasts_s, about)| serde_json::json!({"name": name, "duration_s": lasts_s, "about": about}));
+        return format!("{:#}\n", serde_json::Value::from_iter(each));
+    }
+    let line = |(name, lasts_s, about): (&str, Option<f64>, &str)| {
+        let lasts = lasts_s.map_or("no end".into(), |lasts_s| format!("{lasts_s:.0} s"));
+        format!("{name:12}{lasts:>8}  {about}\n")
     };
-    let hand = format!("{:12}{HAND_S:>6.0} s  {}\n", HAND.0, HAND.1);
-    LIST.iter().map(line).chain([hand]).collect()
+    all.map(line).collect()
 }
 
 fn by_name(name: &str) -> Result<Source, SourceError> {
@@ -249,7 +265,11 @@ mod tests {
 
     #[test]
     fn every_motion_is_listed() {
-        assert_eq!(list().lines().count(), LIST.len() + 1);
-        assert!(list().contains("no end"));
+        let text = list(List { json: false });
+        assert_eq!(text.lines().count(), LIST.len() + 1);
+        assert!(text.contains("no end"));
+        let listed: serde_json::Value = serde_json::from_str(&list(List { json: true })).expect("JSON");
+        assert_eq!(listed.as_array().map(Vec::len), Some(LIST.len() + 1));
+        assert!(listed[0]["about"].is_string(), "{listed}");
     }
 }

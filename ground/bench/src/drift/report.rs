@@ -32,6 +32,20 @@ impl Section {
         format!("{}\n{}", self.title, rows.chain(said).collect::<String>())
     }
 
+    /// For programs, under the names that the text has.
+    pub fn json(&self) -> serde_json::Value {
+        let figures = self
+            .rows
+            .iter()
+            .map(|(name, value)| (name.clone(), value.as_str().into()));
+        serde_json::json!({
+            "test": self.title,
+            "good": !self.is_wrong(),
+            "figures": figures.collect::<serde_json::Map<_, _>>(),
+            "verdict": self.verdict,
+        })
+    }
+
     /// Whether something is wrong.
     pub fn is_wrong(&self) -> bool {
         self.verdict.iter().any(|line| line.starts_with("wrong:"))
