@@ -87,8 +87,10 @@ pub struct Layout<'a> {
     pub mount: Mount,
     /// Where the table stands.
     pub site: Site,
-    /// Channels; empty for all columns with a sigma or a count beside them.
+    /// Channels; empty for all columns with a sigma or a count beside them, or else those that the unit has.
     pub channels: &'a [String],
+    /// Whether the unit has a channel of this name that the excitation excites.
+    pub has: &'a dyn Fn(&str) -> bool,
     /// Units that were told, whatever the columns' names say.
     pub units: Units,
     /// Code limit of each channel \[counts\]: beyond it, or at it, the sensor saturates.
@@ -107,7 +109,7 @@ impl Experiment {
     /// # Errors
     /// When its meaning is not certain.
     pub fn read(table: &Table, layout: &Layout) -> Result<Self, TableError> {
-        let columns = channels(table, layout.channels)?;
+        let columns = channels(table, layout)?;
         let names: Vec<String> = columns.iter().map(|&column| table.columns[column].clone()).collect();
         let outputs = |_: usize, row: &Row| columns.iter().map(|&column| table.number(row, column)).collect();
         let experiment = Self::assemble(table, layout, names, &outputs)?;
@@ -198,28 +200,27 @@ fn stated(table: &Table, row: &Row, sigmas: &[Option<usize>]) -> Result<Vec<Opti
     sigmas.iter().map(of).collect()
 }
 
-fn channels(table: &Table, asked: &[String]) -> Result<Vec<usize>, TableError> {
+fn channels(table: &Table, layout: &Layout) -> Result<Vec<usize>, TableError> {
+    let asked = layout.channels;
     let beside = |name: &str| {
         let has = |end: &str| table.column(&format!("{name}{end}")).is_some();
         has("_sigma") || has("_n")
     };
-    let found: Option<Vec<usize>> = if asked.is_empty() {
+    let those = |is_channel: &dyn Fn(&str) -> bool| -> Vec<usize> {
         let names = table.columns.iter().enumerate();
-        Some(
-            names
-                .filter(|(_, name)| beside(name))
-                .map(|(column, _)| column)
-                .collect(),
-        )
-    } else {
-        asked.iter().map(|name| table.column(name)).collect()
+        names.filter(|(_, name)| is_channel(name)).map(|(k, _)| k).collect()
+    };
+    let found = match those(&beside) {
+        _ if !asked.is_empty() => asked.iter().map(|name| table.column(name)).collect(),
+        found if found.is_empty() => Some(those(layout.has)),
+        found => Some(found),
     };
     found.filter(|found| !found.is_empty()).ok_or_else(|| TableError {
         file: table.file.clone(),
         line: 0,
         column: String::new(),
         why: format!(
-            "which columns are channels? Name them with --channels; the file has {}",
+            "which columns are channels? Name them with --channels, or the unit that has them with --unit; the file has {}",
             table.columns.join(", ")
         ),
     })

@@ -34,6 +34,9 @@ const FREEDOM: usize = 4;
 /// Share of the residuals' energy that a drift must explain: with less, other things are more worth looking at.
 const DRIFT_SHARE: f64 = 0.5;
 
+/// Beyond this variance inflation factor, 1 / (1 - r^2), two columns count as one (Marquardt 1970, Technometrics 12, 591).
+const INFLATION: f64 = 10.0;
+
 /// A scale against the nominal one [counts per unit]; `declared` are the units that the excitation was read in.
 pub fn scale(channel: &str, found: f64, nominal: f64, declared: &[(Kind, Unit)]) -> Option<String> {
     let ratio = found / nominal;
@@ -151,6 +154,29 @@ pub fn residuals(channel: &str, rows: &[Row], parameters: usize) -> Vec<String> 
     wrong
 }
 
+/// Whether the order of the rows is that of their excitation: a drift along them then passes as scale, and no residual shows it.
+pub fn in_order(rows: &[Row]) -> bool {
+    let centred = |values: Vec<f64>| {
+        let values = DVector::from_vec(values);
+        values.add_scalar(-values.mean())
+    };
+    let along = centred(rows.iter().map(|row| row.along).collect());
+    let place = centred((0..rows.len()).map(|k| k as f64).collect());
+    let square = along.dot(&place).powi(2) / (along.norm_squared() * place.norm_squared()).max(f64::MIN_POSITIVE);
+    rows.len() > 2 && square > 1.0 - INFLATION.recip()
+}
+
+/// What is said of channels whose rows are [`in_order`], if there are any.
+pub fn hidden_drift(channels: &[&str]) -> Option<String> {
+    (!channels.is_empty()).then(|| {
+        format!(
+            "{}: the rows are in the order of the excitation, so a drift along them passes as scale and is not seen; mix the order, \
+             or take the rows once more, backwards",
+            channels.join(" ")
+        )
+    })
+}
+
 /// Least squares of residuals on some columns: what they explain, and the chance that residuals without a pattern give as
 /// much, by the F-test. A constant and the line `along` were fitted already, so what the columns have of these is taken out.
 pub fn pattern(
@@ -222,6 +248,22 @@ mod tests {
             }
         };
         (0..25).map(row).collect()
+    }
+
+    #[test]
+    fn rows_in_the_order_of_their_excitation_hide_a_drift() {
+        let mixed = rows(|_, _| 0.0);
+        assert!(!in_order(&mixed));
+        let mut sorted = mixed.clone();
+        sorted.sort_by(|a, b| a.along.total_cmp(&b.along));
+        assert!(in_order(&sorted));
+        let there_and_back: Vec<Row> = sorted.iter().chain(sorted.iter().rev()).cloned().collect();
+        assert!(!in_order(&there_and_back));
+        let mut paired = mixed;
+        paired.sort_by(|a, b| a.along.abs().total_cmp(&b.along.abs()));
+        assert!(!in_order(&paired), "each rate with its antagonist");
+        assert!(!in_order(&sorted[..2]) && !in_order(&[]));
+        assert_eq!(hidden_drift(&[]), None);
     }
 
     #[test]

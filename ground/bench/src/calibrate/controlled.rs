@@ -51,7 +51,8 @@ pub struct MultiPosition {
 struct Common {
     /// Table: CSV, tab-separated or LabVIEW, decimal points or commas
     file: PathBuf,
-    /// Channels, separated by commas; without it all columns that have NAME_sigma or NAME_n beside them
+    /// Channels, separated by commas; without it all columns that have NAME_sigma or NAME_n beside them, or else those that
+    /// --unit has
     #[arg(long, value_delimiter = ',')]
     channels: Vec<String>,
     /// Nominal unit (unit.toml): axes to tell wiring errors by, ranges to tell saturation by
@@ -161,11 +162,20 @@ impl Common {
             let channel = nominal.and_then(|nominal| nominal.channel(name));
             channel.map_or(f64::INFINITY, NominalChannel::limit_counts)
         };
+        let sensor = match kind {
+            Kind::Rate => "gyro",
+            Kind::Force => "accelerometer",
+        };
+        let has = |name: &str| {
+            let channel = nominal.and_then(|nominal| nominal.channel(name));
+            channel.is_some_and(|channel| channel.sensor == sensor)
+        };
         read(&Layout {
             kind,
             mount: self.place.mount(),
             site: self.place.site(),
             channels: &self.channels,
+            has: &has,
             units: self.units,
             limit: &limit,
         })
@@ -193,6 +203,9 @@ impl Common {
         let found = controlled::calibrate(experiment, &options)?;
         let mut report = describe(experiment, &found, self.contradicted);
         report.remarks.extend(remarks);
+        report
+            .remarks
+            .extend(checks::hidden_drift(&in_order(experiment, &found)));
         report.wrong.extend(held_against(experiment, &found, nominal));
         let entries = Entry::controlled(&found, experiment.kind);
         self.output.finish(&report, entries, files)
@@ -216,19 +229,32 @@ fn held_against(experiment: &Experiment, found: &Calibration, nominal: Option<&N
             let axis_b = nominal.axis_b.filter(|_| honest);
             wrong.extend(axis_b.and_then(|axis_b| checks::axis(name, fit.axis_b(), axis_b.into())));
         }
-        let rows = channel.rows.iter().zip(&fit.residuals).map(|(&row, &residual)| {
-            let trial = &experiment.trials[row];
-            checks::Row {
-                label: format!("row {} (line {})", trial.label, trial.line),
-                along: fit.sensitivity_b.dot(&found.excitation_b[row].unwrap_or_default()),
-                residual,
-                stated: trial.stated.get(k).copied().flatten(),
-            }
-        });
-        let rows: Vec<_> = rows.collect();
+        let rows = rows(experiment, found, k);
         wrong.extend(checks::residuals(name, &rows, rows.len() - fit.freedom));
     }
     wrong
+}
+
+/// The rows of a channel's fit, in the order of the table.
+fn rows(experiment: &Experiment, found: &Calibration, channel: usize) -> Vec<checks::Row> {
+    let (used, fit) = (&found.channels[channel].rows, &found.channels[channel].response);
+    let row = |(&row, &residual): (&usize, &f64)| {
+        let trial = &experiment.trials[row];
+        checks::Row {
+            label: format!("row {} (line {})", trial.label, trial.line),
+            along: fit.sensitivity_b.dot(&found.excitation_b[row].unwrap_or_default()),
+            residual,
+            stated: trial.stated.get(channel).copied().flatten(),
+        }
+    };
+    used.iter().zip(&fit.residuals).map(row).collect()
+}
+
+/// The channels whose rows are in the order of their excitation.
+fn in_order<'a>(experiment: &Experiment, found: &'a Calibration) -> Vec<&'a str> {
+    let channels = found.channels.iter().enumerate();
+    let ordered = channels.filter(|(k, _)| checks::in_order(&rows(experiment, found, *k)));
+    ordered.map(|(_, channel)| channel.name.as_str()).collect()
 }
 
 fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradicted) -> Report {

@@ -131,8 +131,9 @@ pub fn scale(found: &Scale, points: &[(f64, f64)]) -> Result<Section, ChartError
         .map(|((rate, _), left)| (*rate, *left))
         .collect();
     let figure = residuals("What a straight line leaves over", "rate", "residual [output]", left)?;
-    let wrong = checks::residuals("the output", &rows_of(found, points), 2);
-    let verdict = match (wrong.is_empty(), points.len() < FEW) {
+    let rows_of = rows_of(found, points);
+    let wrong = checks::residuals("the output", &rows_of, 2);
+    let mut verdict: Vec<String> = match (wrong.is_empty(), points.len() < FEW) {
         (false, _) => wrong.into_iter().map(|line| format!("wrong: {line}")).collect(),
         (true, false) => vec!["good: the residuals show no bend".into()],
         (true, true) => vec![format!(
@@ -140,6 +141,12 @@ pub fn scale(found: &Scale, points: &[(f64, f64)]) -> Result<Section, ChartError
             points.len()
         )],
     };
+    let ordered: &[&str] = if checks::in_order(&rows_of) {
+        &["the output"]
+    } else {
+        &[]
+    };
+    verdict.extend(checks::hidden_drift(ordered).map(|line| format!("warning: {line}")));
     Ok(Section {
         title: "Scale factor".into(),
         rows,

@@ -9,12 +9,18 @@ const SITE: Site = Site {
 };
 
 fn read(kind: Kind, text: &str) -> Result<Experiment, TableError> {
+    read_of(&|_| false, kind, text)
+}
+
+/// Of a unit whose description has these channels.
+fn read_of(has: &dyn Fn(&str) -> bool, kind: Kind, text: &str) -> Result<Experiment, TableError> {
     let table = Table::parse(Path::new("run.csv"), text.as_bytes())?;
     let layout = Layout {
         kind,
         mount: Mount::EMEMS,
         site: SITE,
         channels: &[],
+        has,
         units: Units::default(),
         limit: &|_| 8191.0,
     };
@@ -33,6 +39,20 @@ fn degrees_and_radians_are_told_by_the_columns_name() {
         (degrees.trials[1].label.as_str(), degrees.channels.as_slice()),
         ("b", ["g1".to_string()].as_slice())
     );
+}
+
+#[test]
+fn without_sigmas_the_units_description_says_which_columns_are_channels() {
+    let gyros = |name: &str| name.starts_with('g');
+    let bare = "wx_rad_s,wy_rad_s,wz_rad_s,t1,g1\n1,2,3,25,5\n2,2,3,25,6\n";
+    let found = read_of(&gyros, Kind::Rate, bare).expect("one gyro");
+    assert_eq!(found.channels, ["g1"]);
+    // Where some columns have a sigma, those are meant.
+    let beside = bare
+        .replace("t1,g1", "g2,g1,g1_sigma")
+        .replace("25,5", "25,5,1")
+        .replace("25,6", "25,6,1");
+    assert_eq!(read_of(&gyros, Kind::Rate, &beside).expect("one").channels, ["g1"]);
 }
 
 #[test]
