@@ -56,26 +56,34 @@ const CATALOGUE: [Experiment; 5] = [
     },
 ];
 
+/// What to do about what no effect explains.
+const REPEAT: &str = "Repeat this log: what the library does not know shows whether it returns with the motion, the temperature or the clock.";
+
 /// Advice in words: how to tell a pair apart, or how to `confirm` the first cause, or what to do where the gap `is_unknown`.
 pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, is_unknown: bool) -> String {
     let Some(pair) = rivals else {
         return match confirm {
             Some(confirm) => format!("Nothing is left to tell apart. To be sure: {confirm}"),
-            None if is_unknown => {
-                "Repeat this log: what the library does not know shows whether it returns with the motion, the temperature or the clock.".to_owned()
+            None if is_unknown => REPEAT.to_owned(),
+            None => {
+                "None is needed for what this log can show; for what it cannot, see its detection limits.".to_owned()
             }
-            None => "None is needed for what this log can show; for what it cannot, see its detection limits.".to_owned(),
         };
     };
     let names = (pair.own.0.effect.page().name, pair.rival.effect.page().name);
     let before = error(pair.nats);
     if pair.nats > TOLD_APART {
+        let next = match confirm {
+            None if is_unknown => sentence("", Some(REPEAT)),
+            _ => sentence(" To be sure:", confirm),
+        };
+        let errs = match before {
+            ..1e-6 => "less than 1 in 1,000,000".to_owned(),
+            _ => format!("{:.4} %", 100.0 * before),
+        };
         return format!(
-            "{} and {} are apart already ({:.1e} errors).{}",
-            names.0,
-            names.1,
-            before,
-            sentence(" To be sure:", confirm)
+            "{} and {} are apart already: of decisions between them {errs} err.{next}",
+            names.0, names.1
         );
     }
     let tried = CATALOGUE.iter().filter_map(|experiment| {

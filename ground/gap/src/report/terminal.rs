@@ -206,9 +206,11 @@ fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std:
         let corrected = stage
             .corrected
             .map_or(String::new(), |error| format!("; by the calibration set {error:.3}"));
+        // A reader looks for the gain first; where there is none, the filter's other errors are larger than the effect's.
+        let gains = if stage.after < stage.before { "" } else { "; no gain" };
         writeln!(
             text,
-            "        {}: {:.3} -> {:.3} deg (floor {:.3}){corrected}",
+            "        {}: {:.3} -> {:.3} deg (floor {:.3}){gains}{corrected}",
             stage.name, stage.before, stage.after, stage.floor
         )?;
     }
