@@ -233,3 +233,58 @@ fn a_set_is_intact_only_as_it_was_written() {
     bytes[500] ^= 1;
     assert!(!bytes::is_intact(&bytes));
 }
+
+/// What stands on the umbilical is read by a person: which axis, in the numbering of the plates.
+#[test]
+fn a_refusal_says_what_is_wrong_and_where() {
+    extern crate std;
+    use std::string::ToString;
+
+    let sensor = Sensor {
+        kind: Kind::Magnetometer,
+        plate: 2,
+    };
+    let said = [
+        (Refusal::Length(3), "3 bytes where a set has"),
+        (Refusal::NotASet, "not a calibration set"),
+        (Refusal::Version(9), "set of version 9: update the unit"),
+        (
+            Refusal::Checksum {
+                written: 0xAB,
+                computed: 0x12,
+            },
+            "checksum 000000AB written, 00000012 found: send it again",
+        ),
+        (Refusal::Code(17), "unknown code at byte 17"),
+        (Refusal::OtherRanges, "made at other sensor ranges"),
+        (
+            Refusal::OtherUnit { found: 7, expected: 8 },
+            "of unit 7, this is unit 8",
+        ),
+        (Refusal::NotFinite(Some(Channel(13))), "magnetometer 1 y: not a number"),
+        (Refusal::NotFinite(None), "not a number"),
+        (Refusal::Temperatures, "temperatures out of order or range"),
+        (Refusal::Uncertainty, "uncertainty or place out of range"),
+        (
+            Refusal::NotUnit(Channel(11)),
+            "accelerometer 4 z: axis is not of length 1",
+        ),
+        (
+            Refusal::IllConditioned(sensor, 31.7),
+            "magnetometer 3: condition 31, its axes do not span space",
+        ),
+        (Refusal::Direction(Channel(26)), "gyro 3: over 10 deg from nominal"),
+        (
+            Refusal::Scale(Channel(24)),
+            "gyro 1: scale not within half to twice nominal",
+        ),
+        (Refusal::Bias(Channel(0)), "accelerometer 1 x: bias leaves no range"),
+        (
+            Refusal::Noise(Channel(12)),
+            "magnetometer 1 x: noise not above 0 or absurd",
+        ),
+    ];
+    for (refusal, words) in said {
+        assert!(refusal.to_string().starts_with(words), "{refusal}");
+    }
+}

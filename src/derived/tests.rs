@@ -117,3 +117,20 @@ fn every_one_bit_error_is_refused() {
     }
     assert_eq!(decode(b"$"), Err(DerivedError::Length(1)));
 }
+
+#[test]
+fn what_is_wrong_with_a_frame_is_said_with_its_bytes() {
+    use std::string::ToString;
+
+    let wrong = DerivedError::Checksum {
+        sent: 0xA0,
+        computed: 0xB1,
+    };
+    assert_eq!(
+        DerivedError::Length(1).to_string(),
+        std::format!("1 bytes where a derived frame has {DERIVED_BYTES}")
+    );
+    assert_eq!(DerivedError::Byte(7).to_string(), "byte 7 belongs to no derived frame");
+    assert_eq!(wrong.to_string(), "checksum 00A0 was sent, the fields give 00B1");
+    assert!(DerivedError::Version(9).to_string().starts_with("version 9; "));
+}

@@ -372,3 +372,23 @@ fn a_mount_that_takes_long_gives_way() {
         assert!(reads.get() - before <= 2 * 16);
     }
 }
+
+#[test]
+fn what_the_log_cannot_do_is_said_with_what_to_do() {
+    use std::string::ToString;
+
+    let said = [
+        (LogError::Nand(NandError::Timeout), NandError::Timeout.to_string()),
+        (LogError::NotMounted, "not mounted".into()),
+        (LogError::Newer(9), "log of newer format 9: update the firmware".into()),
+        (
+            LogError::Foreign,
+            "NAND holds something else: G_MA makes it a log".into(),
+        ),
+        (LogError::Full, "full".into()),
+        (LogError::Worn, "no block of the NAND can be written".into()),
+    ];
+    for (error, words) in said {
+        assert_eq!(error.to_string(), words);
+    }
+}
