@@ -265,6 +265,31 @@ fn a_set_is_forgotten_by_g_cx_with_g_ck_only_and_for_good() {
     }
 }
 
+/// A set that comes while the chip is dead is used at once and kept when the chip is there again; an erase meanwhile is refused.
+#[test]
+fn a_set_is_kept_once_a_dead_chip_comes_back() {
+    let flown = noisy()
+        .fault(2 * S, Fault::NandDead(true))
+        .say(3 * S, &set_words(&other_set()))
+        .say(6 * S, b"G_CLG_CK")
+        .say(7 * S, b"G_MAG_CA")
+        .fault(9 * S, Fault::NandDead(false))
+        .fault(14 * S, Fault::PowerCut(0))
+        .say(16 * S, b"G_MVG_MV")
+        .say(17 * S, b"G_MGG_MG")
+        .fly(19 * S);
+    let replies = flown.replies();
+    let at = |words: &str| {
+        let place = replies.iter().position(|reply| reply.contains(words));
+        place.unwrap_or_else(|| panic!("{words} in {replies:?}"))
+    };
+    let not_kept = at("calibration lasts until power-off only: the NAND stays busy");
+    let refused = at("G_MA failed: not mounted");
+    let kept = at("calibration is kept in the recorder");
+    assert!(not_kept < refused && refused < kept, "{replies:?}");
+    assert_eq!(sets_of_records(&flown), [name_of(&other_set())]);
+}
+
 #[test]
 fn a_set_that_is_not_confirmed_is_not_used() {
     let flown = noisy()
