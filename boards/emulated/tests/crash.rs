@@ -24,7 +24,7 @@ use twin::{
 };
 
 /// Runs in every cycle with an attitude.
-const ESTIMATION: &str = "kalman6Filter11keep_finite";
+const ESTIMATION: &str = "6Filter11keep_finite";
 /// Two instructions that are none (`udf #0`): a HardFault.
 const UNDEFINED: u32 = 0xDE00_DE00;
 /// `push {r0-r7, lr}` and back to it: the stack runs over.

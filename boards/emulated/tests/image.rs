@@ -291,7 +291,7 @@ const SUPERVISOR_CALL: u32 = 0xDF00_DF00;
 fn a_crystal_that_stops_in_flight_costs_a_reset_and_flight_goes_on() {
     assert_eq!(image().vector(NMI), image().vector(SVCALL), "one handler");
     let calling = image()
-        .with_code("kalman6Filter11keep_finite", SUPERVISOR_CALL)
+        .with_code("6Filter11keep_finite", SUPERVISOR_CALL)
         .expect("the function is there");
     let mut tape = Tape {
         script: vec![(600 * MS, b"G_DLG_MVG_MV".to_vec()), (2_100 * MS, b"G_ST".to_vec())],
@@ -337,7 +337,7 @@ fn the_status_has_the_checksum_of_the_image_and_another_one_for_another() {
         tape.said()
     );
     let other = image()
-        .with_code("kalman6Filter11keep_finite", 0)
+        .with_code("6Filter11keep_finite", 0)
         .expect("the function is there");
     assert_ne!(other.checksum(), Some(checksum));
 }
