@@ -45,55 +45,6 @@ fn a_reset_in_flight_is_told_apart_and_the_count_goes_on() {
 }
 
 #[test]
-fn a_part_that_holds_sda_is_clocked_free() {
-    // In a cycle it costs readings, between two the next reading of the accelerometers finds it.
-    for (into_cycle_us, costs) in [(1_100, true), (30_000, false)] {
-        let mut tape = Tape {
-            script: vec![(MS, b"G_DL".to_vec())],
-            ..Tape::default()
-        };
-        let held = at_us(cycle_us() + into_cycle_us, Fault::SdaHeld(9));
-        flown(&Options::default(), &[held], 2_500, &mut tape);
-        let errors = errors(&tape);
-        let mut frames = tape.derived().into_iter();
-        assert!(
-            frames.any(|frame| frame.health.contains(Health::BUS_RECOVERED)),
-            "{into_cycle_us} us"
-        );
-        assert_eq!(
-            errors.iter().skip(2).any(|&errors| errors != 0),
-            costs,
-            "{into_cycle_us} us: {errors:x?}"
-        );
-        assert_eq!(errors.last(), Some(&0), "{into_cycle_us} us: {errors:x?}");
-    }
-}
-
-#[test]
-fn a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free() {
-    let begun_us = cycle_us();
-    for offset_us in THROUGH_A_CYCLE_US {
-        let mut tape = Tape::default();
-        let faults = [
-            at_us(begun_us + offset_us, Fault::BusStuck(true)),
-            at_us(begun_us + 300_000, Fault::BusStuck(false)),
-        ];
-        let report = flown(&Options::default(), &faults, 2_700, &mut tape);
-        assert!(
-            report.struck.get("bus-stuck").is_some_and(|times| *times > 0),
-            "{offset_us} us"
-        );
-        let errors = errors(&tape);
-        assert!(errors.len() >= 11, "a packet every 200 ms whatever the bus does");
-        assert!(
-            errors.iter().skip(2).any(|&errors| errors != 0),
-            "{offset_us} us: {errors:x?}"
-        );
-        assert_eq!(errors.last(), Some(&0), "{offset_us} us: {errors:x?}");
-    }
-}
-
-#[test]
 fn a_silent_sensor_has_its_error_bit_until_it_answers_again() {
     let mut tape = Tape::default();
     // Slot 5: the magnetometer of the second plate. Slot 9: its gyro.
@@ -121,37 +72,6 @@ fn without_the_multiplexer_the_gyros_are_still_read() {
 
 /// \[ns\] from the hang to the reset: the watchdog's second, and the 0.2 s in which it may last have been fed before.
 const BITES: std::ops::Range<u64> = 800 * MS..1_250 * MS;
-
-#[test]
-fn a_part_that_hangs_lets_the_watchdog_bite_and_flight_is_resumed() {
-    let hangs = 1_777;
-    let mut tape = Tape {
-        script: vec![
-            (900 * MS, b"G_MVG_MV".to_vec()),
-            ((hangs + 2_000) * MS, b"G_ST".to_vec()),
-        ],
-        ..Tape::default()
-    };
-    let report = flown(
-        &Options::default(),
-        &[at(hangs, Fault::DmaHung)],
-        hangs + 2_500,
-        &mut tape,
-    );
-    let [(struck, cause)] = report.resets[..] else {
-        panic!("{:?}", report.resets)
-    };
-    assert_eq!(cause, ResetCause::Watchdog);
-    assert!(BITES.contains(&(struck - hangs * MS)), "{struck}");
-    for reply in ["started: Watchdog", "G_ST FLIGHT", "started Watchdog resets 1"] {
-        assert!(tape.said().contains(reply), "{reply} in {}", tape.said());
-    }
-    let (before, after): (Vec<_>, Vec<_>) = tape.packets().into_iter().partition(|(at, _)| *at < struck);
-    assert!(after.len() >= 5, "{} packets after the reset", after.len());
-    assert!(after.iter().all(|(_, reading)| reading.errors.0 == 0), "{after:?}");
-    let step = after[0].1.counter - before.last().expect("packets").1.counter;
-    assert!((1..=2).contains(&step), "the counter went on by {step}");
-}
 
 #[test]
 fn a_part_that_stretches_the_clock_too_long_is_cut_off_and_all_others_are_read() {
@@ -188,24 +108,113 @@ fn a_part_that_holds_the_clock_for_good_costs_its_own_plate_at_most() {
     assert!(last & 1 << 5 != 0 && last & !plate == 0, "{errors:x?}");
 }
 
-#[test]
-fn a_controller_that_sends_no_start_is_reset() {
-    let begun_us = cycle_us();
-    for into_cycle_us in [1_100, 3_700] {
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free() {
+        let begun_us = cycle_us();
+        for offset_us in THROUGH_A_CYCLE_US {
+            let mut tape = Tape::default();
+            let faults = [
+                at_us(begun_us + offset_us, Fault::BusStuck(true)),
+                at_us(begun_us + 300_000, Fault::BusStuck(false)),
+            ];
+            let report = flown(&Options::default(), &faults, 2_700, &mut tape);
+            assert!(
+                report.struck.get("bus-stuck").is_some_and(|times| *times > 0),
+                "{offset_us} us"
+            );
+            let errors = errors(&tape);
+            assert!(errors.len() >= 11, "a packet every 200 ms whatever the bus does");
+            assert!(
+                errors.iter().skip(2).any(|&errors| errors != 0),
+                "{offset_us} us: {errors:x?}"
+            );
+            assert_eq!(errors.last(), Some(&0), "{offset_us} us: {errors:x?}");
+        }
+    }
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_part_that_holds_sda_is_clocked_free() {
+        // In a cycle it costs readings, between two the next reading of the accelerometers finds it.
+        for (into_cycle_us, costs) in [(1_100, true), (30_000, false)] {
+            let mut tape = Tape {
+                script: vec![(MS, b"G_DL".to_vec())],
+                ..Tape::default()
+            };
+            let held = at_us(cycle_us() + into_cycle_us, Fault::SdaHeld(9));
+            flown(&Options::default(), &[held], 2_500, &mut tape);
+            let errors = errors(&tape);
+            let mut frames = tape.derived().into_iter();
+            assert!(
+                frames.any(|frame| frame.health.contains(Health::BUS_RECOVERED)),
+                "{into_cycle_us} us"
+            );
+            assert_eq!(
+                errors.iter().skip(2).any(|&errors| errors != 0),
+                costs,
+                "{into_cycle_us} us: {errors:x?}"
+            );
+            assert_eq!(errors.last(), Some(&0), "{into_cycle_us} us: {errors:x?}");
+        }
+    }
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_part_that_hangs_lets_the_watchdog_bite_and_flight_is_resumed() {
+        let hangs = 1_777;
         let mut tape = Tape {
-            script: vec![(MS, b"G_DL".to_vec())],
+            script: vec![
+                (900 * MS, b"G_MVG_MV".to_vec()),
+                ((hangs + 2_000) * MS, b"G_ST".to_vec()),
+            ],
             ..Tape::default()
         };
-        let misplaced = at_us(begun_us + into_cycle_us, Fault::StopMisplaced);
-        let report = flown(&Options::default(), &[misplaced], 1_900, &mut tape);
-        assert_eq!(report.struck.get("stop-misplaced"), Some(&1), "{:?}", report.struck);
-        assert_eq!(report.resets, []);
-        let mut frames = tape.derived().into_iter();
-        assert!(
-            frames.any(|frame| frame.health.contains(Health::BUS_RECOVERED)),
-            "{into_cycle_us} us"
+        let report = flown(
+            &Options::default(),
+            &[at(hangs, Fault::DmaHung)],
+            hangs + 2_500,
+            &mut tape,
         );
-        let errors = errors(&tape);
-        assert_eq!(errors.last(), Some(&0), "{into_cycle_us} us: {errors:x?}");
+        let [(struck, cause)] = report.resets[..] else {
+            panic!("{:?}", report.resets)
+        };
+        assert_eq!(cause, ResetCause::Watchdog);
+        assert!(BITES.contains(&(struck - hangs * MS)), "{struck}");
+        for reply in ["started: Watchdog", "G_ST FLIGHT", "started Watchdog resets 1"] {
+            assert!(tape.said().contains(reply), "{reply} in {}", tape.said());
+        }
+        let (before, after): (Vec<_>, Vec<_>) = tape.packets().into_iter().partition(|(at, _)| *at < struck);
+        assert!(after.len() >= 5, "{} packets after the reset", after.len());
+        assert!(after.iter().all(|(_, reading)| reading.errors.0 == 0), "{after:?}");
+        let step = after[0].1.counter - before.last().expect("packets").1.counter;
+        assert!((1..=2).contains(&step), "the counter went on by {step}");
+    }
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_controller_that_sends_no_start_is_reset() {
+        let begun_us = cycle_us();
+        for into_cycle_us in [1_100, 3_700] {
+            let mut tape = Tape {
+                script: vec![(MS, b"G_DL".to_vec())],
+                ..Tape::default()
+            };
+            let misplaced = at_us(begun_us + into_cycle_us, Fault::StopMisplaced);
+            let report = flown(&Options::default(), &[misplaced], 1_900, &mut tape);
+            assert_eq!(report.struck.get("stop-misplaced"), Some(&1), "{:?}", report.struck);
+            assert_eq!(report.resets, []);
+            let mut frames = tape.derived().into_iter();
+            assert!(
+                frames.any(|frame| frame.health.contains(Health::BUS_RECOVERED)),
+                "{into_cycle_us} us"
+            );
+            let errors = errors(&tape);
+            assert_eq!(errors.last(), Some(&0), "{into_cycle_us} us: {errors:x?}");
+        }
     }
 }

@@ -194,24 +194,6 @@ fn a_static_is_read_by_its_name_and_a_wrong_name_is_refused() {
     assert!(matches!(&refused, Err(Error::Image(error)) if error.to_string().contains("NO_SUCH_STATIC")));
 }
 
-#[test]
-fn option_bytes_are_told_and_a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said_at_the_start() {
-    for (set_mv, read_out) in [(0, 0), (2100, 1), (2400, 2), (2700, 1)] {
-        let mut plant = Plant::ideal(world("still"));
-        plant.options.brown_out.set_mv = set_mv;
-        plant.options.read_out = read_out;
-        let mut tape = Tape {
-            script: vec![(400 * MS, b"G_ST".to_vec())],
-            ..Tape::default()
-        };
-        fly_with(&Options::default(), image(), plant, &[], 600 * MS, &mut tape).expect("it flies");
-        let status = format!("brown-out {set_mv} mV of 2700 read-out {read_out} dips 0");
-        assert!(tape.said().contains(&status), "{}", tape.said());
-        let warning = format!("brown-out reset at {set_mv} mV, the board asks for 2700");
-        assert_eq!(tape.said().contains(&warning), set_mv < 2700, "{}", tape.said());
-    }
-}
-
 /// The voltage detector's interrupt counts; a reset in between loses none.
 #[test]
 fn dips_of_the_supply_are_counted_since_power_on() {
@@ -382,5 +364,29 @@ fn noise_and_a_break_on_the_umbilical_cost_the_words_in_them_and_nothing_else() 
     for pair in packets.windows(2) {
         let period = pair[1].0 - pair[0].0;
         assert!(period.abs_diff(PERIOD) <= 2 * MS, "{period} ns");
+    }
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn option_bytes_are_told_and_a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said_at_the_start() {
+        for (set_mv, read_out) in [(0, 0), (2100, 1), (2400, 2), (2700, 1)] {
+            let mut plant = Plant::ideal(world("still"));
+            plant.options.brown_out.set_mv = set_mv;
+            plant.options.read_out = read_out;
+            let mut tape = Tape {
+                script: vec![(400 * MS, b"G_ST".to_vec())],
+                ..Tape::default()
+            };
+            fly_with(&Options::default(), image(), plant, &[], 600 * MS, &mut tape).expect("it flies");
+            let status = format!("brown-out {set_mv} mV of 2700 read-out {read_out} dips 0");
+            assert!(tape.said().contains(&status), "{}", tape.said());
+            let warning = format!("brown-out reset at {set_mv} mV, the board asks for 2700");
+            assert_eq!(tape.said().contains(&warning), set_mv < 2700, "{}", tape.said());
+        }
     }
 }

@@ -108,87 +108,6 @@ fn a_failing_supply_begins_no_operation() {
     assert_eq!(missing.iter().filter(late).count(), 0, "{missing:?} {}", tape.said());
 }
 
-/// F20: the supply is gone for 20 ms at some instants of a cycle. The record that it stopped is taken after it.
-#[test]
-fn a_dip_of_20_ms_costs_no_record() {
-    let mut stopped = 0;
-    for after_ms in [0, 20, 60, 105, 150] {
-        let fails = (2_000 + after_ms) * MS;
-        let at = |at, failing| Scheduled {
-            at,
-            fault: Fault::SupplyFailing(failing),
-        };
-        let faults = [at(fails, true), at(fails + 20 * MS, false)];
-        let (tape, chip) = flown(&faults, fails + 1_500 * MS);
-        stopped += u64::from(tape.said().contains("recorder: the supply is failing"));
-        let missing = missing(&tape, &logged(&chip));
-        // The last packet may not have its record yet.
-        assert!(
-            missing.iter().all(|at| *at > fails + 1_400 * MS),
-            "{after_ms} ms: {missing:?}"
-        );
-    }
-    assert!(stopped > 0, "no dip met a record");
-}
-
-/// Fault F20: the voltage detector's interrupt draws WP# at once, whatever is under way.
-#[test]
-fn a_supply_that_fails_in_the_middle_of_an_operation_draws_write_protect() {
-    let (mut under_way, quarter) = (0, MS / 4);
-    // A record is programmed soon after its packet closes, 10 ms after each cycle began.
-    let cycle = flown(&[], 1_400 * MS).0.packets()[4].0 - 23_541 * 1_000;
-    for step in 40..64 {
-        let at = cycle + step * quarter;
-        let (_, before) = flown(&[], at);
-        if before.is_protected() {
-            continue;
-        }
-        under_way += 1;
-        let fails = Scheduled {
-            at,
-            fault: Fault::SupplyFailing(true),
-        };
-        let (_, after) = flown(&[fails], at + 5_000);
-        assert!(after.is_protected(), "{step}: WP# is high 5 us after the supply failed");
-        break;
-    }
-    assert!(under_way > 0, "no instant was in the middle of an operation");
-}
-
-/// The shortest time after which a record was durable, by faults that leave less and less of it.
-#[test]
-fn a_record_is_durable_400_ms_after_a_power_cut_and_sooner_after_a_reset() {
-    for (fault, longest) in [(Fault::PowerCut(2), BACK), (Fault::Reset, 150 * MS)] {
-        let gaps: Vec<Nanos> = (0..6).map(|step| longest - step * 10 * MS).collect();
-        let mut at = 1_500 * MS;
-        let mut faults = vec![Scheduled { at, fault }];
-        for gap in &gaps {
-            at += gap;
-            faults.push(Scheduled { at, fault });
-        }
-        let (_, chip) = flown(&faults, at + MS);
-        let back = boots(&logged(&chip)) - 1;
-        assert!(back > 0, "{fault:?}: no record {longest} ns after it");
-        println!("{fault:?}: durable {} ms after it", gaps[back - 1] / MS);
-    }
-}
-
-#[test]
-fn cuts_at_random_instants_lose_no_record_and_end_in_flight() {
-    let cuts = std::env::var("EMEMS_CUTS")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(CUTS);
-    let runs = cuts.div_ceil(CUTS_A_RUN);
-    // A run is a minute of one core: odd and even ones side by side.
-    std::thread::scope(|scope| {
-        for first in 0..2 {
-            scope.spawn(move || (first..runs).step_by(2).for_each(cut_again_and_again));
-        }
-    });
-    println!("{} cuts, back each time, nothing lost", runs * CUTS_A_RUN);
-}
-
 /// One flight with [`CUTS_A_RUN`] cuts. What telemetry has sent whole is in the log: a record is durable 2 ms after its
 /// packet closes, the last byte of the packet is out after 14 ms. No time is excused after a cut.
 fn cut_again_and_again(run: u64) {
@@ -216,4 +135,94 @@ fn cut_again_and_again(run: u64) {
         "run {run}: back in FLIGHT and recording each time"
     );
     assert_eq!(missing(&tape, &logged), Vec::<Nanos>::new(), "run {run}: {faults:?}");
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn cuts_at_random_instants_lose_no_record_and_end_in_flight() {
+        let cuts = std::env::var("EMEMS_CUTS")
+            .ok()
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(CUTS);
+        let runs = cuts.div_ceil(CUTS_A_RUN);
+        // A run is a minute of one core: odd and even ones side by side.
+        std::thread::scope(|scope| {
+            for first in 0..2 {
+                scope.spawn(move || (first..runs).step_by(2).for_each(cut_again_and_again));
+            }
+        });
+        println!("{} cuts, back each time, nothing lost", runs * CUTS_A_RUN);
+    }
+
+    /// The shortest time after which a record was durable, by faults that leave less and less of it.
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_record_is_durable_400_ms_after_a_power_cut_and_sooner_after_a_reset() {
+        for (fault, longest) in [(Fault::PowerCut(2), BACK), (Fault::Reset, 150 * MS)] {
+            let gaps: Vec<Nanos> = (0..6).map(|step| longest - step * 10 * MS).collect();
+            let mut at = 1_500 * MS;
+            let mut faults = vec![Scheduled { at, fault }];
+            for gap in &gaps {
+                at += gap;
+                faults.push(Scheduled { at, fault });
+            }
+            let (_, chip) = flown(&faults, at + MS);
+            let back = boots(&logged(&chip)) - 1;
+            assert!(back > 0, "{fault:?}: no record {longest} ns after it");
+            println!("{fault:?}: durable {} ms after it", gaps[back - 1] / MS);
+        }
+    }
+
+    /// Fault F20: the voltage detector's interrupt draws WP# at once, whatever is under way.
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_supply_that_fails_in_the_middle_of_an_operation_draws_write_protect() {
+        let (mut under_way, quarter) = (0, MS / 4);
+        // A record is programmed soon after its packet closes, 10 ms after each cycle began.
+        let cycle = flown(&[], 1_400 * MS).0.packets()[4].0 - 23_541 * 1_000;
+        for step in 40..64 {
+            let at = cycle + step * quarter;
+            let (_, before) = flown(&[], at);
+            if before.is_protected() {
+                continue;
+            }
+            under_way += 1;
+            let fails = Scheduled {
+                at,
+                fault: Fault::SupplyFailing(true),
+            };
+            let (_, after) = flown(&[fails], at + 5_000);
+            assert!(after.is_protected(), "{step}: WP# is high 5 us after the supply failed");
+            break;
+        }
+        assert!(under_way > 0, "no instant was in the middle of an operation");
+    }
+
+    /// F20: the supply is gone for 20 ms at some instants of a cycle. The record that it stopped is taken after it.
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_dip_of_20_ms_costs_no_record() {
+        let mut stopped = 0;
+        for after_ms in [0, 20, 60, 105, 150] {
+            let fails = (2_000 + after_ms) * MS;
+            let at = |at, failing| Scheduled {
+                at,
+                fault: Fault::SupplyFailing(failing),
+            };
+            let faults = [at(fails, true), at(fails + 20 * MS, false)];
+            let (tape, chip) = flown(&faults, fails + 1_500 * MS);
+            stopped += u64::from(tape.said().contains("recorder: the supply is failing"));
+            let missing = missing(&tape, &logged(&chip));
+            // The last packet may not have its record yet.
+            assert!(
+                missing.iter().all(|at| *at > fails + 1_400 * MS),
+                "{after_ms} ms: {missing:?}"
+            );
+        }
+        assert!(stopped > 0, "no dip met a record");
+    }
 }

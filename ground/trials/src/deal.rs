@@ -303,37 +303,6 @@ fn case_toml(name: &str, style: Style, claimed: &Environment, loose: Option<&Loo
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_seed_is_a_case() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let card = Card {
-            ring: Ring::R1,
-            given: None,
-        };
-        let [one, same] = ["A", "B"].map(|name| deal(folder.path(), name, card, 5).expect("dealt"));
-        assert_eq!((one.effects, one.snr_marginal), (same.effects, same.snr_marginal));
-        let read = |case: &str, file: &str| fs::read(folder.path().join(case).join(file)).expect(file);
-        for file in ["measured.txt.gz", "motion.csv.gz", "unit.toml"] {
-            assert_eq!(read("A", file), read("B", file), "{file}");
-        }
-    }
-
-    #[test]
-    fn every_effect_disturbs_what_it_says_it_touches() {
-        let named = disturbance::named();
-        let (one, other) = named.split_at(named.len() / 2);
-        // Minutes of one core: side by side.
-        std::thread::scope(|scope| {
-            scope.spawn(|| disturb(one));
-            disturb(other);
-        });
-    }
-
-    #[test]
-    fn everything_novel_disturbs_what_it_says_it_touches() {
-        disturb(novel::ALL);
-    }
-
     fn disturb(disturbances: &[Disturbance]) {
         /// \[s\] long enough for what happens once to have happened.
         const LONG_S: f64 = 250.0;
@@ -382,6 +351,45 @@ mod tests {
                     channel.name
                 );
             }
+        }
+    }
+
+    /// What takes more than six seconds of a core.
+    mod long {
+        use super::*;
+
+        #[test]
+        #[ignore = "long: cargo host-test-long"]
+        fn every_effect_disturbs_what_it_says_it_touches() {
+            let named = disturbance::named();
+            let (one, other) = named.split_at(named.len() / 2);
+            // Minutes of one core: side by side.
+            std::thread::scope(|scope| {
+                scope.spawn(|| disturb(one));
+                disturb(other);
+            });
+        }
+
+        #[test]
+        #[ignore = "long: cargo host-test-long"]
+        fn a_seed_is_a_case() {
+            let folder = tempfile::tempdir().expect("a folder");
+            let card = Card {
+                ring: Ring::R1,
+                given: None,
+            };
+            let [one, same] = ["A", "B"].map(|name| deal(folder.path(), name, card, 5).expect("dealt"));
+            assert_eq!((one.effects, one.snr_marginal), (same.effects, same.snr_marginal));
+            let read = |case: &str, file: &str| fs::read(folder.path().join(case).join(file)).expect(file);
+            for file in ["measured.txt.gz", "motion.csv.gz", "unit.toml"] {
+                assert_eq!(read("A", file), read("B", file), "{file}");
+            }
+        }
+
+        #[test]
+        #[ignore = "long: cargo host-test-long"]
+        fn everything_novel_disturbs_what_it_says_it_touches() {
+            disturb(novel::ALL);
         }
     }
 }

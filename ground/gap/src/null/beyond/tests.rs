@@ -107,33 +107,6 @@ fn worth_in(
 }
 
 #[test]
-fn a_lever_arm_of_a_millimetre_may_be_the_references_and_one_of_centimetres_is_not() {
-    let arm = |metres: f64, accuracy: [f64; 2]| worth("lever-arm", &[metres, 0.0, 0.0], accuracy, None);
-    assert_eq!(
-        arm(0.001, [0.0, 1e-4]),
-        f64::INFINITY,
-        "an exact reference errs by nothing"
-    );
-    let [small, large, plain] =
-        [[0.003, 1e-4], [0.05, 1e-4], [0.003, 0.0]].map(|[metres, sigma_m]| arm(metres, [1e-3, sigma_m]));
-    // Three sigmas of the point are worth four and a half nats at most, and more where a position is exact.
-    assert!(small <= 4.5 && plain > 1.5 * small, "{small} {plain}");
-    assert!((100.0..=1250.0).contains(&large), "{large}");
-}
-
-#[test]
-fn a_slow_tilt_of_two_sigmas_may_be_the_references_and_one_of_twenty_or_a_sudden_one_is_not() {
-    let tilt = |rad: f64, span: Option<Span>| worth("table-tilt", &[rad, 0.0], [3e-3, 0.0], span.map(Interval::from));
-    let [small, large] = [6e-3, 60e-3].map(|rad| tilt(rad, None));
-    // That a tilt stays for three correlation times is a little less likely than that it is there once.
-    assert!((0.0..=6.0).contains(&small), "{small}");
-    assert!(large > 100.0, "{large}");
-    // No attitude error of twenty seconds begins between two samples.
-    let sudden = tilt(6e-3, Some(Span { from: 20.0, to: 40.0 }));
-    assert!(sudden > 3.0 * small, "{sudden} {small}");
-}
-
-#[test]
 fn what_neither_does_is_beyond_them() {
     let iron = |accuracy: [f64; 2]| worth("hard-iron", &[10.0, 0.0, 0.0], accuracy, None);
     let [doubted, exact] = [[3e-3, 1e-4], [1e-9, 1e-9]].map(iron);
@@ -157,4 +130,39 @@ fn a_gradient_that_the_room_may_have_is_no_effect() {
     let [unknown, none] = [1.5, 0.0].map(gradient);
     // Two sigmas of it, but for what the places of the four plates add, which the columns do not have.
     assert!(unknown < 0.02 * none && none > 1000.0, "{unknown} {none}");
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_slow_tilt_of_two_sigmas_may_be_the_references_and_one_of_twenty_or_a_sudden_one_is_not() {
+        let tilt =
+            |rad: f64, span: Option<Span>| worth("table-tilt", &[rad, 0.0], [3e-3, 0.0], span.map(Interval::from));
+        let [small, large] = [6e-3, 60e-3].map(|rad| tilt(rad, None));
+        // That a tilt stays for three correlation times is a little less likely than that it is there once.
+        assert!((0.0..=6.0).contains(&small), "{small}");
+        assert!(large > 100.0, "{large}");
+        // No attitude error of twenty seconds begins between two samples.
+        let sudden = tilt(6e-3, Some(Span { from: 20.0, to: 40.0 }));
+        assert!(sudden > 3.0 * small, "{sudden} {small}");
+    }
+
+    #[test]
+    #[ignore = "long: cargo host-test-long"]
+    fn a_lever_arm_of_a_millimetre_may_be_the_references_and_one_of_centimetres_is_not() {
+        let arm = |metres: f64, accuracy: [f64; 2]| worth("lever-arm", &[metres, 0.0, 0.0], accuracy, None);
+        assert_eq!(
+            arm(0.001, [0.0, 1e-4]),
+            f64::INFINITY,
+            "an exact reference errs by nothing"
+        );
+        let [small, large, plain] =
+            [[0.003, 1e-4], [0.05, 1e-4], [0.003, 0.0]].map(|[metres, sigma_m]| arm(metres, [1e-3, sigma_m]));
+        // Three sigmas of the point are worth four and a half nats at most, and more where a position is exact.
+        assert!(small <= 4.5 && plain > 1.5 * small, "{small} {plain}");
+        assert!((100.0..=1250.0).contains(&large), "{large}");
+    }
 }
