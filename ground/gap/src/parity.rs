@@ -24,6 +24,8 @@
 //! go through the same operator, so an effect that is another motion has no column left. No attitude is needed for
 //! this: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
 //!
+//! One plate has no redundancy: [`plate`] says what its whole log shows all the same.
+//!
 //! Columns are those of [`crate::library`], made about the smoothed motion. The held-out windows have a motion of their own, and say
 //! whether what is named is as strong there.
 
@@ -36,6 +38,7 @@ pub mod name;
 pub mod nulls;
 pub mod packet;
 pub mod page;
+pub mod plate;
 pub mod search;
 pub mod smooth;
 pub mod smoothed;
@@ -49,7 +52,10 @@ use std::path::Path;
 
 use crate::{
     input::case::CaseError,
-    parity::{findings::Findings, flight::Flight, followed::Followed, smooth::told::Told, verdict::Verdict},
+    parity::{
+        findings::Findings, flight::Flight, followed::Followed, plate::sensors::Sensors, smooth::told::Told,
+        verdict::Verdict,
+    },
 };
 
 /// File of the verdict, of the screen and of the page among the texts.
@@ -57,6 +63,8 @@ const FILES: [&str; 3] = ["verdict.json", "all.txt", "index.html"];
 
 /// File of the smoothed attitude.
 pub const ATTITUDE: &str = "attitude.csv";
+
+const NO_SHRINK: &str = "without a reference the gap of the held-out windows is not judged; they are asked how strong there what is named is\n";
 
 /// Why nothing is said.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +90,9 @@ pub fn analysed(
     progress: &dyn Fn(&'static str, f64),
 ) -> Result<Vec<(String, String)>, ParityError> {
     let flight = Flight::open(case)?;
+    if let Some(sensors) = Sensors::of(&flight.unit) {
+        return of_plate(&flight, sensors, withheld, progress);
+    }
     let coded = Findings::coded(&flight, withheld);
     let followed = Followed::of(&flight, &flight.log, &coded);
     let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
@@ -95,12 +106,34 @@ pub fn analysed(
         ("why.txt", text::why(&flight, &findings)),
         ("next.txt", text::next(&findings)),
         ("limits.txt", text::visibility(&findings)),
-        (
-            "shrink.txt",
-            "without a reference the gap of the held-out windows is not judged; they are asked how strong there what is named is\n".to_owned(),
-        ),
+        ("shrink.txt", NO_SHRINK.to_owned()),
     ];
     texts.extend(sections.map(|(name, text)| (name.to_owned(), text)));
     texts.extend(told.csv().map(|text| (ATTITUDE.to_owned(), text)));
+    Ok(texts)
+}
+
+/// The same of one plate.
+fn of_plate(
+    flight: &Flight,
+    sensors: Sensors,
+    withheld: &[String],
+    progress: &dyn Fn(&'static str, f64),
+) -> Result<Vec<(String, String)>, ParityError> {
+    let findings = plate::Findings::of(flight, sensors, withheld, progress)?;
+    let verdict = serde_json::to_string_pretty(&plate::told::verdict(flight, &findings))?;
+    let texts = [
+        ("verdict.json", format!("{verdict}\n")),
+        ("all.txt", plate::text::screen(flight, &findings)),
+        ("index.html", plate::told::html(flight, &findings)?),
+        ("where.txt", plate::text::places(&findings)),
+        ("why.txt", plate::text::why(flight, &findings)),
+        ("next.txt", plate::text::next(flight, &findings) + "\n"),
+        ("limits.txt", nulls::told()),
+        ("shrink.txt", NO_SHRINK.to_owned()),
+    ];
+    let mut texts: Vec<(String, String)> = texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
+    let attitude = plate::told::attitude(&findings).csv();
+    texts.extend(attitude.map(|text| (ATTITUDE.to_owned(), text)));
     Ok(texts)
 }

@@ -84,6 +84,18 @@ pub const NULLS: &[Null] = &[
     },
 ];
 
+/// All of them in words, with the test of each.
+pub fn told() -> String {
+    let mut out = "What no redundancy can show, and what would:\n".to_owned();
+    for null in NULLS {
+        out += &format!("- {}.\n", null.what);
+        if !null.settled_by.is_empty() {
+            out += &format!("  Test: {}.\n", null.settled_by);
+        }
+    }
+    out
+}
+
 /// The null that a hypothesis belongs to: one sensor's delay or bias among others is none.
 pub fn of(hypothesis: &Hypothesis) -> Option<&'static Null> {
     let is_shared = match hypothesis.cause.locality {

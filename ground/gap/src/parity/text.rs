@@ -10,7 +10,7 @@ use crate::{
         findings::{Findings, Place},
         flight::Flight,
         name::{By, Name},
-        nulls::NULLS,
+        nulls::{self, NULLS},
         smooth::told::Told,
         visible::Row,
     },
@@ -216,12 +216,7 @@ pub fn visibility(findings: &Findings) -> String {
             row.share()
         );
     }
-    out += "\nWhat no redundancy can show, and what would:\n";
-    for null in NULLS {
-        let _ = writeln!(out, "- {}.", null.what);
-        if !null.settled_by.is_empty() {
-            let _ = writeln!(out, "  Test: {}.", null.settled_by);
-        }
-    }
+    out += "\n";
+    out += &nulls::told();
     out
 }

@@ -1,0 +1,130 @@
+//! The texts of one plate, by file name: verdict, screen, page, attitude.
+
+use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel};
+use serde_json::json;
+use twin::effect::LIBRARY;
+
+use crate::{
+    parity::{
+        flight::Flight,
+        nulls::NULLS,
+        plate::{Findings, filter::At, text},
+        smooth::told::{Attitude, Told},
+    },
+    report::verdict::rounded,
+};
+
+/// Probability of a name: what it competes with is nothing and its one rival, and the library has more.
+const NAMED: f64 = 0.99;
+
+/// Names that one plate can be given.
+pub const CAN_BE_NAMED: [&str; 4] = ["shock", "vibration", "hard-iron", "field-gradient"];
+
+/// The verdict as it is written: `gap-verdict/2` with `"from": "one-plate"`.
+pub fn verdict(flight: &Flight, findings: &Findings) -> serde_json::Value {
+    let outcome = findings.outcome(flight);
+    let cause = |name: super::Name| {
+        json!({
+            "effect": name.effect, "channels": name.channels, "or_at": [], "probability": NAMED,
+            "by": "one-plate", "parameters": {}, "seen": name.seen,
+        })
+    };
+    let untold = findings.untold();
+    let share = 1.0 / untold.len().max(1) as f64;
+    let alternative = |effect: &&str| json!({ "effect": effect, "probability": share });
+    let [before, after] = findings.gap.map(|gap| rounded(gap, 4));
+    let [plate, room] = findings.weighed.gains.map(|gain| rounded(gain, 1));
+    let never: Vec<&str> = (LIBRARY.iter().map(|own| own.page().name))
+        .filter(|name| !CAN_BE_NAMED.contains(name))
+        .collect();
+    json!({
+        "case": flight.opened.text.name,
+        "format": "gap-verdict/2",
+        "from": "one-plate",
+        "gap": { "before": before, "after": after, "floor": 1.0, "units": "sigma" },
+        "causes": findings.names(flight).into_iter().map(cause).collect::<Vec<_>>(),
+        "alternatives": untold.iter().map(alternative).collect::<Vec<_>>(),
+        "none_of_these": if findings.is_unexplained() || !findings.is_about_a_place() { 0.95 } else { 0.05 },
+        "outcome": outcome.word(),
+        "field_nats": { "fixed_to_plate": plate, "stays_in_room": room },
+        "visible": [],
+        "not_visible": NULLS.iter().map(|own| json!({ "what": own.what, "settled_by": own.settled_by })).collect::<Vec<_>>(),
+        "never_named": never,
+        "next_experiment": text::next(flight, findings),
+    })
+}
+
+/// The attitude in the form of [`Told`]; nothing in it where there is none.
+pub fn attitude(findings: &Findings) -> Told {
+    let one = |at: &At| Attitude {
+        t_s: at.t_s,
+        q_nb: at.q_nb,
+        sigmas_b_deg: at.sigmas_b().map(f64::to_degrees),
+    };
+    Told {
+        attitudes: findings.attitude.iter().flatten().map(one).collect(),
+        rests: rests(&findings.field),
+        turns: Vec::new(),
+    }
+}
+
+/// \[s\] spans of rest.
+pub fn rests(nodes: &[At]) -> Vec<(f64, f64)> {
+    let mut spans: Vec<(f64, f64)> = Vec::new();
+    let mut was = false;
+    for pair in nodes.windows(2) {
+        let is_rest = pair[1].is_rest;
+        match spans.last_mut().filter(|_| was && is_rest) {
+            Some(last) => last.1 = pair[1].t_s,
+            None if is_rest => spans.push((pair[0].t_s, pair[1].t_s)),
+            None => {}
+        }
+        was = is_rest;
+    }
+    spans
+}
+
+/// The page.
+///
+/// # Errors
+/// When a plot cannot be drawn.
+pub fn html(flight: &Flight, findings: &Findings) -> Result<String, ChartError> {
+    let nulls = NULLS
+        .iter()
+        .map(|null| vec![null.what.to_owned(), null.settled_by.to_owned()]);
+    let mut blocks = vec![
+        Block::Lead(text::lead(flight, findings)),
+        Block::Terminal(text::screen(flight, findings)),
+        Block::Heading("What one plate cannot show".to_owned()),
+        Block::Table {
+            columns: ["not seen", "what would settle it"].map(str::to_owned).to_vec(),
+            rows: nulls.collect(),
+        },
+    ];
+    if findings.sensors.has_field() && findings.is_about_a_place() {
+        blocks.push(Block::Figure(added(&findings.field)?));
+    }
+    blocks.extend(attitude(findings).figure()?.map(Block::Figure));
+    let title = format!("Gap without a reference: {}", flight.opened.text.name);
+    Ok(chart::html(&title, &flight.opened.text.about, &blocks))
+}
+
+/// What is added to the field, in the frame of each.
+fn added(nodes: &[At]) -> Result<Figure, ChartError> {
+    let lines = |of: &dyn Fn(&At) -> nalgebra::Vector3<f64>| -> Vec<Layer> {
+        let names = ["x", "y", "z"];
+        let line = |axis: usize| Marks::Line(nodes.iter().map(|at| (at.t_s, of(at)[axis])).collect());
+        (0..3).map(|axis| Layer::new(names[axis], axis, line(axis))).collect()
+    };
+    let panel = |y: &str, layers: Vec<Layer>| Panel {
+        x: Axis::linear("time [s]"),
+        y: Axis::linear(y),
+        layers,
+        ..Panel::default()
+    };
+    let panels = [
+        panel("fixed to the plate, in b [uT]", lines(&At::iron)),
+        panel("stays in the room, in n [uT]", lines(&At::beside)),
+    ];
+    Figure::of("What is added to the field, along the best model", 1, &panels)
+}
