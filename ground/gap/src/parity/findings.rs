@@ -267,7 +267,8 @@ fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 
 fn empty(flight: &Flight, free: [f64; 4]) -> CaseError {
     let problem = format!(
         "are as few as the unknowns of a motion: gyros, accelerometers and magnetometers together keep {:.2} degrees of freedom a \
-         packet. Parity is empty, nothing can be said without a reference; give a motion, or the channels of further plates",
+         packet. Parity is empty, nothing can be said without a reference; give a motion, the channels of further plates, or three \
+         gyros and three accelerometers of one at 20 Hz or more",
         free[..3].iter().sum::<f64>()
     );
     CaseError::key(&flight.opened.path(&flight.opened.text.unit), "channels", problem)

@@ -135,11 +135,7 @@ impl Findings {
         let rests = still::rests(&samples, &begins, &model(true));
         let is_begun_at_rest = rests.first().copied().unwrap_or(false);
         let nothing = model(is_begun_at_rest);
-        let mut first = still::first(&samples, &nothing);
-        if !is_begun_at_rest {
-            // Far off, what is linear about it does not hold; the whole log knows the begin better.
-            first = Course::of(&samples, &begins, &rests, first, &nothing).nodes[0].q_nb;
-        }
+        let first = still::first(&samples, &nothing);
         let weighed = match sensors.has_field() {
             true => Weighed::of(&samples, &begins, &rests, first, nothing, &|share| {
                 progress("field", share)

@@ -16,7 +16,7 @@
 //! other motions, and which is free therefore. And once a second the velocity, which is none within what a unit that stays about a place
 //! may have: a tilt of `t` rad makes `9.8 t` m/s a second of velocity that is not there.
 //!
-//! Backwards it is the smoother of Rauch, Tung and Striebel (1965), its errors those of the group.
+//! Backwards it is the fixed-interval smoother of Rauch et al. (1965), its errors those of the group.
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
