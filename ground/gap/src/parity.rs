@@ -24,11 +24,14 @@
 //! go through the same operator, so an effect that is another motion has no column left. No attitude is needed for
 //! this: the attitude of the smoothed motion only says where the columns of effects that feel north or gravity point.
 //!
+//! Of several chips on one body, [`chips`] says where each lies and how its axes differ, beside all this.
+//!
 //! One plate has no redundancy: [`plate`] says what its whole log shows all the same.
 //!
 //! Columns are those of [`crate::library`], made about the smoothed motion. The held-out windows have a motion of their own, and say
 //! whether what is named is as strong there.
 
+pub mod chips;
 pub mod codes;
 pub mod course;
 pub mod findings;

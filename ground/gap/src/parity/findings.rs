@@ -23,6 +23,7 @@ use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
     parity::{
+        chips::{self, Beside},
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
@@ -76,6 +77,8 @@ pub struct Findings {
     pub channels: Vec<Place>,
     /// What can be seen.
     pub visible: Vec<Row>,
+    /// Each chip of several beside the first.
+    pub chips: Vec<Beside>,
     /// Likeliest first.
     pub names: Vec<Name>,
     /// Other effects with their probabilities.
@@ -191,6 +194,7 @@ impl Findings {
                 .collect(),
             outcome: Outcome::of(names.len(), none_of_these.max(doubts.untold), none_of_these, false),
             gap: [before, left.gap],
+            chips: chips::look(&flight.unit, &flight.whole),
             visible,
             names,
             alternatives,
@@ -280,7 +284,8 @@ fn free(problem: &Problem, motion: &Motion) -> [f64; 4] {
     let packets = problem.twin.starts_s().len().max(1) as f64;
     [Kind::Gyro, Kind::Accelerometer, Kind::Magnetometer, Kind::Thermometer].map(|kind| {
         let own = (0..channels.len()).filter(|channel| channels[*channel].sensor == kind);
-        own.map(|channel| motion.free(channel)).sum::<f64>() / packets
+        // Of no channel the sum is minus zero.
+        own.map(|channel| motion.free(channel)).sum::<f64>().max(0.0) / packets
     })
 }
 

@@ -31,6 +31,8 @@ pub struct Flight {
     pub unit: UnitDescription,
     /// Where it was.
     pub environment: Environment,
+    /// All rows, none thinned.
+    pub whole: Log,
     /// The rows of the fit windows.
     pub log: Log,
     /// Those of the held-out windows, which no fit reads; none where they are too few.
@@ -71,6 +73,7 @@ impl Flight {
             log: only(&log, &rows),
             held: (held.len() >= LEAST_ROWS).then(|| only(&log, &held)),
             windows: parted,
+            whole: log,
             opened,
             unit,
             environment,

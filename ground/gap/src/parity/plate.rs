@@ -26,7 +26,7 @@ pub mod text;
 pub mod told;
 
 use crate::{
-    input::case::{CaseError, columns_of},
+    input::case::CaseError,
     parity::{
         flight::Flight,
         plate::{
@@ -105,9 +105,8 @@ impl Findings {
     ) -> Result<Self, CaseError> {
         let opened = &flight.opened;
         // All of it, at its full rate: neither the windows nor thinning leave a course that gyros could be integrated along.
-        let log = opened.log(&columns_of(&flight.unit), flight.unit.cycle_s)?;
         let refused = |problem: String| CaseError::key(&opened.path(&opened.text.measured), "t_s", problem);
-        let samples = (sensors.samples(&log, &flight.unit))
+        let samples = (sensors.samples(&flight.whole, &flight.unit))
             .ok_or_else(|| refused("has no two rows with all three gyros and accelerometers".to_owned()))?;
         let (t_s, step_s) = (&samples.rates.t_s, samples.step_s());
         let span_s = (t_s[0], t_s[t_s.len() - 1]);

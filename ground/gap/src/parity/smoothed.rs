@@ -22,12 +22,13 @@ use twin::effect::{LIBRARY, Nature};
 use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
-    library::hypotheses::Library,
+    library::{hypotheses::Library, products::Entries},
     null::problem::{Component, Problem},
     parity::{
         followed::Followed,
         name::{By, Name},
         nulls::{self, NULLS},
+        packet::Motion,
         search::{self, Chosen, First, Offered, residual_of},
         space::{self, Projected, Space, dot},
         visible::{self, Row},
@@ -150,22 +151,30 @@ pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<
     causes.iter().enumerate().map(strength).collect()
 }
 
-/// The same on the held-out windows, smoothed with a motion of their own; none of any where that did not settle.
+/// The same on the held-out windows, smoothed with a motion of their own; by parity alone where that did not settle.
 ///
 /// # Errors
 /// When the unit's description names an effect there is not.
 pub fn promises(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> Result<Vec<Option<Promise>>, CaseError> {
     let smoothed = held.smoothed(progress)?;
     if !smoothed.is_settled() {
-        return Ok(vec![None; causes.len()]);
+        let (twin, fit, reference) = (held.twin_of_course()?, held.fit(), Reference::default());
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = Motion::of(&problem, &held.course);
+        let space = Space::new(&problem, &motion, exact_nulls(&problem));
+        return Ok(strengths(&space, &DVector::zeros(0), causes));
     }
     let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
     let problem = Problem::new(&twin, &fit, &reference);
     let motion = held.motion(smoothed, &problem);
+    let space = Space::new(&problem, motion, exact_nulls(&problem));
+    Ok(strengths(&space, &motion.prior(), causes))
+}
+
+/// Columns of the exact nulls of a problem.
+fn exact_nulls(problem: &Problem) -> Vec<Entries> {
     let is_null = |name: &str| NULLS.iter().any(|null| null.effects.contains(&name));
     let others = LIBRARY.iter().map(|effect| effect.page().name);
     let others: Vec<String> = others.filter(|name| !is_null(name)).map(str::to_owned).collect();
-    let nulls = nulls::columns(&problem, &Library::new(&problem, &others, &|_| ()));
-    let space = Space::new(&problem, motion, nulls);
-    Ok(strengths(&space, &motion.prior(), causes))
+    nulls::columns(problem, &Library::new(problem, &others, &|_| ()))
 }

@@ -7,6 +7,7 @@ use std::fmt::Write;
 use crate::{
     input::windows::Span,
     parity::{
+        chips,
         findings::{Findings, Place},
         flight::Flight,
         name::{By, Name},
@@ -47,6 +48,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
         "GAP     {:.3} sigma where 1 is noise and calibration alone",
         findings.gap[0]
     );
+    out += &chips::text::lines(&findings.chips);
     out += &places(findings);
     out += &why(flight, findings);
     let _ = writeln!(out, "{}", told.line());

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::{
     parity::{
+        chips,
         findings::Findings,
         flight::Flight,
         name::{By, Name},
@@ -25,6 +26,8 @@ pub struct Verdict {
     format: &'static str,
     from: &'static str,
     gap: Gap,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    chips: Vec<serde_json::Value>,
     causes: Vec<Cause>,
     alternatives: Vec<Alternative>,
     none_of_these: f64,
@@ -122,6 +125,7 @@ impl Verdict {
                 floor: 1.0,
                 units: "sigma",
             },
+            chips: chips::text::json(&findings.chips),
             causes: findings.names.iter().map(cause).collect(),
             alternatives: findings.alternatives.iter().map(alternative).collect(),
             none_of_these: rounded(findings.none_of_these),
