@@ -90,10 +90,10 @@ fn flown(chips: &[Is], with_field: bool) -> TempDir {
         };
         (0..12).map(|_| one()).sum::<f64>() - 6.0
     };
-    let kinds = if with_field { "gam" } else { "ga" };
+    let kinds = &['g', 'a', 'm'][..if with_field { 3 } else { 2 }];
     let names = (0..chips.len()).flat_map(|chip| {
         let of = move |letter: char| ["x", "y", "z"].map(|axis| format!("{letter}{chip}{axis}"));
-        kinds.chars().flat_map(of)
+        kinds.iter().copied().flat_map(of)
     });
     let mut text = format!("t_s,{}\n", names.collect::<Vec<_>>().join(","));
     for row in 0..6000 {

@@ -37,6 +37,7 @@ use crate::{
         },
     },
     probability::outcome::Outcome,
+    thresholds::{FIELD_MISFIT, KNOCKS, LINE_OVER, VELOCITY_MISFIT},
 };
 
 /// \[s\] between samples from which on gyros cannot be integrated: a hand turns a unit by a tenth of a radian in it.
@@ -44,17 +45,6 @@ const SLOWEST_S: f64 = 0.05;
 
 /// Least length of a log \[s\].
 const SHORTEST_S: f64 = 5.0;
-
-/// Knocks that a log may have before they are a name: one is a unit that is put down.
-const KNOCKS: usize = 2;
-
-/// Power of a line over what stands beside it from which on it is a vibration. Of 24 recordings by hand (BROAD) the largest without one has 2.3,
-/// with one 6.2 at least; this is about their geometric mean.
-const LINE: f64 = 4.0;
-
-/// Mean square of what looks at velocity and field are off by, from which on the motion is not what was supposed. The first is 0.3 at most on 24
-/// recordings by hand, and far above 1 in a flight, which does not stay about a place; the second is 1.2 at most along the best model.
-const MISFITS: [f64; 2] = [2.0, 1.0];
 
 /// What is said.
 pub struct Findings {
@@ -144,7 +134,7 @@ impl Findings {
         progress("attitude", 0.0);
         let along = |model| Course::of(&samples, &begins, &rests, first, &model);
         let (without, best, wary) = (along(nothing), along(weighed.model()), along(weighed.wary()));
-        let is_supposed = wary.misfit[1] <= MISFITS[1];
+        let is_supposed = wary.misfit[1] <= VELOCITY_MISFIT;
         Ok(Self {
             sensors,
             samples: (t_s.len(), step_s),
@@ -167,7 +157,7 @@ impl Findings {
 
     /// What stays on in the field is more than any of the models makes.
     pub fn is_unexplained(&self) -> bool {
-        self.is_about_a_place() && self.gap[1].powi(2) > MISFITS[0]
+        self.is_about_a_place() && self.gap[1].powi(2) > FIELD_MISFIT
     }
 
     /// Every name, of which the field's needs a motion about a place.
@@ -185,7 +175,7 @@ impl Findings {
         }
         for (line, kind) in self.lines.iter().zip([Accelerometer, Gyro]) {
             let is_named = names.iter().any(|own| own.effect == "vibration");
-            if let Some(line) = line.filter(|line| line.over > LINE && !is_named) {
+            if let Some(line) = line.filter(|line| line.over > LINE_OVER && !is_named) {
                 let seen = text::line(&line, kind);
                 names.push(Name {
                     effect: "vibration",

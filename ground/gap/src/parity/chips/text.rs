@@ -5,13 +5,10 @@ use std::fmt::Write;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 
-use crate::parity::chips::{Beside, joined::Sized};
-
-/// Of its sigma, how large a cross axis has to be to be told.
-const TOLD: f64 = 4.0;
-
-/// \[deg\] and how large to matter.
-const MATTERS_DEG: f64 = 0.05;
+use crate::{
+    parity::chips::{Beside, joined::Sized},
+    thresholds::{CHIP_DEG, CHIP_SIGMAS},
+};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -56,15 +53,15 @@ pub fn lines(chips: &[Beside]) -> String {
 /// Cross axes and scales that are known to be there.
 fn differs(sized: &Sized) -> String {
     let mut told = Vec::new();
-    for row in 0..3 {
-        for column in 0..3 {
+    for (row, reads) in AXES.iter().enumerate() {
+        for (column, of) in AXES.iter().enumerate() {
             let (size, sigma) = (sized.matrix[(row, column)], sized.sigmas[(row, column)]);
-            let is_told = size.abs() > TOLD * sigma && size.abs().to_degrees() > MATTERS_DEG;
+            let is_told = size.abs() > CHIP_SIGMAS * sigma && size.abs().to_degrees() > CHIP_DEG;
             if is_told && row == column {
-                told.push(format!("scale {} {:.3} +- {:.3} %", AXES[row], 1e2 * size, 1e2 * sigma));
+                told.push(format!("scale {} {:.3} +- {:.3} %", reads, 1e2 * size, 1e2 * sigma));
             } else if is_told {
                 let (size, sigma) = (size.to_degrees(), sigma.to_degrees());
-                told.push(format!("{} on {} {size:.3} +- {sigma:.3} deg", AXES[row], AXES[column]));
+                told.push(format!("{} on {} {size:.3} +- {sigma:.3} deg", reads, of));
             }
         }
     }
@@ -80,10 +77,9 @@ fn differs(sized: &Sized) -> String {
 /// A turn is antisymmetric, and accelerometers on the same chip show it.
 pub fn turned_or_crossed(own: &Beside) -> Option<String> {
     let gyros = own.joined.rates.as_ref()?;
-    let known = |at: &(usize, usize)| gyros.matrix[*at].abs() - TOLD * gyros.sigmas[*at];
-    let beside = |(row, column): &(usize, usize)| {
-        row != column && gyros.matrix[(*row, *column)].abs().to_degrees() > MATTERS_DEG
-    };
+    let known = |at: &(usize, usize)| gyros.matrix[*at].abs() - CHIP_SIGMAS * gyros.sigmas[*at];
+    let beside =
+        |(row, column): &(usize, usize)| row != column && gyros.matrix[(*row, *column)].abs().to_degrees() > CHIP_DEG;
     let all = (0..9).map(|at| (at / 3, at % 3)).filter(beside);
     let (row, column) = all.max_by(|one, other| known(one).total_cmp(&known(other)))?;
     if known(&(row, column)) < 0.0 {
@@ -93,10 +89,10 @@ pub fn turned_or_crossed(own: &Beside) -> Option<String> {
     let sigma = gyros.sigmas[(row, column)].hypot(gyros.sigmas[(column, row)]);
     let forces = own.joined.forces.as_ref()?;
     let (shown, shown_sigma) = (forces.matrix[(row, column)], forces.sigmas[(row, column)]);
-    let is_shown = (shown - size).abs() < TOLD * shown_sigma.hypot(gyros.sigmas[(row, column)]);
+    let is_shown = (shown - size).abs() < CHIP_SIGMAS * shown_sigma.hypot(gyros.sigmas[(row, column)]);
     let is_hidden = shown.abs() < 0.5 * size.abs() && !is_shown;
-    let is_turn = (size + across).abs() < TOLD * sigma;
-    let is_even = (size - across).abs() < TOLD * sigma;
+    let is_turn = (size + across).abs() < CHIP_SIGMAS * sigma;
+    let is_even = (size - across).abs() < CHIP_SIGMAS * sigma;
     let pair = format!(
         "{} on {} and {} on {}",
         AXES[row], AXES[column], AXES[column], AXES[row]

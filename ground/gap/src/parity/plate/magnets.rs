@@ -11,9 +11,12 @@
 
 use nalgebra::UnitQuaternion;
 
-use crate::parity::plate::{
-    filter::{Model, evidence},
-    samples::Samples,
+use crate::{
+    parity::plate::{
+        filter::{Model, evidence},
+        samples::Samples,
+    },
+    thresholds::ADDED_NATS,
 };
 
 /// [uT/sqrt(s)] how far what is added may wander.
@@ -21,11 +24,6 @@ const WANDERS: [f64; 4] = [0.0, 0.3, 1.0, 3.0];
 
 /// \[uT\] of what is added, at the begin.
 const ADDED_UT: f64 = 30.0;
-
-/// \[nats\] from which on something is said to be there, and said to be the one and not the other. Of 24 recordings by hand (BROAD) those
-/// without a magnet gained 9 at most, which is a constant iron of 4 uT, and the others 0; those with one 935 at least, and the two frames lay
-/// 65 nats apart at least. All 16 that are not of blind cases were looked at.
-pub const NAMED_NATS: f64 = 30.0;
 
 /// \[uT\] and \[s\] of the room along which the attitude is told, and of one in which something is fixed to the plate, which wanders by so much
 /// [uT/sqrt(s)]. With them the attitude follows the field less than evidence would have it: a room errs alike for as long as the unit
@@ -105,13 +103,13 @@ impl Weighed {
 
     /// Whether something is there.
     pub fn is_there(&self) -> bool {
-        self.gains[0].max(self.gains[1]) >= NAMED_NATS
+        self.gains[0].max(self.gains[1]) >= ADDED_NATS
     }
 
     /// What is there, where the log tells it.
     pub fn told(&self) -> Option<Added> {
         let [plate, room] = self.gains;
-        if !self.is_there() || (plate - room).abs() < NAMED_NATS {
+        if !self.is_there() || (plate - room).abs() < ADDED_NATS {
             return None;
         }
         Some(if plate > room { Added::ToPlate } else { Added::ToRoom })

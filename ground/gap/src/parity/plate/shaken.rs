@@ -9,9 +9,7 @@
 use nalgebra::Vector3;
 use rustfft::{FftPlanner, num_complex::Complex};
 
-/// [m/s2] second difference of the force from which on it is a knock: of fourteen recordings by hand at 286 Hz that nobody knocked (BROAD), the
-/// largest is 39 m/s2, when the unit was put down; of 22 taps with a finger the median is 129 m/s2.
-pub const KNOCK_M_S2: f64 = 50.0;
+use crate::thresholds::KNOCK_M_S2;
 
 /// \[s\] between two knocks: a plate that was hit rings for less.
 const APART_S: f64 = 0.3;

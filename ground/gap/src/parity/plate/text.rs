@@ -11,13 +11,14 @@ use crate::{
         plate::{
             Findings,
             filter::At,
-            magnets::{Added, NAMED_NATS},
+            magnets::Added,
             shaken::{Knock, Line},
             told::{CAN_BE_NAMED, attitude},
         },
     },
     probability::outcome::Outcome,
     report::terminal::wrapped,
+    thresholds::ADDED_NATS,
 };
 
 /// All of it.
@@ -87,7 +88,7 @@ pub fn places(findings: &Findings) -> String {
             let _ = writeln!(
                 out,
                 "FIELD   off by {:.2} sigma with calibration and room alone, {:.2} along the best model; evidence over nothing: fixed to the plate \
-                 {plate:+.0} nats, in the room {room:+.0}, named from {NAMED_NATS:.0} on",
+                 {plate:+.0} nats, in the room {room:+.0}, named from {ADDED_NATS:.0} on",
                 findings.gap[0], findings.gap[1]
             );
         }
