@@ -33,6 +33,7 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         &flight.unit,
         &flight.environment,
         (&course, &start),
+        flight.rests(&flight.log, &flight.unit),
         &|_| (),
     )?;
     let stepped = began.elapsed().as_secs_f64();

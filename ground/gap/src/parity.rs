@@ -5,7 +5,7 @@
 //!
 //! | step | file | gives |
 //! |---|---|---|
-//! | 1 | [`flight`] | the fit windows of the log, and the unit in its environment |
+//! | 1 | [`flight`] (by [`phases`]) | the fit windows of the log, and the unit in its environment; what it did when |
 //! | 2 | [`codes`] | samples sent twice, lost bits: no model is needed for these |
 //! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
@@ -41,6 +41,7 @@ pub mod name;
 pub mod nulls;
 pub mod packet;
 pub mod page;
+pub mod phases;
 pub mod plate;
 pub mod search;
 pub mod smooth;

@@ -239,9 +239,9 @@ fn without_magnetometers_the_heading_counts_from_the_begin() {
 #[test]
 fn a_flight_is_not_taken_for_a_motion_about_a_place() {
     let mut rows = recorded();
-    // Pushed by three g for ten seconds, along what is down at the begin.
+    // Pushed for ten seconds by less than a launch is known by.
     for row in rows.iter_mut().filter(|row| (60.0..70.0).contains(&row.t_s)) {
-        row.force += row.q_nb.unwrap_or_default().inverse() * Vector3::new(0.0, 0.0, -30.0);
+        row.force += row.q_nb.unwrap_or_default().inverse() * Vector3::new(0.0, 0.0, -8.0);
     }
     let folder = case(&rows, 1, true);
     let told = found(&folder);
@@ -254,6 +254,19 @@ fn a_flight_is_not_taken_for_a_motion_about_a_place() {
     assert_eq!(told.1.outcome(&told.0), Outcome::Unknown);
     let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is told");
     assert!(texts.iter().all(|(name, _)| name != ATTITUDE));
+}
+
+#[test]
+fn a_thrust_that_is_found_frees_the_velocity_and_the_attitude_is_kept() {
+    let mut rows = recorded();
+    for row in rows.iter_mut().filter(|row| (60.0..70.0).contains(&row.t_s)) {
+        row.force += row.q_nb.unwrap_or_default().inverse() * Vector3::new(0.0, 0.0, -30.0);
+    }
+    let told = found(&case(&rows, 1, true));
+    assert!(told.0.phases_line().contains("thrust 60.0"), "{}", told.0.phases_line());
+    assert!(told.1.is_about_a_place());
+    let [_, tilt, _] = held_against(&told.1, &rows);
+    assert!(tilt.to_degrees() < 1.5, "{tilt}");
 }
 
 #[test]

@@ -112,6 +112,8 @@ pub struct CaseFile {
     /// What is known of the motion where nobody saw it.
     #[serde(default)]
     pub motion_known: MotionKnown,
+    /// What a flight did when, where its log is not to tell it.
+    pub phases: Option<PhasePairs>,
     /// Surroundings.
     #[serde(default)]
     pub environment: Surroundings,
@@ -132,6 +134,27 @@ pub struct MotionKnown {
     /// Nothing.
     #[serde(default)]
     pub none: bool,
+}
+
+/// `[phases]`: pairs of seconds each.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhasePairs {
+    /// Nothing moves, before a flight.
+    pub rest: Vec<[f64; 2]>,
+    /// A motor pushes.
+    pub thrust: Vec<[f64; 2]>,
+    /// Nothing but drag.
+    #[serde(alias = "free_fall")]
+    pub coast: Vec<[f64; 2]>,
+    /// A turn a second and more, across others.
+    pub spin: Vec<[f64; 2]>,
+    /// The air brakes harder than gravity pulls.
+    pub entry: Vec<[f64; 2]>,
+    /// It hangs.
+    pub parachute: Vec<[f64; 2]>,
+    /// Nothing moves, after a flight.
+    pub landed: Vec<[f64; 2]>,
 }
 
 /// `[matters]`: see [`Bars`].

@@ -11,10 +11,16 @@ use std::path::Path;
 
 use twin::{environment::Environment, predict::UnitDescription};
 
-use crate::input::{
-    case::{CaseError, Kind, Opened, columns_of, environment_of},
-    log::{Log, Series},
-    windows::{Span, Windows},
+use crate::{
+    input::{
+        case::{CaseError, Kind, Opened, columns_of, environment_of},
+        log::{Log, Series},
+        windows::{Span, Windows},
+    },
+    parity::{
+        phases::{self, Stretch},
+        smooth::rests::rests,
+    },
 };
 
 /// Rows that are kept at most: 20 min of packets. A longer or faster log is thinned evenly, which bounds time and memory.
@@ -31,6 +37,10 @@ pub struct Flight {
     pub unit: UnitDescription,
     /// Where it was.
     pub environment: Environment,
+    /// What it did when.
+    pub phases: Vec<Stretch>,
+    /// Whether its file says so.
+    pub are_phases_told: bool,
     /// All rows, none thinned.
     pub whole: Log,
     /// The rows of the fit windows.
@@ -69,7 +79,13 @@ impl Flight {
         let held = self::rows(&log, windows.hold());
         let every = held.len().div_ceil(MOST_ROWS).max(1);
         let held: Vec<usize> = held.into_iter().step_by(every).collect();
+        let phases = match &opened.text.phases {
+            Some(pairs) => phases::told(pairs, &opened.file)?,
+            None => phases::found(&log, &unit, &environment),
+        };
         Ok(Flight {
+            phases,
+            are_phases_told: opened.text.phases.is_some(),
             log: only(&log, &rows),
             held: (held.len() >= LEAST_ROWS).then(|| only(&log, &held)),
             windows: parted,
@@ -79,6 +95,21 @@ impl Flight {
             environment,
             thinned,
         })
+    }
+
+    /// What it did when, in words.
+    pub fn phases_line(&self) -> String {
+        let first_s = self.whole.start_s.first().copied().unwrap_or(0.0);
+        phases::line(&self.phases, self.are_phases_told, first_s)
+    }
+
+    /// \[s\] spans in which nothing moves, of rows of it: as its file says, or as they are found.
+    pub fn rests(&self, log: &Log, unit: &UnitDescription) -> Vec<(f64, f64)> {
+        if self.are_phases_told {
+            phases::still(&self.phases)
+        } else {
+            rests(log, unit, &self.environment)
+        }
     }
 
     /// Names of channels.

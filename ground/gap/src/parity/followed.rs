@@ -34,6 +34,7 @@ pub struct Followed {
     motion: OnceCell<Smoothing>,
     calibrated: OnceCell<DMatrix<f64>>,
     environment: Environment,
+    rests: Vec<(f64, f64)>,
     start: Start,
 }
 
@@ -45,12 +46,13 @@ impl Followed {
         let environment = flight.environment;
         let (course, start) = Course::of(&log, &unit, &environment);
         Self {
-            log,
-            unit,
             course,
             smoothed: OnceCell::new(),
             motion: OnceCell::new(),
             calibrated: OnceCell::new(),
+            rests: flight.rests(&log, &unit),
+            log,
+            unit,
             environment,
             start,
         }
@@ -65,7 +67,14 @@ impl Followed {
             return Ok(known);
         }
         let course = (&self.course, &self.start);
-        let smoothed = Smoothed::of(&self.log, &self.unit, &self.environment, course, progress)?;
+        let smoothed = Smoothed::of(
+            &self.log,
+            &self.unit,
+            &self.environment,
+            course,
+            self.rests.clone(),
+            progress,
+        )?;
         Ok(self.smoothed.get_or_init(|| smoothed))
     }
 

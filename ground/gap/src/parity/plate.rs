@@ -29,8 +29,9 @@ use crate::{
     input::case::CaseError,
     parity::{
         flight::Flight,
+        phases,
         plate::{
-            filter::{At, Course},
+            filter::{At, Course, Stay},
             magnets::{Added, Weighed},
             sensors::Sensors,
             shaken::{Knock, Line},
@@ -123,16 +124,17 @@ impl Findings {
         let model = |is_still| sensors.model(&flight.unit, &flight.environment, &opened.text.environment, is_still);
         let rests = still::rests(&samples, &begins, &model(true));
         let is_begun_at_rest = rests.first().copied().unwrap_or(false);
+        let stays = stays(flight, t_s, &begins, &rests);
         let nothing = model(is_begun_at_rest);
         let first = still::first(&samples, &nothing);
         let weighed = match sensors.has_field() {
-            true => Weighed::of(&samples, &begins, &rests, first, nothing, &|share| {
+            true => Weighed::of(&samples, &begins, &stays, first, nothing, &|share| {
                 progress("field", share)
             }),
             false => Weighed::unseen(nothing),
         };
         progress("attitude", 0.0);
-        let along = |model| Course::of(&samples, &begins, &rests, first, &model);
+        let along = |model| Course::of(&samples, &begins, &stays, first, &model);
         let (without, best, wary) = (along(nothing), along(weighed.model()), along(weighed.wary()));
         let is_supposed = wary.misfit[1] <= VELOCITY_MISFIT;
         Ok(Self {
@@ -217,4 +219,24 @@ impl Findings {
         let matters = is_off || !self.untold().is_empty();
         Outcome::of(names, f64::from(u8::from(matters)), f64::from(u8::from(is_off)), false)
     }
+}
+
+/// What holds the velocity of each node: phases that are told come before what is seen.
+fn stays(flight: &Flight, t_s: &[f64], begins: &[usize], rests: &[bool]) -> Vec<Stay> {
+    let told = flight.are_phases_told.then(|| phases::still(&flight.phases));
+    let nodes = begins.iter().map(|at| t_s[*at]).zip(rests);
+    let stay = |(from_s, is_rest): (f64, &bool)| {
+        let is_still = match &told {
+            Some(spans) => spans
+                .iter()
+                .any(|(first_s, last_s)| (*first_s..*last_s).contains(&from_s)),
+            None => *is_rest,
+        };
+        match (phases::flies(&flight.phases, from_s), is_still) {
+            (true, _) => Stay::Flies,
+            (false, true) => Stay::Still,
+            (false, false) => Stay::About,
+        }
+    };
+    nodes.map(stay).collect()
 }

@@ -108,7 +108,7 @@ pub struct Smoothed {
 }
 
 impl Smoothed {
-    /// Of a log.
+    /// Of a log, in which the unit rests in these spans \[s\].
     ///
     /// # Errors
     /// When the unit's description names an effect there is not.
@@ -117,9 +117,9 @@ impl Smoothed {
         unit: &UnitDescription,
         environment: &Environment,
         (course, start): (&Course, &Start),
+        rests: Vec<(f64, f64)>,
         progress: &dyn Fn(f64),
     ) -> Result<Self, CaseError> {
-        let rests = rests::rests(log, unit, environment);
         let (first_s, last_s) = (log.start_s[0], log.start_s[log.start_s.len() - 1]);
         let slots_s = || unit.channels.iter().map(|channel| channel.slot_s);
         let (earliest_s, latest_s) = (slots_s().fold(0.0, f64::min), slots_s().fold(0.0, f64::max));

@@ -42,6 +42,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
         findings.rows
     );
     out += &parted(flight);
+    out += &flight.phases_line();
     out += &seen_and_not(findings);
     let _ = writeln!(
         out,

@@ -45,6 +45,17 @@ const VELOCITY_S: f64 = 1.0;
 /// [m/s] of a unit that stands still: a node of rest.
 const STILL_M_S: f64 = 0.005;
 
+/// What holds the velocity of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stay {
+    /// It stands still.
+    Still,
+    /// It stays about a place.
+    About,
+    /// Nothing: it flies.
+    Flies,
+}
+
 type State = SVector<f64, STATES>;
 type Square = SMatrix<f64, STATES, STATES>;
 
@@ -143,10 +154,10 @@ pub fn begins(samples: &Samples) -> Vec<usize> {
 }
 
 impl Course {
-    /// Of a log whose attitude is about this at the begin; `rests` says of every node whether the plate stands still.
-    pub fn of(samples: &Samples, begins: &[usize], rests: &[bool], begin: UnitQuaternion<f64>, model: &Model) -> Self {
+    /// Of a log whose attitude is about this at the begin; `stays` says of every node what holds its velocity.
+    pub fn of(samples: &Samples, begins: &[usize], stays: &[Stay], begin: UnitQuaternion<f64>, model: &Model) -> Self {
         let mut steps = Vec::with_capacity(begins.len());
-        let (evidence, misfit) = forwards(samples, begins, rests, begin, model, &mut |step| steps.push(step));
+        let (evidence, misfit) = forwards(samples, begins, stays, begin, model, &mut |step| steps.push(step));
         Self {
             nodes: backwards(steps),
             evidence,
@@ -156,8 +167,8 @@ impl Course {
 }
 
 /// \[nats\] evidence of a model: every look is predicted from those before it alone.
-pub fn evidence(samples: &Samples, begins: &[usize], rests: &[bool], begin: UnitQuaternion<f64>, model: &Model) -> f64 {
-    forwards(samples, begins, rests, begin, model, &mut |_| ()).0
+pub fn evidence(samples: &Samples, begins: &[usize], stays: &[Stay], begin: UnitQuaternion<f64>, model: &Model) -> f64 {
+    forwards(samples, begins, stays, begin, model, &mut |_| ()).0
 }
 
 /// Where it begins.
@@ -189,7 +200,7 @@ fn begun(t_s: f64, q_nb: UnitQuaternion<f64>, model: &Model) -> At {
 fn forwards(
     samples: &Samples,
     begins: &[usize],
-    rests: &[bool],
+    stays: &[Stay],
     begin: UnitQuaternion<f64>,
     model: &Model,
     keep: &mut dyn FnMut(Step),
@@ -198,7 +209,7 @@ fn forwards(
     let mut now = begun(t_s[0], begin, model);
     let (mut evidence, mut misfit, mut looks) = (0.0, [0.0; 2], [0.0; 2]);
     let mut looked_s = t_s[0];
-    for (pair, is_rest) in begins.windows(2).zip(rests) {
+    for (pair, stay) in begins.windows(2).zip(stays) {
         let bias: Vector3<f64> = now.state.fixed_rows::<3>(BIAS).into_owned();
         let matrix = Matrix3::from_fn(|row, column| now.state[MATRIX + 3 * row + column]);
         let node = Node::of(
@@ -221,7 +232,7 @@ fn forwards(
             q_nb: node.q_nb,
             state,
             covariance,
-            is_rest: *is_rest,
+            is_rest: *stay == Stay::Still,
         };
         let predicted = (next.q_nb, next.state, next.covariance);
         let mut look = |kind: usize, slopes: &SMatrix<f64, 3, STATES>, off: Vector3<f64>, sigma: f64, next: &mut At| {
@@ -240,8 +251,12 @@ fn forwards(
             let off = field_n - model.field_n_ut - slopes * next.state;
             look(0, &slopes, off, model.field, &mut next);
         }
-        let sigma = if *is_rest { STILL_M_S } else { model.velocity };
-        if *is_rest || next.t_s - looked_s >= VELOCITY_S {
+        let sigma = match stay {
+            Stay::Still => Some(STILL_M_S),
+            Stay::About => (next.t_s - looked_s >= VELOCITY_S).then_some(model.velocity),
+            Stay::Flies => None,
+        };
+        if let Some(sigma) = sigma {
             looked_s = next.t_s;
             let mut slopes = SMatrix::<f64, 3, STATES>::zeros();
             slopes.fixed_columns_mut::<3>(VELOCITY).copy_from(&Matrix3::identity());

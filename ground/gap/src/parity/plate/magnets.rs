@@ -13,7 +13,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::{
     parity::plate::{
-        filter::{Model, evidence},
+        filter::{Model, Stay, evidence},
         samples::Samples,
     },
     thresholds::ADDED_NATS,
@@ -56,12 +56,12 @@ impl Weighed {
     pub fn of(
         samples: &Samples,
         begins: &[usize],
-        rests: &[bool],
+        stays: &[Stay],
         begin: UnitQuaternion<f64>,
         nothing: Model,
         progress: &dyn Fn(f64),
     ) -> Self {
-        let of = |model: &Model| evidence(samples, begins, rests, begin, model);
+        let of = |model: &Model| evidence(samples, begins, stays, begin, model);
         let without = of(&nothing);
         let to_plate = WANDERS.map(|wander| Model {
             iron: [ADDED_UT, wander],

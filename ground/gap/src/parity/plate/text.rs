@@ -42,6 +42,7 @@ pub fn screen(flight: &Flight, findings: &Findings) -> String {
         CAN_BE_NAMED.join(", "),
         nulls().join("; ")
     );
+    out += &flight.phases_line();
     if !findings.is_begun_at_rest {
         out += "BEGIN   the log does not begin at rest: its first attitude is a guess of 30 deg, and zeros of the gyros are found on the way\n";
     }
