@@ -142,11 +142,11 @@ pub fn still(stretches: &[Stretch]) -> Vec<(f64, f64)> {
     own.map(|own| (own.from_s, own.to_s)).collect()
 }
 
-/// Whether the unit is under way then.
+/// Whether the unit is under way then, or within [`BIN_S`] of it: no phase is known more finely.
 pub fn flies(stretches: &[Stretch], t_s: f64) -> bool {
     stretches
         .iter()
-        .any(|own| own.phase.is_flight() && (own.from_s..own.to_s).contains(&t_s))
+        .any(|own| own.phase.is_flight() && (own.from_s - BIN_S..own.to_s + BIN_S).contains(&t_s))
 }
 
 /// Whether the first phase of a flight that the log has is one under way: it began before the log did.
