@@ -23,7 +23,6 @@ mod consensus;
 mod gyros;
 mod health;
 mod repeat;
-mod root;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -37,13 +36,13 @@ use crate::{
     calibration::{Channel, Measured, Set},
     geometry::{PLATES, TRIAD_AXES},
     redundancy::{Known, Solution},
+    root::{reciprocal_root, root},
     sample::{Kind, Reading},
 };
 
 use gyros::Gyros;
 pub use health::{SensorHealth, Verdict};
 use repeat::Repeats;
-use root::{reciprocal_root, root};
 use triads::{Apart, Triads};
 use vector_rate::{Direction, RateError, VectorRate};
 

@@ -82,7 +82,7 @@ use self::{
     kept::Going,
     measured::Measured,
     passage::walks,
-    pending::{Pace, Pending},
+    pending::{Pace, Pending, Stage},
     rest::Contradicted,
     spell::Spell,
     start::UNKNOWN,
@@ -112,7 +112,7 @@ pub struct Filter {
     correction: Correction,
     /// What it still has to do.
     pending: Pending,
-    /// Nothing of it is to be done in the next step.
+    /// Nothing of it but what is known of the iron is to be done in the next step.
     spared: bool,
     /// How often the covariance was complete, round and round.
     settlements: u8,
@@ -257,8 +257,8 @@ impl Filter {
             if since_s >= LONG_STEP_S {
                 self.correct_now(outcome);
             }
-        } else if !self.pending.is_done() && !self.spared {
-            let pace = if since_s < LONG_STEP_S {
+        } else if !self.pending.is_done() && (!self.spared || self.pending.stage() == Stage::Learn) {
+            let pace = if since_s < LONG_STEP_S || self.spared {
                 Pace::Small
             } else {
                 Pace::Large
@@ -311,10 +311,11 @@ impl Filter {
     /// The iron, from the window's field.
     pub(super) fn learn_iron(&mut self) {
         let (iron_b, duration_s) = (self.iron.iron_b, self.measured.means.duration_s);
-        if let Some(sums) = self.measured.sums.if_any()
-            && self.iron.learn(&self.params, duration_s, sums)
-        {
-            self.reference.have_other_iron(&self.params, &iron_b);
+        if let Some(sums) = self.measured.sums.if_any() {
+            if self.iron.learn(&self.params, duration_s, sums) {
+                self.reference.have_other_iron(&self.params, &iron_b);
+            }
+            self.reference.follow(&self.params, &self.iron.iron_b);
         }
         self.keep_finite();
     }

@@ -48,6 +48,7 @@ pub mod rail;
 pub mod redundancy;
 pub mod resume;
 pub mod retained;
+mod root;
 pub mod sample;
 pub mod spin;
 pub mod triad;

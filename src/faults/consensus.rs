@@ -8,8 +8,8 @@
 
 use nalgebra::Vector3;
 
-use super::root::reciprocal_root;
 use crate::redundancy::{Known, Seen, Solution, solve_seen};
+use crate::root::reciprocal_root;
 
 /// Standard deviations. Beyond it a value is not used; it changes the vector by at most a quarter of that unnoticed.
 pub(super) const GATE: f32 = 6.0;

@@ -21,7 +21,6 @@ use nalgebra::{ComplexField, Matrix3, SMatrix, Vector3, Vector4};
 use super::{
     Cycle,
     health::Verdict,
-    root::{reciprocal_root, root},
     trace::{Limits, Systematic},
     watch::{QUIET, Watch},
 };
@@ -29,6 +28,7 @@ use crate::{
     calibration::{Axis, Uncertainty},
     geometry::PLATES,
     redundancy::{Known, Solution, matrix, solve},
+    root::{reciprocal_root, root},
 };
 
 /// Means over one and five seconds: 2e-7 and 3e-6 a test. Lower than for single axes, as there is one test, not 24, and as a

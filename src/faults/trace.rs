@@ -9,7 +9,7 @@
 //! What is systematic is the same for all sensors of a kind, so it is kept once for all their axes ([`Systematic`]), and
 //! every axis keeps its disagreements in the same [`Place`]s.
 
-use super::root::root;
+use crate::root::root;
 
 /// Cycles: those within one second of the first faulty one at 5 Hz, itself included.
 pub(super) const SHORT: usize = 6;

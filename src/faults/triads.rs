@@ -16,7 +16,6 @@ use super::{
     Cycle,
     consensus::{Disagreement, agreed},
     health::Verdict,
-    root::root,
     trace::{Limits, Systematic, larger},
     watch::{QUIET, Watch},
 };
@@ -24,6 +23,7 @@ use crate::{
     calibration::{Axis, Uncertainty},
     geometry::{PLATES, TRIAD_AXES},
     redundancy::{Known, Seen, Solution, solve_seen},
+    root::root,
 };
 
 /// Means over one and five seconds, for less than one false alarm of 24 axes in ten hours of simulated rest. Sum of squares:

@@ -11,9 +11,9 @@
 
 use super::{
     health::Verdict,
-    root::{reciprocal_root, root},
     trace::{Added, Bounds, LONG, Limits, Place, Trace, WILD, larger},
 };
+use crate::root::{reciprocal_root, root};
 
 /// Cycles the learned offset goes back: 200 s at 5 Hz. Large: steps are seen sharper. Small: drifts are followed.
 pub(super) const MEMORY: f32 = 1000.0;

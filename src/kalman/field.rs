@@ -19,7 +19,7 @@ use super::{
     innovation::Noise,
     square,
 };
-use crate::attitude::sin_cos;
+use crate::{attitude::sin_cos, root::root};
 
 /// The expected field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,7 +123,8 @@ impl Reference {
         let (sin_d, cos_d) = sin_cos(self.declination);
         let (x, y) = (mean.mag_n.x, mean.mag_n.y);
         let (north, east) = (cos_d * x + sin_d * y, cos_d * y - sin_d * x);
-        let (norm, horizontal) = (mean.mag_n.norm(), ComplexField::sqrt(north * north + east * east));
+        let norm = root(mean.mag_n.norm_squared());
+        let horizontal = ComplexField::sqrt(north * north + east * east);
         let dip = RealField::atan2(mean.mag_n.z, horizontal);
         if !(horizontal > LEAST_HORIZONTAL * norm && self.norm_ut > 0.0) {
             return None;
@@ -190,25 +191,41 @@ impl Reference {
         }
     }
 
-    /// The mean field so far, while the reference is young, and norm, dip and direction of it without `iron_b` \[uT\].
+    /// The mean field so far, while the reference is young.
     pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums, iron_b: &Vector3<f32>) {
-        if self.learnt_s.is_infinite() {
+        if !self.is_young(params) {
             return;
         }
-        let learning = self.learnt_s < params.learn_s;
-        if learning {
-            self.learnt_s += duration_s;
-            let part = duration_s / self.learnt_s;
-            self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
-            self.turned += (sums.turned / sums.count - self.turned) * part;
-        }
-        let field_n = self.raw_n - self.turned * iron_b;
+        self.learnt_s += duration_s;
+        let part = duration_s / self.learnt_s;
+        self.raw_n += (sums.total_n / sums.count - self.raw_n) * part;
+        self.turned += (sums.turned / sums.count - self.turned) * part;
         if self.found {
-            let points_at = RealField::atan2(field_n.y, field_n.x);
-            if learning {
-                self.found_at = points_at;
-            }
-            self.declination = points_at - self.found_at;
+            let field_n = self.without(iron_b);
+            self.found_at = RealField::atan2(field_n.y, field_n.x);
+        }
+        self.take_off(iron_b);
+    }
+
+    /// Norm, dip and direction without `iron_b` \[uT\], which was learnt: of a young reference they follow when it learns.
+    pub(super) fn follow(&mut self, params: &Params, iron_b: &Vector3<f32>) {
+        if self.learnt_s.is_finite() && !self.is_young(params) {
+            self.take_off(iron_b);
+        }
+    }
+
+    fn is_young(&self, params: &Params) -> bool {
+        self.learnt_s < params.learn_s
+    }
+
+    fn without(&self, iron_b: &Vector3<f32>) -> Vector3<f32> {
+        self.raw_n - self.turned * iron_b
+    }
+
+    fn take_off(&mut self, iron_b: &Vector3<f32>) {
+        let field_n = self.without(iron_b);
+        if self.found {
+            self.declination = RealField::atan2(field_n.y, field_n.x) - self.found_at;
         }
         self.norm_ut = field_n.norm();
         self.dip = RealField::atan2(field_n.z, ComplexField::sqrt(field_n.xy().norm_squared()));

@@ -76,7 +76,7 @@ impl Pending {
         let own = free.first_mut()?;
         self.passage.carry(start, row, &mut own.column);
         if let Row::Velocity(axis) = *row {
-            self.velocity[axis] = own.column;
+            self.velocity[axis].become_as(&own.column);
         }
         Some((seen, own))
     }

@@ -9,7 +9,10 @@ use super::{
     Filter, HALF_A_MILLISECOND, path, seconds, square,
     step::{Sampled, Step},
 };
-use crate::attitude::{dcm_nb, from_rotation_vector, renormalised};
+use crate::{
+    attitude::{dcm_nb, from_rotation_vector, renormalised},
+    root::root,
+};
 
 impl Filter {
     /// Attitude over `covered_s` by the gyros and over `gap_s` by the latest rate known; its matrix.
@@ -31,7 +34,7 @@ impl Filter {
         let after = dcm_nb(&self.q_nb);
         let params = &self.params;
         let mut variance = params.angle_noise * params.angle_noise * (covered_s + gap_s)
-            + params.turn_noise * params.turn_noise * (gyro_b - wrong_b + bridged_b).norm();
+            + params.turn_noise * params.turn_noise * root((gyro_b - wrong_b + bridged_b).norm_squared());
         // The rate missed is one and the same all through a gap, however many steps it lasts.
         let silent_s = self.silent_s + gap_s;
         variance += square(params.gap_rate_sd) * (square(silent_s) - square(self.silent_s));

@@ -33,7 +33,7 @@ impl Filter {
         self.window.duration_s + since_s >= self.params.window_s - HALF_A_MILLISECOND
     }
 
-    /// Leaves the next step to others: what is pending waits for the one after it.
+    /// Leaves the next step to others: what is pending waits for the one after it, but for what is known of the iron, which is little.
     pub fn spare(&mut self) {
         self.spared = true;
     }

@@ -32,7 +32,19 @@ impl State {
         drivers: [0.0; DRIVERS],
     };
 
+    /// Becomes as another one.
+    ///
+    /// Not inlined: for a copy within one structure the compiler calls what copies what may overlap, at a hundred instructions.
+    #[inline(never)]
+    pub fn become_as(&mut self, other: &State) {
+        self.driven = other.driven;
+        self.drivers = other.drivers;
+    }
+
     /// Scalar product.
+    ///
+    /// Not inlined, so that a [`Row`] which sees one state alone is: most do.
+    #[inline(never)]
     pub fn dot(&self, other: &State) -> f32 {
         dot(&self.driven, &other.driven) + dot(&self.drivers, &other.drivers)
     }
@@ -80,6 +92,7 @@ pub(super) enum Row<'a> {
 
 impl Row<'_> {
     /// What it sees of this one.
+    #[inline]
     pub fn of(&self, state: &State) -> f32 {
         match *self {
             Row::Velocity(axis) => {

@@ -13,6 +13,7 @@ use super::{
     state::DRIVERS,
     step::{BEYOND_NOISE, Sampled},
 };
+use crate::root::root;
 
 /// Running sums.
 #[derive(Clone, Debug)]
@@ -236,7 +237,7 @@ impl Window {
             return 0.0;
         }
         let part = (self.duration_s / EXCESS_S).min(1.0);
-        let now = self.acc.integral_mean().norm() - params.gravity;
+        let now = root(self.acc.integral_mean().norm_squared()) - params.gravity;
         self.excess_before + (now - self.excess_before) * part
     }
 
@@ -287,8 +288,8 @@ impl Window {
             (0.0, Vector3::zeros(), 0.0)
         };
         let near_one_g = sampled
-            && ComplexField::abs(acc_n.norm() - params.gravity)
-                < MEAN_NEAR_ONE_G * params.gravity + SHAKEN * ComplexField::sqrt(acc_spread);
+            && ComplexField::abs(root(acc_n.norm_squared()) - params.gravity)
+                < MEAN_NEAR_ONE_G * params.gravity + SHAKEN * root(acc_spread);
         let vertical = near_one_g && !(lift_off && self.far_from_one_g);
         let vertical_s = if vertical { self.duration_s } else { 0.0 };
         let rest = !lift_off

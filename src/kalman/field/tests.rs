@@ -243,7 +243,7 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
         // Iron that is learnt later turns the field away from where it was found, as long as it is the same iron.
         let (samples, other_b) = (samples(&mut draws, 0.1), iron_b + draws.vector(3.0));
         let mut later = reference;
-        later.learn(&params, 1.0, &sums(&samples), &other_b);
+        later.follow(&params, &other_b);
         let field_n = (weighted_n - turned * other_b.cast::<f64>()) / lasted_s;
         assert!(near(later.norm_ut, field_n.norm(), 1e-4, 1e-3), "{seed}");
         if !at_site {
@@ -253,7 +253,7 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
         // Another iron: the field without the one before stands, whatever is learnt of the new one.
         let (norm_ut, dip) = (later.norm_ut, later.dip);
         later.have_other_iron(&params, &other_b);
-        later.learn(&params, 1.0, &sums(&samples), &draws.vector(20.0));
+        later.follow(&params, &draws.vector(20.0));
         assert!(
             near(later.norm_ut, norm_ut.into(), 1e-4, 0.0) && near(later.dip, dip.into(), 1e-4, 1e-5),
             "{seed}"
@@ -272,6 +272,9 @@ fn a_young_reference_is_learnt_afresh_with_other_iron() {
     ] {
         let mut young = reference;
         young.learn(&params, 0.999 * params.learn_s, &window, &Vector3::zeros());
+        let learnt = young;
+        young.follow(&params, &Vector3::x());
+        assert_eq!(young, learnt);
         let mut complete = reference;
         complete.learn(&params, params.learn_s, &window, &Vector3::zeros());
         let stood = complete;
@@ -284,5 +287,6 @@ fn a_young_reference_is_learnt_afresh_with_other_iron() {
     // That of a site is not learnt at all.
     let mut known = Reference::known(40.0, 1.0, 0.1);
     known.learn(&params, 1.0, &window, &Vector3::zeros());
+    known.follow(&params, &Vector3::x());
     assert_eq!(known, Reference::known(40.0, 1.0, 0.1));
 }

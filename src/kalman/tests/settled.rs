@@ -74,12 +74,16 @@ fn the_covariance_asked_for_is_that_of_the_latest_window() {
     world.fly(STEP_S, Vector3::zeros(), nothing);
     let (asked, mut stages) = (world.filter.covariance(), 0);
     while !world.filter.pending.is_done() {
-        // It is the same whenever it is asked for, and a step that is left to others does nothing.
+        // It is the same whenever it is asked for, and a step that is left to others does nothing but
+        // learn of the iron.
         assert!(near(world.filter.covariance().worst(), asked.worst().into(), 1e-5, 0.0));
-        let stage = world.filter.pending.stage();
+        let mut stage = world.filter.pending.stage();
         if stages % 2 == 0 {
             world.filter.spare();
             world.fly(STEP_S, Vector3::zeros(), nothing);
+            if stage == Stage::Learn {
+                (stage, stages) = (Stage::Passage, stages + 1);
+            }
             assert_eq!(world.filter.pending.stage(), stage, "spared");
         }
         match world.filter.settled() {
