@@ -30,6 +30,7 @@ use crate::{
     orbit, peers,
     plausible::{self, Implausible},
     plots,
+    rails::{self, NoRails},
     recording::{self, RecordingError},
     reference,
 };
@@ -57,6 +58,9 @@ pub struct Arguments {
     /// Seconds to add to the reference's times to have the log's [default: 0]
     #[arg(long, value_name = "SECONDS", requires = "reference", allow_hyphen_values = true)]
     pub offset_s: Option<f64>,
+    /// The unit's flight log, image or dump: launch rails that its attitude took at its latest start are taken from it
+    #[arg(long, value_name = "FILE", requires = "log")]
+    pub flight_log: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
     pub units: Units,
@@ -110,6 +114,9 @@ pub enum AttitudeError {
     /// A calibration set for a log that is not in counts.
     #[error("{0}: a nine-axis log is in SI already; sets are for counts: packets, or CSV of `ground decode --counts`")]
     NotCounts(String),
+    /// A flight log cannot be used.
+    #[error(transparent)]
+    Rails(#[from] NoRails),
     /// A calibration set cannot be used.
     #[error(transparent)]
     Set(#[from] NoSet),
@@ -259,9 +266,13 @@ fn of_unit(
     for file in &arguments.sets {
         sets.push(methods::read(file, &settings)?);
     }
+    let rails = match &arguments.flight_log {
+        Some(file) => rails::read(file)?,
+        None => Vec::new(),
+    };
     let count = sets.len() * cycles.len();
     let began = Instant::now();
-    let mut runs = methods::run(sets, &settings, cycles, reference);
+    let mut runs = methods::run(sets, &settings, cycles, &rails, reference);
     let took_s = began.elapsed().as_secs_f64();
     if runs.iter().all(|run| run.flight.estimates.is_empty()) {
         return Ok(None);
@@ -284,6 +295,10 @@ fn of_unit(
     }
     let Some(last) = runs.pop() else { return Ok(None) };
     say(format!("looked at closer            {}\n", last.name));
+    let [taken, left] = last.flight.rails;
+    if taken + left > 0 {
+        say(format!("launch rails                {taken} taken, {left} not\n"));
+    }
     let [equal, other] = last.flight.replayed;
     if equal + other > 0 {
         say(format!(

@@ -21,6 +21,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::{
     log::Cycle,
+    rails::Taken,
     recording::{Row, attitude_at},
     score::{Rmse, Score},
     whiteness::Check,
@@ -58,6 +59,8 @@ pub struct Flight {
     pub aligned_s: Vec<f64>,
     /// Cycles that are, bit for bit, what the unit sent, and those that are not.
     pub replayed: [usize; 2],
+    /// Launch rails that the attitude took, and those that it did not: there was no attitude, or they contradict it.
+    pub rails: [usize; 2],
 }
 
 /// Errors against a reference.
@@ -102,10 +105,15 @@ impl Flight {
         flight
     }
 
-    /// Estimates a unit's log as the unit does.
-    pub fn of_unit<'a>(mut estimator: Estimator, cycles: impl IntoIterator<Item = &'a Cycle>) -> Self {
+    /// Estimates a unit's log as the unit does, with the launch rails that it took, each before the cycle that follows.
+    pub fn of_unit<'a>(mut estimator: Estimator, cycles: impl IntoIterator<Item = &'a Cycle>, rails: &[Taken]) -> Self {
         let mut flight = Flight::default();
+        let mut rails = rails.iter().peekable();
         for cycle in cycles {
+            while let Some(taken) = rails.next_if(|taken| taken.at_us < cycle.sample.start_us) {
+                let met = estimator.know_nose(&taken.rail.nose(), true);
+                flight.rails[usize::from(met != Some(Ok(())))] += 1;
+            }
             let (estimate, outcome) = estimator.step_in_full(&cycle.sample, &cycle.increments);
             if let Some(sent) = &cycle.sent {
                 let again = Derived { estimate, ..**sent };

@@ -22,6 +22,7 @@ pub mod orbit;
 pub mod peers;
 pub mod plausible;
 pub mod plots;
+pub mod rails;
 pub mod recording;
 pub mod reference;
 pub mod replay;

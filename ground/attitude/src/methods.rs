@@ -18,6 +18,7 @@ use nalgebra::Vector3;
 use crate::{
     flight::{Comparison, Flight},
     log::Cycle,
+    rails::Taken,
     recording::Row,
 };
 
@@ -68,10 +69,16 @@ pub fn read(file: &Path, settings: &Settings) -> Result<(String, Set), NoSet> {
     Ok((format!("{methods}, {name}"), image.set))
 }
 
-/// The log by each of the sets.
-pub fn run(sets: Vec<(String, Set)>, settings: &Settings, cycles: &[Cycle], reference: Option<&[Row]>) -> Vec<Run> {
+/// The log by each of the sets, with the launch rails that the unit took.
+pub fn run(
+    sets: Vec<(String, Set)>,
+    settings: &Settings,
+    cycles: &[Cycle],
+    rails: &[Taken],
+    reference: Option<&[Row]>,
+) -> Vec<Run> {
     let of = |(name, set)| {
-        let flight = Flight::of_unit(Estimator::new(set, &settings.site), cycles);
+        let flight = Flight::of_unit(Estimator::new(set, &settings.site), cycles, rails);
         let met = reference.and_then(|rows| flight.compare(rows));
         Run { name, flight, met }
     };

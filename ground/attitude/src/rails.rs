@@ -1,0 +1,89 @@
+//! The launch rails that a unit's attitude took, from its flight log.
+//!
+//! In: a flight log, an image of the chip or a dump. Out: of the unit's latest start in the newest epoch each rail, in the order they
+//! were taken, and when by the unit's clock. The stream of packets has none of them, and without them the attitude from the first rail
+//! on is not the unit's.
+//!
+//! Refuses a file that holds no record of a log.
+
+use std::{
+    io::{self, Read},
+    path::Path,
+};
+
+use emems::{mode::Cause, rail::Rail};
+use packets::input;
+use recorder::log::{self, LIMIT, Log, LogError};
+
+/// A rail that the unit's attitude took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// \[us\] when, by the unit's clock.
+    pub at_us: u64,
+    /// What it took.
+    pub rail: Rail,
+}
+
+/// Why no rails are read.
+#[derive(Debug, thiserror::Error)]
+pub enum NoRails {
+    /// The file cannot be read.
+    #[error("{file}: {error}")]
+    Io {
+        /// Which.
+        file: String,
+        /// Why.
+        error: io::Error,
+    },
+    /// It is no log that this program reads.
+    #[error("{file}: {error}")]
+    Log {
+        /// Which.
+        file: String,
+        /// Why.
+        error: LogError,
+    },
+    /// It holds nothing of a log.
+    #[error("{0}: no record of a flight log; an image of the chip or what `ground dump` wrote is wanted")]
+    Nothing(String),
+}
+
+/// Those of a file.
+///
+/// # Errors
+/// When it cannot be read, or is no flight log.
+pub fn read(path: &Path) -> Result<Vec<Taken>, NoRails> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    let content = input::open(path).and_then(|content| content.take(LIMIT + 1).read_to_end(&mut bytes));
+    if let Err(error) = content {
+        return Err(NoRails::Io { file, error });
+    }
+    let log = match log::read(&bytes) {
+        Ok(log) => log,
+        Err(error) => return Err(NoRails::Log { file, error }),
+    };
+    if log.headers.is_empty() && log.changes.is_empty() && log.packets.is_empty() {
+        return Err(NoRails::Nothing(file));
+    }
+    Ok(of(&log))
+}
+
+/// Those of a log.
+pub fn of(log: &Log) -> Vec<Taken> {
+    let starts = log.headers.keys().chain(log.changes.keys()).chain(log.packets.keys());
+    let latest = starts.map(|key| (key.epoch, key.boot)).max();
+    let of_latest = log
+        .changes
+        .iter()
+        .filter(|(key, _)| Some((key.epoch, key.boot)) == latest);
+    of_latest
+        .filter_map(|(_, change)| match change.cause {
+            Cause::RailTaken(rail) => Some(Taken {
+                at_us: change.at_us,
+                rail,
+            }),
+            _ => None,
+        })
+        .collect()
+}
