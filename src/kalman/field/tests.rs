@@ -241,7 +241,7 @@ fn a_reference_is_the_mean_of_the_windows_while_it_is_young() {
         }
         assert!(lasted_s >= 20.0);
         // Iron that is learnt later turns the field away from where it was found, as long as it is the same iron.
-        let (samples, other_b) = (samples(&mut draws, 0.1), iron_b + draws.vector(3.0));
+        let other_b = iron_b + draws.vector(3.0);
         let mut later = reference;
         later.follow(&params, &other_b);
         let field_n = (weighted_n - turned * other_b.cast::<f64>()) / lasted_s;
