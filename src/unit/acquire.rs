@@ -151,6 +151,10 @@ pub async fn run<B: Board>(
             starts.keep(memory);
         }
         start = start.saturating_add(period);
+        // Not at once: the estimation of this cycle takes milliseconds in one piece through a spin, and a part that answers meanwhile
+        // would be heard too late.
+        let quiet = start.saturating_sub(period / 4 * 3);
+        votes.waiting(Voter::Acquire, shared.clock.until(quiet)).await;
         if after(Duration::from_micros(limit_us.saturating_mul(2))) < start
             && let Some(slot) = to_verify.next()
         {

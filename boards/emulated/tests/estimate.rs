@@ -6,7 +6,7 @@ mod bench;
 use bench::{MS, Tape, image, world};
 use emems::{
     board::ResetCause,
-    derived::{self, Derived},
+    derived::{self, Derived, Health},
     estimate::Estimator,
     mode::Mode,
     sample::Sample,
@@ -31,6 +31,23 @@ fn tumbled() -> Tape {
     let plant = Plant::new(world("tumble"), 7);
     emulated::fly(image(), plant, &[], 30_000 * MS, &mut tape).expect("the image flies");
     tape
+}
+
+/// From lift-off on a step takes milliseconds in one piece. Nobody who waits for a part meanwhile takes it for silent.
+#[test]
+fn a_rocket_that_is_well_loses_no_sensor_while_its_spin_is_followed() {
+    let mut tape = Tape {
+        script: vec![(MS, b"G_DL".to_vec())],
+        ..Tape::default()
+    };
+    emulated::fly(image(), Plant::new(world("rocket"), 7), &[], 36_000 * MS, &mut tape).expect("the image flies");
+    assert!(tape.said().contains("lift-off: FLIGHT"), "{}", tape.said());
+    assert!(!tape.said().contains("lost"), "{}", tape.said());
+    let unwell = Health::RECONFIGURED.with(Health::BUS_RECOVERED);
+    let frames = tape.derived();
+    assert!(frames.iter().all(|frame| frame.health.0 & unwell.0 == 0));
+    let longest_us = frames.iter().map(|frame| frame.estimate_us).max();
+    assert!(longest_us > Some(2_000), "{longest_us:?}: no step was long");
 }
 
 #[test]
