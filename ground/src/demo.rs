@@ -484,7 +484,7 @@ mod tests {
         use super::*;
 
         #[test]
-        #[ignore = "long: cargo host-test-long"]
+        #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
         fn the_whole_loop_ends_with_a_page_and_names_what_was_withheld() {
             let place = tempfile::tempdir().expect("a folder");
             let arguments = Arguments {

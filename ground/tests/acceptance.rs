@@ -48,7 +48,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn faults_of_parts_are_named_on_the_image() {
         named(
             &[
@@ -73,7 +73,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn faults_of_wiring_are_named_on_the_image() {
         named(
             &[

@@ -145,7 +145,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_real_log_and_its_reference_become_a_case_on_one_clock() {
         let place = tempfile::tempdir().expect("a folder");
         let flight = flown(
@@ -244,7 +244,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn an_undisturbed_flight_is_a_case_without_a_gap_whatever_recorded_it() {
         let place = tempfile::tempdir().expect("a folder");
         for reference in ["exact", "optical", "table"] {
@@ -276,7 +276,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn what_was_done_to_the_unit_is_named_corrected_and_flown_as_a_twin() {
         let place = tempfile::tempdir().expect("a folder");
         let with = "--with gyro-scale=0.02@g2 --seed 4 --reference optical";
@@ -322,7 +322,7 @@ mod long {
 
     /// At rest a camera's rate is its noise, and the residual minus that: a factor of -1, of all gyros.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_table_that_rests_between_its_turns_has_no_factor_before_a_camera() {
         let place = tempfile::tempdir().expect("a folder");
         let (_, diagnosis) = diagnosed(&flown(place.path(), "--motion rotation-1 --reference optical"));

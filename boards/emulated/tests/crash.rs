@@ -116,7 +116,7 @@ mod long {
 
     /// U9: a copy of the mode is found by what it is in WAIT and in FLIGHT, and one bit of it is flipped.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_flipped_bit_of_the_mode_in_ram_is_put_right_and_said() {
         let flown = |commands: &[u8], faults: &[Scheduled]| {
             let mut tape = Tape {
@@ -156,7 +156,7 @@ mod long {
 
     /// U3: where arithmetic overflows, in FLIGHT and recording: the record is said, and is in the log at the next start.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_panic_leaves_a_crash_record_that_the_log_keeps() {
         let broken = image().with_panic(ESTIMATION).expect("an overflow that is seen");
         let mut tape = Tape {
@@ -199,7 +199,7 @@ mod long {
     /// U9: bits of the attitude filter flip in the RAM, one in seven packets. Each is found and said, and no frame is without an attitude
     /// or has one that is off by more than it says.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn flipped_bits_of_the_filter_in_ram_are_found_and_the_attitude_goes_on() {
         let (place, from) = covariance();
         // Any bit of any of the 25 numbers, both odd so that all of them have their turn.

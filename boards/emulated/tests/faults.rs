@@ -113,7 +113,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_bus_stuck_in_mid_transfer_is_used_again_when_it_is_free() {
         let begun_us = cycle_us();
         for offset_us in THROUGH_A_CYCLE_US {
@@ -138,7 +138,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_part_that_holds_sda_is_clocked_free() {
         // In a cycle it costs readings, between two the next reading of the accelerometers finds it.
         for (into_cycle_us, costs) in [(1_100, true), (30_000, false)] {
@@ -164,7 +164,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_part_that_hangs_lets_the_watchdog_bite_and_flight_is_resumed() {
         let hangs = 1_777;
         let mut tape = Tape {
@@ -196,7 +196,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_controller_that_sends_no_start_is_reset() {
         let begun_us = cycle_us();
         for into_cycle_us in [1_100, 3_700] {

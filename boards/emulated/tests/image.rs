@@ -372,7 +372,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn option_bytes_are_told_and_a_brown_out_reset_that_is_not_set_as_the_board_asks_is_said_at_the_start() {
         for (set_mv, read_out) in [(0, 0), (2100, 1), (2400, 2), (2700, 1)] {
             let mut plant = Plant::ideal(world("still"));

@@ -142,7 +142,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn cuts_at_random_instants_lose_no_record_and_end_in_flight() {
         let cuts = std::env::var("EMEMS_CUTS")
             .ok()
@@ -160,7 +160,7 @@ mod long {
 
     /// The shortest time after which a record was durable, by faults that leave less and less of it.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_record_is_durable_400_ms_after_a_power_cut_and_sooner_after_a_reset() {
         for (fault, longest) in [(Fault::PowerCut(2), BACK), (Fault::Reset, 150 * MS)] {
             let gaps: Vec<Nanos> = (0..6).map(|step| longest - step * 10 * MS).collect();
@@ -179,7 +179,7 @@ mod long {
 
     /// Fault F20: the voltage detector's interrupt draws WP# at once, whatever is under way.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_supply_that_fails_in_the_middle_of_an_operation_draws_write_protect() {
         let (mut under_way, quarter) = (0, MS / 4);
         // A record is programmed soon after its packet closes, 10 ms after each cycle began.
@@ -204,7 +204,7 @@ mod long {
 
     /// F20: the supply is gone for 20 ms at some instants of a cycle. The record that it stopped is taken after it.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_dip_of_20_ms_costs_no_record() {
         let mut stopped = 0;
         for after_ms in [0, 20, 60, 105, 150] {

@@ -359,7 +359,7 @@ mod tests {
         use super::*;
 
         #[test]
-        #[ignore = "long: cargo host-test-long"]
+        #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
         fn every_effect_disturbs_what_it_says_it_touches() {
             let named = disturbance::named();
             let (one, other) = named.split_at(named.len() / 2);
@@ -371,7 +371,7 @@ mod tests {
         }
 
         #[test]
-        #[ignore = "long: cargo host-test-long"]
+        #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
         fn a_seed_is_a_case() {
             let folder = tempfile::tempdir().expect("a folder");
             let card = Card {
@@ -387,7 +387,7 @@ mod tests {
         }
 
         #[test]
-        #[ignore = "long: cargo host-test-long"]
+        #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
         fn everything_novel_disturbs_what_it_says_it_touches() {
             disturb(novel::ALL);
         }

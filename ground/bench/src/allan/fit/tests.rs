@@ -168,7 +168,7 @@ mod long {
 
     /// Of 1,000 records, seven are one standard deviation of the count; the wanted 93 to 97 % are three of them.
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn intervals_hold_the_truth_in_93_to_97_of_100_records_whatever_the_noise_is_made_of() {
         let none = Noise::default();
         #[rustfmt::skip]

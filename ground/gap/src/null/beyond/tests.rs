@@ -137,7 +137,7 @@ mod long {
     use super::*;
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_slow_tilt_of_two_sigmas_may_be_the_references_and_one_of_twenty_or_a_sudden_one_is_not() {
         let tilt =
             |rad: f64, span: Option<Span>| worth("table-tilt", &[rad, 0.0], [3e-3, 0.0], span.map(Interval::from));
@@ -151,7 +151,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "long: cargo host-test-long"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_lever_arm_of_a_millimetre_may_be_the_references_and_one_of_centimetres_is_not() {
         let arm = |metres: f64, accuracy: [f64; 2]| worth("lever-arm", &[metres, 0.0, 0.0], accuracy, None);
         assert_eq!(
