@@ -9,8 +9,8 @@
 //! three turns a second turns by a degree in a millisecond. One whose question runs out of time is not read in that cycle, since it
 //! would stretch the clock once more; a second such question in a row loses it.
 //!
-//! After the packet is closed, one sensor in turn has its settings verified: a part that browned out by itself answers
-//! as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
+//! A quarter of the period after a cycle began, when it is estimated, one sensor in turn has its settings verified: a part that
+//! browned out by itself answers as before, but with its power-on settings (fault S12). Between two cycles the accelerometers are read some times more,
 //! for the estimation alone ([`forces`]). What fails then is left out and nothing is concluded from it: the next cycle will see.
 
 use core::fmt::Display;
@@ -151,10 +151,10 @@ pub async fn run<B: Board>(
             starts.keep(memory);
         }
         start = start.saturating_add(period);
-        // Not at once: the estimation of this cycle takes milliseconds in one piece through a spin, and a part that answers meanwhile
-        // would be heard too late.
-        let quiet = start.saturating_sub(period / 4 * 3);
-        votes.waiting(Voter::Acquire, shared.clock.until(quiet)).await;
+        // Not at once: through a spin the estimation of this cycle takes milliseconds in one piece, and what a part answers meanwhile
+        // would be heard after its time.
+        let estimated = start.saturating_sub(period / 4 * 3);
+        votes.waiting(Voter::Acquire, shared.clock.until(estimated)).await;
         if after(Duration::from_micros(limit_us.saturating_mul(2))) < start
             && let Some(slot) = to_verify.next()
         {
