@@ -16,6 +16,7 @@ pub mod regression;
 pub mod text;
 
 use nalgebra::{Matrix3, Vector3};
+use packets::magnitude::median;
 use twin::predict::{Kind, UnitDescription};
 
 use crate::{
@@ -86,9 +87,7 @@ pub fn look(unit: &UnitDescription, log: &Log) -> Vec<Beside> {
     let all: Vec<usize> = chips.iter().flat_map(Chip::channels).collect();
     let rows = whole(log, &all);
     let t_s: Vec<f64> = rows.iter().map(|row| log.start_s[*row]).collect();
-    let mut steps_s: Vec<f64> = log.start_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps_s.sort_by(f64::total_cmp);
-    let step_s = steps_s.get(steps_s.len() / 2).copied().unwrap_or(0.0);
+    let step_s = median(log.start_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
     let is_together = |chip: &Chip| (chip.slot_s(unit) - first.slot_s(unit)).abs() <= TOGETHER * step_s;
     let readings: Vec<Readings> = chips.iter().map(|chip| chip.readings(unit, log, &rows)).collect();
     let mean = |at: usize| readings.iter().map(|own| own.rates[at]).sum::<Vector3<f64>>() / readings.len() as f64;
@@ -157,7 +156,7 @@ impl Chip {
 }
 
 /// Directions of three channels, one a row.
-fn directions(unit: &UnitDescription, own: [usize; 3]) -> Matrix3<f64> {
+pub fn directions(unit: &UnitDescription, own: [usize; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| unit.channels[own[row]].axis_b[column])
 }
 

@@ -12,6 +12,7 @@
 //! All of it is linear in the unknowns, so rows are averaged over [`MEAN_S`] first: that costs nothing but noise, however fast the body spins.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use packets::magnitude::median;
 
 use crate::parity::chips::regression::{Fitted, Point};
 
@@ -137,9 +138,7 @@ fn spans(t_s: &[f64]) -> Vec<(usize, usize)> {
 }
 
 fn usual(t_s: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0)
 }
 
 /// Means over spans of the rows that may be used.

@@ -6,6 +6,7 @@
 //! time (Kuensch 1989).
 
 use nalgebra::{DMatrix, DVector, Vector3};
+use packets::magnitude::median;
 
 /// Blocks of time: sigmas are known to a fifth.
 const BLOCKS: usize = 12;
@@ -73,9 +74,8 @@ fn solved(points: &[&Point]) -> Option<DVector<f64>> {
             .map(|point| point.value - Vector3::from_iterator((&point.slopes * &theta).iter().copied()))
             .collect();
         let scales = Vector3::from_fn(|axis, _| {
-            let mut sizes: Vec<f64> = rests.iter().map(|rest| rest[axis].abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            (MEDIAN_TO_SIGMA * sizes[sizes.len() / 2]).max(f64::MIN_POSITIVE)
+            let middle = median(rests.iter().map(|rest| rest[axis].abs())).unwrap_or(0.0);
+            (MEDIAN_TO_SIGMA * middle).max(f64::MIN_POSITIVE)
         });
         for (weight, rest) in weights.iter_mut().zip(&rests) {
             *weight = Vector3::from_fn(|axis, _| {

@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Seen is the mean field of a node, `y = B + e + n + R h + d R (w x m) - th x y`: `e` what any room adds to the field, `n` what is added beside
-//! and stays in n (a magnet in the room), `h` what is fixed to the plate (iron, bias), `d` the delay of the magnetometers against the gyros, which nothing but a reference could tell from
-//! other motions, and which is free therefore. And once a second the velocity, which is none within what a unit that stays about a place
+//! and stays in n (a magnet in the room), `h` what is fixed to the plate (iron, bias), `d` the delay of the magnetometers
+//! against the gyros, which nothing but a reference could tell from other motions, and which is free therefore. And once a second the velocity, which is none within what a unit that stays about a place
 //! may have: a tilt of `t` rad makes `9.8 t` m/s a second of velocity that is not there.
 //!
 //! Backwards it is the fixed-interval smoother of Rauch et al. (1965), its errors those of the group.
@@ -42,7 +42,7 @@ pub const NODE_S: f64 = 0.2;
 /// \[s\] between looks at the velocity: for so long a hand's velocity stays alike.
 const VELOCITY_S: f64 = 1.0;
 
-/// [m/s] of a unit that stands still: a node of rest.
+/// [m/s] of a unit that stands still, assumed: a table that shakes by a millimetre at a hertz.
 const STILL_M_S: f64 = 0.005;
 
 /// What holds the velocity of a node.
@@ -90,6 +90,21 @@ pub struct Model {
     pub begin: [f64; 2],
 }
 
+/// A node, given the whole log.
+#[derive(Clone, Debug)]
+pub struct At {
+    /// \[s\]
+    pub t_s: f64,
+    /// Body to n.
+    pub q_nb: UnitQuaternion<f64>,
+    /// The others; the first three are nothing.
+    pub state: State,
+    /// Theirs; the first three of a turn in n.
+    pub covariance: Square,
+    /// Whether it rests.
+    pub is_rest: bool,
+}
+
 impl At {
     /// \[uT\] what is fixed to the plate, in b.
     pub fn iron(&self) -> Vector3<f64> {
@@ -107,21 +122,6 @@ impl At {
         let dcm = *self.q_nb.to_rotation_matrix().matrix();
         (dcm.transpose() * of_n * dcm).diagonal().map(|own| own.max(0.0).sqrt())
     }
-}
-
-/// A node, given the whole log.
-#[derive(Clone, Debug)]
-pub struct At {
-    /// \[s\]
-    pub t_s: f64,
-    /// Body to n.
-    pub q_nb: UnitQuaternion<f64>,
-    /// The others; the first three are nothing.
-    pub state: State,
-    /// Theirs; the first three of a turn in n.
-    pub covariance: Square,
-    /// Whether it rests.
-    pub is_rest: bool,
 }
 
 /// A log along a model.
@@ -185,8 +185,8 @@ fn begun(t_s: f64, q_nb: UnitQuaternion<f64>, model: &Model) -> At {
     put(DELAY, 1, model.delay_s);
     put(MATRIX, 9, model.matrix[1]);
     (0..3).for_each(|axis| sigmas[MATRIX + 4 * axis] = model.matrix[0]);
-    let tenth = sigmas.map(|sigma| (sigma * sigma).max(1e-18));
-    let mut covariance = Square::from_diagonal(&tenth);
+    let variances = sigmas.map(|sigma| (sigma * sigma).max(1e-18));
+    let mut covariance = Square::from_diagonal(&variances);
     (0..3).for_each(|axis| covariance[(FORCE_BIAS + axis, FORCE_BIAS + axis)] = model.force[1].powi(2));
     At {
         t_s,

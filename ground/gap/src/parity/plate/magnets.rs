@@ -19,15 +19,17 @@ use crate::{
     thresholds::ADDED_NATS,
 };
 
-/// [uT/sqrt(s)] how far what is added may wander.
+/// [uT/sqrt(s)] how far what is added may wander: nothing, and up to a magnet that is attached within seconds, in steps that the evidence
+/// tells apart.
 const WANDERS: [f64; 4] = [0.0, 0.3, 1.0, 3.0];
 
-/// \[uT\] of what is added, at the begin.
+/// \[uT\] of what is added, at the begin: as large as the Earth's field.
 const ADDED_UT: f64 = 30.0;
 
 /// \[uT\] and \[s\] of the room along which the attitude is told, and of one in which something is fixed to the plate, which wanders by so much
 /// [uT/sqrt(s)]. With them the attitude follows the field less than evidence would have it: a room errs alike for as long as the unit
-/// stays where it is, which no walk says, and an attitude that follows it is sure of a wrong heading.
+/// stays where it is, which no walk says, and an attitude that follows it is sure of a wrong heading. Chosen
+/// with the recordings of docs/gap/without-reference.md in view, whose NEES that page has.
 const WARY: [f64; 2] = [6.0, 2.0];
 const WARY_OF_PLATE: [f64; 2] = [10.0, 1.0];
 const WARY_WANDER: f64 = 1.0;

@@ -5,6 +5,7 @@
 //! may be missing.
 
 use nalgebra::{Matrix3, Vector3};
+use packets::magnitude::median;
 
 /// One kind of sensor along three directions: `[rows]`.
 #[derive(Clone, Debug, Default)]
@@ -67,8 +68,6 @@ impl Samples {
 
     /// \[s\] of a sample, from the middle one of all steps.
     pub fn step_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.rates.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+        median(self.rates.t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a unit and its log. Out: [`Sensors`]; its [`Samples`], and the [`Model`] of what its description says of their errors.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use twin::{
     environment::Environment,
     predict::{Channel, Kind, UnitDescription},
@@ -10,9 +10,12 @@ use twin::{
 
 use crate::{
     input::{case::Surroundings, log::Log},
-    parity::plate::{
-        filter::Model,
-        samples::{Samples, Triad},
+    parity::{
+        chips::directions,
+        plate::{
+            filter::Model,
+            samples::{Samples, Triad},
+        },
     },
 };
 
@@ -134,11 +137,6 @@ impl Sensors {
             begin: BEGIN[usize::from(!is_still)],
         }
     }
-}
-
-/// Directions of three channels, one a row.
-fn directions(unit: &UnitDescription, own: [usize; 3]) -> Matrix3<f64> {
-    Matrix3::from_fn(|row, column| unit.channels[own[row]].axis_b[column])
 }
 
 /// Rows in which all three have a sample.

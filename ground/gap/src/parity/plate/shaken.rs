@@ -7,6 +7,7 @@
 //! each frequency the median of all spans counts, so that knocks and the spans of rest, up to half of a log, do not.
 
 use nalgebra::Vector3;
+use packets::magnitude::median;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use crate::thresholds::KNOCK_M_S2;
@@ -89,9 +90,10 @@ pub fn line(step_s: f64, samples: &[Vector3<f64>]) -> Option<Line> {
         }
         powers.iter_mut().zip(sums).for_each(|(all, own)| all.push(own));
     }
-    let medians: Vec<f64> = powers.iter_mut().map(|own| median(own)).collect();
+    let middle = |own: &[f64]| median(own.iter().copied()).unwrap_or(0.0);
+    let medians: Vec<f64> = powers.iter().map(|own| middle(own)).collect();
     let over = |at: usize| {
-        let side = |from: usize, to: usize| median(&mut medians[from..to].to_vec());
+        let side = |from: usize, to: usize| middle(&medians[from..to]);
         let (below, above) = (side(at - FAR, at - NEAR), side(at + NEAR + 1, at + FAR + 1));
         medians[at] / below.max(above).max(f64::MIN_POSITIVE)
     };
@@ -102,9 +104,4 @@ pub fn line(step_s: f64, samples: &[Vector3<f64>]) -> Option<Line> {
         amplitude: medians[at].sqrt(),
         over,
     })
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
