@@ -21,6 +21,11 @@ use crate::{
     thresholds::ADDED_NATS,
 };
 
+/// To a tenth, and nothing without a sign.
+fn tenth(value: f64) -> f64 {
+    (10.0 * value).round() / 10.0 + 0.0
+}
+
 /// All of it.
 pub fn screen(flight: &Flight, findings: &Findings) -> String {
     let text = &flight.opened.text;
@@ -32,8 +37,8 @@ pub fn screen(flight: &Flight, findings: &Findings) -> String {
         "PARITY  empty: one plate has as many sensors as a motion has unknowns. What follows rests on the whole log, {count} samples at \
          {:.0} Hz from {:.1} to {:.1} s; windows are not used: gyros carry the attitude, gravity and field hold it",
         1.0 / step_s,
-        findings.span_s.0,
-        findings.span_s.1
+        tenth(findings.span_s.0),
+        tenth(findings.span_s.1)
     );
     let _ = writeln!(
         out,
