@@ -39,6 +39,7 @@ use crate::{
 };
 
 use gyros::Gyros;
+pub use shared::LONGEST_LINE;
 use shared::{Shared, Start};
 
 /// What a laboratory may choose without touching the code.

@@ -28,6 +28,13 @@ pub enum Entry {
     },
     /// A derived frame.
     Derived(Box<Derived>),
+    /// What the unit says to people.
+    Line {
+        /// Offset in the stream.
+        offset: u64,
+        /// Without `>` and line end.
+        text: String,
+    },
     /// Bytes that are no frame.
     Reject(Reject),
 }
@@ -105,6 +112,13 @@ impl Digest {
                 self.record.derived(&item);
                 Entry::Derived(derived.clone())
             }
+            Item::Line { offset, text } => {
+                self.record.line(text);
+                Entry::Line {
+                    offset: *offset,
+                    text: text.clone(),
+                }
+            }
             Item::Reject(reject) => {
                 self.record.summary.reject(reject);
                 Entry::Reject(*reject)
@@ -152,6 +166,7 @@ mod tests {
             .map(|entry| match entry {
                 Entry::Packet { number, step, .. } => format!("{number} {step:?}"),
                 Entry::Derived(_) => "derived".into(),
+                Entry::Line { offset, text } => format!("offset {offset}: {text}"),
                 Entry::Reject(reject) => reject.to_string(),
             })
             .collect();

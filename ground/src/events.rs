@@ -28,6 +28,9 @@ const QUIET: u64 = 25;
 /// Failures in one event below which a sensor is not silent but noisy: those are counted in the summary.
 const SILENT: u64 = 3;
 
+/// How a change of mode begins.
+const MODE: &str = "mode ";
+
 /// Packets in a row that are above or below a force.
 const IN_A_ROW: u32 = 3;
 
@@ -150,7 +153,10 @@ impl Events {
             .replace(derived.mode)
             .is_some_and(|before| before != derived.mode)
         {
-            self.instant(number, format!("mode {}", derived.mode.name()));
+            let what = format!("{MODE}{}", derived.mode.name());
+            if !self.recent().any(|event| event.what.starts_with(&what)) {
+                self.instant(number, what);
+            }
         }
         if let Some(start) = &derived.start
             && self
@@ -161,6 +167,24 @@ impl Events {
             let reason = format!("{:?}", start.reset).to_lowercase();
             self.instant(number, format!("reset ({reason})"));
         }
+    }
+
+    /// Takes a line that the unit says to people: a change of mode with its cause, which a derived frame says without.
+    pub fn line(&mut self, text: &str) {
+        if !text.starts_with(MODE) {
+            return;
+        }
+        if let Some(without_cause) = self.recent().find(|event| text.starts_with(&event.what)) {
+            text.clone_into(&mut without_cause.what);
+            return;
+        }
+        self.instant(self.last, text.to_owned());
+    }
+
+    /// What was kept of the last packets.
+    fn recent(&mut self) -> impl Iterator<Item = &mut Event> {
+        let since = self.last.saturating_sub(QUIET);
+        self.closed.iter_mut().filter(move |event| event.number >= since)
     }
 
     /// All of them in order, the conditions that last to the end among them, and how many more there were.
@@ -254,7 +278,12 @@ fn force(reading: &Reading) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use emems::sample::Errors;
+    use emems::{
+        derived::Health,
+        estimate::Estimate,
+        increments::Integrator,
+        sample::{Errors, NO_SLOT},
+    };
 
     use super::*;
 
@@ -332,6 +361,39 @@ mod tests {
             reading
         });
         assert_eq!(told(readings), [(50, 79, "g2 silent".into())]);
+    }
+
+    #[test]
+    fn a_change_of_mode_is_told_once_with_its_cause() {
+        let said = "mode FLIGHT: lift-off";
+        let frame = |mode| Derived {
+            counter: 7,
+            start_us: 0,
+            mode,
+            health: Health::default(),
+            start: None,
+            cycle_us: 0,
+            slots_us: [NO_SLOT; SENSOR_COUNT],
+            increments: Integrator::new(1.0).take(),
+            estimate_us: 0,
+            estimate: Estimate::NOTHING,
+        };
+        for line_first in [false, true] {
+            let mut events = Events::default();
+            events.packet(7, Step::First, &pushed(9.8, false));
+            events.derived(&frame(Mode::Wait));
+            if line_first {
+                events.line(said);
+            }
+            events.derived(&frame(Mode::Flight));
+            if !line_first {
+                events.line(said);
+            }
+            events.line("G_ST FLIGHT task none");
+            let (all, _) = events.all();
+            let told: Vec<_> = all.iter().map(|event| (event.number, event.what.as_str())).collect();
+            assert_eq!(told, [(7, said)], "the line first: {line_first}");
+        }
     }
 
     #[test]

@@ -194,7 +194,7 @@ impl Folder {
                     self.si.line(&table::si_row(t_s, reading))?;
                 }
                 Entry::Derived(derived) => self.derived.line(&table::derived_row(derived))?,
-                Entry::Reject(_) => {}
+                Entry::Line { .. } | Entry::Reject(_) => {}
             }
             let remark = remark(entry, self.cycle_s);
             if let Some(remark) = &remark {
@@ -294,6 +294,7 @@ pub fn remark(entry: &Entry, cycle_s: f64) -> Option<String> {
             Some(format!("offset {offset}, packet {counter}, {t_s:.3} s: {what}"))
         }
         Entry::Derived(_) => None,
+        Entry::Line { offset, text } => Some(format!("offset {offset}: the unit says: {text}")),
         Entry::Reject(reject) => Some(reject.to_string()),
     }
 }

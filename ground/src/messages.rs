@@ -84,12 +84,17 @@ impl Messages {
                 self.packet(*number as f64 * cycle_s, reading)?;
             }
             Entry::Derived(derived) => self.estimate(self.number(derived) as f64 * cycle_s, derived)?,
-            Entry::Reject(_) => {}
+            Entry::Line { .. } | Entry::Reject(_) => {}
         }
         match remark {
             Some(remark) => {
                 let t_s = self.latest.map_or(0.0, |(number, _)| number as f64 * cycle_s);
-                self.line(t_s, WARNING, remark)
+                let level = if matches!(entry, Entry::Line { .. }) {
+                    INFO
+                } else {
+                    WARNING
+                };
+                self.line(t_s, level, remark)
             }
             None => Ok(()),
         }

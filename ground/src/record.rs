@@ -66,6 +66,12 @@ impl Record {
             }
         }
     }
+
+    /// Takes a line that the unit says to people.
+    pub fn line(&mut self, text: &str) {
+        self.summary.lines += 1;
+        self.events.line(text);
+    }
 }
 
 impl Default for Record {

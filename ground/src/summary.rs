@@ -78,11 +78,13 @@ pub struct Summary {
     pub jumped: u64,
     /// Derived frames.
     pub derived: u64,
+    /// Lines that the unit said to people.
+    pub lines: u64,
     /// Stretches of bytes that are no frame.
     pub stretches: u64,
     /// Bytes in them.
     pub rejected_bytes: u64,
-    /// Bytes of the frame that was on the line when the stream ended.
+    /// Bytes of the frame or line of text that was on the line when the stream ended.
     pub cut_off_bytes: u64,
     /// Packets in which each sensor failed, reading order.
     pub failed: [u64; SENSOR_COUNT],
@@ -137,7 +139,7 @@ impl Summary {
     /// Counts the last stretch of a stream: one that is the beginning of a frame is no damage.
     pub fn end(&mut self, reject: &Reject) {
         match reject.reason {
-            Reason::CutOff { .. } => self.cut_off_bytes = reject.length,
+            Reason::CutOff { .. } | Reason::Line => self.cut_off_bytes = reject.length,
             _ => self.reject(reject),
         }
     }
@@ -174,6 +176,9 @@ impl Summary {
                 format!("repeated {} times, jumped {} times", self.repeated, self.jumped),
             ));
         }
+        if self.lines > 0 {
+            rows.push(("lines of text", self.lines.to_string()));
+        }
         if self.stretches > 0 {
             rows.push((
                 "not decoded",
@@ -181,7 +186,7 @@ impl Summary {
             ));
         }
         if self.cut_off_bytes > 0 {
-            rows.push(("cut off at the end", format!("{} bytes of a frame", self.cut_off_bytes)));
+            rows.push(("cut off at the end", format!("{} bytes", self.cut_off_bytes)));
         }
         rows
     }

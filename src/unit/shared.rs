@@ -67,8 +67,11 @@ pub type CycleReader<'a> = Subscriber<'a, NoopRawMutex, Cycle, CYCLES, 4, 0>;
 /// A reader of the derived frames.
 pub type DerivedReader<'a> = Subscriber<'a, NoopRawMutex, Derived, FRAMES, 3, 0>;
 
+/// Bytes of the longest line that is said to people, without `>` and line end.
+pub const LONGEST_LINE: usize = 128;
+
 /// A line for the console, without its end.
-pub type Line = String<128>;
+pub type Line = String<LONGEST_LINE>;
 
 /// A record on its way from the recorder's part to the umbilical's, and the page it came from.
 pub type Dumped = (u32, RecordBytes);

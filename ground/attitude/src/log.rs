@@ -78,7 +78,7 @@ impl Cycles {
                 self.packet = Some(*reading);
                 cycle
             }
-            Item::Reject(_) => None,
+            Item::Line { .. } | Item::Reject(_) => None,
         }
     }
 

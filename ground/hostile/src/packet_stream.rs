@@ -1,4 +1,4 @@
-//! The decoder of packets and derived frames: what it gives covers the stream without gap or overlap, whatever pieces
+//! The decoder of packets, derived frames and lines of text: what it gives covers the stream without gap or overlap, whatever pieces
 //! the stream came in, and what it calls intact encodes to the bytes it was read from.
 use emems::{derived, packet};
 use packets::stream::{Bytes5To8, Decoder, Item, Reject};
@@ -23,6 +23,7 @@ pub fn packets(stream: &[u8]) {
                 }
                 Item::Packet { offset, .. } => (offset, stream[offset as usize..][..packet::PACKET_BYTES].to_vec()),
                 Item::Derived { offset, derived } => (offset, derived::encode(&derived).to_vec()),
+                Item::Line { offset, text } => (offset, format!(">{text}").into_bytes()),
                 Item::Reject(Reject { offset, length, .. }) => {
                     (offset, stream[offset as usize..][..length as usize].to_vec())
                 }

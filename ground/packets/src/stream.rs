@@ -1,12 +1,12 @@
 //! A byte stream to readings, however damaged.
 //!
-//! In: bytes, in pieces of any size. Out: every intact packet and derived frame with its offset, and for each stretch
-//! of bytes between them one [`Reject`] with offset, length and reason. Refuses nothing and never panics; line ends
+//! In: bytes, in pieces of any size. Out: every intact packet, derived frame and line of text with its offset, and for each
+//! stretch of bytes between them one [`Reject`] with offset, length and reason. Refuses nothing and never panics; line ends
 //! between frames are passed over without a word, since one packet a line is how people keep streams.
 //!
 //! Packets start with `@`, derived frames with `$`, and neither character stands anywhere else in either. So a reader
 //! that starts anew at each of them finds every intact frame, two candidates never overlap, and one frame is all it
-//! need remember.
+//! need remember. What the unit says to people, `>mode FLIGHT: lift-off` and CR LF, starts with `>` outside a frame.
 
 pub mod sequence;
 
@@ -15,12 +15,16 @@ use emems::{
     derived::{self, DERIVED_BYTES, DERIVED_START, Derived, DerivedError},
     packet::{self, ERROR_IDENTIFIER, PACKET_BYTES, PacketError, START},
     sample::{Errors, Reading},
+    unit::LONGEST_LINE,
 };
 
 use crate::channel::{self, CHANNELS};
 
 /// CRC-16/CCITT-FALSE, by its catalogued name.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+
+/// First byte of a line that the unit says to people.
+const LINE_START: u8 = b'>';
 
 /// What bytes 5 to 8 of a packet are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,11 +53,18 @@ pub enum Item {
         /// What it says.
         derived: Box<Derived>,
     },
-    /// Bytes that are no intact frame.
+    /// A line that the unit says to people: a change of mode, or a reply where the stream is of the umbilical.
+    Line {
+        /// Offset of its `>`.
+        offset: u64,
+        /// What it says, without `>` and line end; printable ASCII.
+        text: String,
+    },
+    /// Bytes that are none of these.
     Reject(Reject),
 }
 
-/// A stretch of bytes between intact frames.
+/// A stretch of bytes between intact frames and lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("offset {offset}, {length} bytes: {reason}")]
 pub struct Reject {
@@ -71,6 +82,9 @@ pub enum Reason {
     /// They stand outside any frame.
     #[error("not part of a frame")]
     OutsideFrame,
+    /// They begin like a line of text.
+    #[error("begins like a line of text that does not end")]
+    Line,
     /// They begin like a packet.
     #[error("begins like a packet, then {0}")]
     Packet(PacketError),
@@ -135,6 +149,7 @@ impl Decoder {
                 self.abandon_candidate();
                 self.candidate.push(byte);
             }
+            _ if self.candidate.starts_with(&[LINE_START]) => self.push_text(byte, items),
             _ if !self.candidate.is_empty() => {
                 self.candidate.push(byte);
                 if self.candidate.len() == self.whole() {
@@ -142,9 +157,25 @@ impl Decoder {
                 }
             }
             b'\r' | b'\n' => {}
+            LINE_START => self.candidate.push(byte),
             _ => {
                 self.stretch.get_or_insert((self.position, Reason::OutsideFrame));
             }
+        }
+    }
+
+    /// The next byte of a line of text.
+    fn push_text(&mut self, byte: u8, items: &mut Vec<Item>) {
+        match byte {
+            b'\r' | b'\n' => {
+                let offset = self.position - self.candidate.len() as u64;
+                let text = String::from_utf8_lossy(self.candidate.get(1..).unwrap_or_default()).into_owned();
+                items.extend(self.close_stretch(offset).map(Item::Reject));
+                items.push(Item::Line { offset, text });
+                self.candidate.clear();
+            }
+            b' '..=b'~' if self.candidate.len() <= LONGEST_LINE => self.candidate.push(byte),
+            _ => self.abandon_candidate(),
         }
     }
 
@@ -188,6 +219,7 @@ impl Decoder {
             return;
         }
         let reason = match packet::decode(&self.candidate) {
+            _ if self.candidate.starts_with(&[LINE_START]) => Reason::Line,
             Err(error) if whole == PACKET_BYTES && error.at < found => Reason::Packet(error),
             _ => Reason::CutOff { found, whole },
         };

@@ -83,7 +83,7 @@ impl Cycle {
             match entry {
                 Entry::Packet { .. } => self.packets += 1,
                 Entry::Derived(derived) => self.frame(derived.counter, derived.start_us)?,
-                Entry::Reject(_) => {}
+                Entry::Line { .. } | Entry::Reject(_) => {}
             }
         }
         self.held.extend(entries);

@@ -20,7 +20,7 @@ fn read(bytes_5_to_8: Bytes5To8, pieces: &[&[u8]]) -> (Vec<(u64, u16)>, Vec<Stri
     for item in pieces.iter().flat_map(|piece| decoder.push(piece)).collect::<Vec<_>>() {
         match item {
             Item::Packet { offset, reading } => packets.push((offset, reading.counter)),
-            Item::Derived { .. } => {}
+            Item::Derived { .. } | Item::Line { .. } => {}
             Item::Reject(reject) => rejects.push(reject.to_string()),
         }
     }
@@ -43,6 +43,38 @@ fn packets_back_to_back_or_one_a_line_leave_nothing_to_report() {
         &[(0, 1), (158, 1)],
         &[],
     );
+}
+
+/// Lines of text with their offsets.
+fn lines(stream: &[u8]) -> Vec<(u64, String)> {
+    let items = Decoder::default().push(stream);
+    let line = |item| match item {
+        Item::Line { offset, text } => Some((offset, text)),
+        _ => None,
+    };
+    items.into_iter().filter_map(line).collect()
+}
+
+#[test]
+fn what_the_unit_says_between_packets_is_no_damage() {
+    let stream = [GOLDEN, b">mode FLIGHT: lift-off\r\n".as_slice(), GOLDEN, b">\n>ok\r\n"].concat();
+    check(&stream, &[(0, 1), (180, 1)], &[]);
+    let said = [(156, "mode FLIGHT: lift-off"), (336, ""), (338, "ok")];
+    assert_eq!(lines(&stream), said.map(|(offset, text)| (offset, text.to_string())));
+}
+
+#[test]
+fn a_line_that_does_not_end_is_told_and_costs_no_packet() {
+    let unfinished = "offset 0, 5 bytes: begins like a line of text that does not end";
+    check(&[b">mode".as_slice(), GOLDEN].concat(), &[(5, 1)], &[unfinished]);
+    check(b">mode", &[], &[unfinished]);
+    let endless = [b">".as_slice(), &[b'x'; LONGEST_LINE + 1], b"\r\n", GOLDEN].concat();
+    let told = "offset 0, 132 bytes: begins like a line of text that does not end";
+    check(&endless, &[(132, 1)], &[told]);
+    assert_eq!(lines(&endless[1..endless.len() - GOLDEN.len()]), []);
+    let longest = [b">".as_slice(), &[b'x'; LONGEST_LINE], b"\r\n"].concat();
+    assert_eq!(lines(&longest), [(0, "x".repeat(LONGEST_LINE))]);
+    assert_eq!(lines(b">a\xFFb\r\n"), []);
 }
 
 #[test]
@@ -220,7 +252,7 @@ fn part() -> impl Strategy<Value = (bool, Vec<u8>)> {
     prop_oneof![
         any::<u16>().prop_map(|counter| (true, encode(&Reading::unread(counter)).to_vec())),
         proptest::collection::vec(any::<u8>(), 0..40).prop_map(|bytes| (false, bytes)),
-        "[@#$0-9A-Fa-f\r\n]{0,200}".prop_map(|text| (false, text.into_bytes())),
+        "[@#$>0-9A-Fa-f\r\n]{0,200}".prop_map(|text| (false, text.into_bytes())),
         (0usize..156).prop_map(|cut| (false, GOLDEN[..cut].to_vec())),
         (0usize..=DERIVED_BYTES).prop_map(|cut| (false, derived_frame()[..cut].to_vec())),
         (0usize..156).prop_map(|cut| (false, GOLDEN[cut + 1..].to_vec())),
@@ -252,6 +284,7 @@ proptest! {
             let (offset, length) = match item {
                 Item::Packet { offset, .. } => (offset, PACKET_BYTES as u64),
                 Item::Derived { offset, .. } => (offset, DERIVED_BYTES as u64),
+                Item::Line { offset, text } => (offset, 1 + text.len() as u64),
                 Item::Reject(Reject { offset, length, .. }) => (offset, length),
             };
             prop_assert!(length > 0);

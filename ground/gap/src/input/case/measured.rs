@@ -52,7 +52,7 @@ fn from_packets(file: &Path, bytes: &[u8], columns: &[Column], cycle_s: f64) -> 
                 log.stream.rejected += 1;
                 continue;
             }
-            Item::Derived { .. } => continue,
+            Item::Derived { .. } | Item::Line { .. } => continue,
         };
         let (number, step) = sequence.number(reading.counter);
         match step {
