@@ -171,7 +171,10 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         Verdict::Done(Action::Erase) => {
             shared.erase_ordered.set(true);
             shared.note(Cause::Erased);
-            shared.say(format_args!("{word} ok: erasing {} pages", shared.recorder.get().used));
+            match shared.recorder_error.get() {
+                None => shared.say(format_args!("{word} ok: erasing {} pages", shared.recorder.get().used)),
+                Some(error) => shared.say(format_args!("{word} ok: erase ordered, but recorder: {error}")),
+            }
         }
         Verdict::Done(Action::SelfTest) => {
             shared.self_test_ordered.signal(());
