@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use emems::{
-    calibration::Channel,
+    calibration::{Channel, Ranges, Set},
     derived::{self, Derived},
     estimate::Estimator,
     increments::{Force, Increments, forces::READINGS},
     sample::{Kind, Reading, Sample},
     unit::Settings,
 };
-use host_tests::{Flight, Flown, MS, S, world};
+use host_tests::{Flight, Flown, MS, S, set_words, world};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use twin::{
     environment::Environment,
@@ -28,6 +28,40 @@ fn flight(motion: &str, seed: u64) -> Flight {
         ..Flight::ideal(world(motion))
     }
     .say(MS, b"G_DL")
+}
+
+/// The nominal set of a unit whose parts have no noise: what rounding makes is all that is left.
+fn set_without_noise() -> Set {
+    let mut set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+    let axes = (set.acc.iter_mut()).chain(&mut set.mag).chain(&mut set.gyro);
+    axes.for_each(|axis| axis.noise = axis.scale.abs() / 12_f32.sqrt());
+    set
+}
+
+/// A sensor that repeats itself is frozen, unless its set says that it has no noise to change a code with.
+#[test]
+fn parts_without_noise_are_believed_when_the_set_says_so() {
+    let told = |set: &Set| {
+        let flown = Flight::ideal(world("still"))
+            .say(MS, b"G_DL")
+            .say(S, &set_words(set))
+            .say(5 * S, b"G_CL")
+            .say(6 * S, b"G_CK")
+            .fly(60 * S);
+        assert!(flown.replied("G_CK ok"), "{:?}", flown.replies());
+        let late = flown.derived.iter().filter(|frame| frame.start_us > 45_000_000);
+        late.map(|frame| frame.estimate.triad_nb.is_some()).collect::<Vec<_>>()
+    };
+    let believed = told(&set_without_noise());
+    assert!(
+        believed.len() > 50 && believed.iter().all(|found| *found),
+        "{believed:?}"
+    );
+    assert!(
+        told(&Set::nominal(Ranges::of(&Settings::NOMINAL)))
+            .iter()
+            .all(|found| !found)
+    );
 }
 
 /// Derived frames, each with its packet.

@@ -3,7 +3,10 @@
 //! In: each sensor's counts. Out: whether it has repeated more often than its noise would let it. With noise of `s` counts
 //! an axis repeats its code with a chance of at most `p = sum P(code)^2`, codes centred on the true value, and a sensor of
 //! three axes with `p^3`. It is frozen after `n` repeats, `p^(3n) < `[`CHANCE`]: 5 at 3 mg a count and 4.6 mg of noise,
-//! some thirty at 12 mg. A value that was not read neither repeats nor changes.
+//! some twenty at 12 mg. A value that was not read neither repeats nor changes.
+//!
+//! Rounding alone has a standard deviation of [`ROUNDING`] and changes no code. An axis whose set has no more noise than that, as of a
+//! plant without noise, may repeat itself for ever.
 //!
 //! Holds for sensors that convert anew between two reads: a unit that reads faster than its parts convert would see
 //! repeats that are none.
@@ -14,30 +17,29 @@ use crate::sample::NOT_READ;
 
 /// Chance of so many repeats in a row of a healthy sensor.
 const CHANCE: f32 = 1e-9;
-/// Repeats beyond which waiting longer tells nothing: half a minute at 5 Hz.
-const MOST: f32 = 150.0;
+/// \[counts\] of a uniform law of one count: the root of 1/12, with as much more as rounding a set's numbers makes.
+const ROUNDING: f32 = 0.2887;
 
 /// How often one sensor has repeated itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Repeats<const N: usize> {
     last: [i16; N],
     seen: u16,
-    frozen_at: u16,
+    /// Repeats; `None` for a sensor that may repeat itself for ever.
+    frozen_at: Option<u16>,
 }
 
 impl<const N: usize> Repeats<N> {
     /// A sensor whose axes have noise of these many counts.
     pub(super) fn new(noise_counts: [f32; N]) -> Self {
-        let chance = noise_counts
-            .into_iter()
-            .fold(1.0, |chance, sigma| chance * repeat(sigma));
-        // Without noise a repeat is certain: the logarithm is kept off zero.
-        let repeats = ComplexField::ln(CHANCE) / ComplexField::ln(chance).min(-1e-6);
+        let noisy = noise_counts.into_iter().filter(|sigma| *sigma > ROUNDING);
+        let chance = noisy.fold(1.0, |chance, sigma| chance * repeat(sigma));
+        let repeats = || ComplexField::ceil((ComplexField::ln(CHANCE) / ComplexField::ln(chance)).max(2.0)) as u16;
         Repeats {
             // What no part says, so that the first counts repeat nothing.
             last: [NOT_READ; N],
             seen: 0,
-            frozen_at: ComplexField::ceil(repeats.clamp(2.0, MOST)) as u16,
+            frozen_at: (chance < 1.0).then(repeats),
         }
     }
 
@@ -50,7 +52,7 @@ impl<const N: usize> Repeats<N> {
                 (self.last, self.seen) = (*counts, 0);
             }
         }
-        self.seen >= self.frozen_at
+        self.frozen_at.is_some_and(|frozen_at| self.seen >= frozen_at)
     }
 }
 
@@ -97,10 +99,23 @@ mod tests {
 
     #[test]
     fn it_takes_five_repeats_at_3_mg_and_some_twenty_at_12() {
-        assert_eq!(Repeats::new([1.53; 3]).frozen_at, 5);
-        assert_eq!(Repeats::new([0.38; 3]).frozen_at, 18);
-        assert_eq!(Repeats::new([1e-3; 3]).frozen_at, 150);
-        assert_eq!(Repeats::new([2.68]).frozen_at, 10);
+        assert_eq!(Repeats::new([1.53; 3]).frozen_at, Some(5));
+        assert_eq!(Repeats::new([0.38; 3]).frozen_at, Some(18));
+        assert_eq!(Repeats::new([0.3; 3]).frozen_at, Some(36));
+        assert_eq!(Repeats::new([2.68]).frozen_at, Some(10));
+    }
+
+    #[test]
+    fn what_has_no_noise_but_rounding_may_repeat_itself_for_ever() {
+        for noise_counts in [12.0_f32.sqrt().recip(), 1e-3] {
+            let mut repeats = Repeats::new([noise_counts; 3]);
+            assert!(
+                (0..2 * u32::from(u16::MAX)).all(|_| !repeats.frozen(Some(&[1, 2, 3]))),
+                "{noise_counts}"
+            );
+        }
+        // One axis that has noise tells of all three.
+        assert_eq!(Repeats::new([1e-3, 1e-3, 1.53]).frozen_at, Some(13));
     }
 
     #[test]
