@@ -257,6 +257,8 @@ impl Spin {
                 let seen = core::array::from_fn::<_, PLATES, _>(|k| (SEES_SPIN + k, least_squares[(row, k)]));
                 self.covariance.along(&seen)
             }),
+            iron_b: self.iron_b,
+            iron_covariance: self.covariance.block::<3, 3>(IRON, IRON),
         }
     }
 

@@ -91,6 +91,17 @@ impl HardIron {
         }
     }
 
+    /// Another filter has found it, with this covariance.
+    pub(super) fn take_over(&mut self, iron_b: Vector3<f32>, covariance: &Matrix3<f32>) {
+        // Of an iron that is not looked for, or a covariance that is none, nothing is taken.
+        if let Some(information) = covariance.try_inverse().filter(|_| self.information.trace() > 0.0) {
+            self.weighted = information * iron_b;
+            self.information = information;
+            self.recent = Equations::default();
+            self.solve();
+        }
+    }
+
     /// Learns from a window. Whether the iron turned out to be another.
     pub(super) fn learn(&mut self, params: &Params, duration_s: f32, sums: &FieldSums) -> bool {
         if params.iron_sd_ut <= 0.0 || sums.count < 2.0 {

@@ -1,10 +1,10 @@
 //! What another filter hands over, and taking it.
 //!
-//! In: attitude, rate, bias and their covariance at the gyros' latest true instant, and what the gyros see of a spin about x_b beyond
-//! it. Out: this filter, going on from there. What it knows of the rest of the gyro matrix, of the iron and of the field stays;
-//! what it had gathered and not used is dropped.
+//! In: attitude, rate, bias and their covariance at the gyros' latest true instant, what the gyros see of a spin about x_b beyond
+//! it, and the iron, which turned with the spin. Out: this filter, going on from there. What it knows of the rest of the gyro matrix
+//! and of the field stays; what it had gathered and not used is dropped.
 
-use nalgebra::{SMatrix, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector2, Vector3};
 
 use super::{Covariance, Filter, pending::Pending, spell::Spell, state::GYRO_MATRIX, window::Window};
 
@@ -23,6 +23,10 @@ pub struct Known {
     pub sees_spin_b: Vector3<f32>,
     /// \[1\] variance of each of its components.
     pub sees_spin_variance: Vector3<f32>,
+    /// \[uT\] hard iron in b.
+    pub iron_b: Vector3<f32>,
+    /// \[uT2\] its covariance.
+    pub iron_covariance: Matrix3<f32>,
 }
 
 impl Filter {
@@ -39,6 +43,7 @@ impl Filter {
                 self.gyro_matrix[(row, 0)] = known.sees_spin_b[row];
             }
         }
+        self.iron.take_over(known.iron_b, &known.iron_covariance);
         self.window = Window::EMPTY;
         self.gyro_b = None;
         self.last_us = Some(at_us);

@@ -5,7 +5,8 @@
 //! seconds of processor each, and prints a line a phase. The page has the error and three standard deviations over the flight.
 //!
 //! Each unit is told a field that is off by what a model is: each component by a normal number of
-//! [`FIELD_OFF_UT`]. Rough flights are as [`Levels`] has them, and their gyros feel force.
+//! [`FIELD_OFF_UT`]. Its vehicle has hard iron as large as the crew says that swinging leaves of it
+//! ([`Launch::iron_sd_ut`]), which turns with the spin. Rough flights are as [`Levels`] has them, and their gyros feel force.
 //!
 //! The error is the rotation vector from the attitude that the unit sent to the truth at the same instant, in n. Total: root mean
 //! square of its length over all packets of a phase and all units. Nose: the same of the angle between the two x axes. Said: the root
@@ -28,7 +29,7 @@ use twin::{
     part::{Nanos, signal::Noise},
     plant::{Plant, Quality},
     run::{Bench, Flow},
-    truth::TruthSource,
+    truth::{Truth, TruthSource},
 };
 
 /// \[uT\] standard deviation of what a component of the field is told wrong: 0.2 deg of 26 uT.
@@ -109,21 +110,49 @@ fn told(seed: u64, levels: Option<Levels>) -> Site {
     }
 }
 
+/// A flight in a vehicle with hard iron.
+struct InVehicle<T> {
+    source: T,
+    iron_b_ut: Vector3<f64>,
+}
+
+impl<T: TruthSource> TruthSource for InVehicle<T> {
+    fn at(&self, t_s: f64) -> Truth {
+        let mut truth = self.source.at(t_s);
+        truth.field_b_ut += self.iron_b_ut;
+        truth
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        self.source.duration_s()
+    }
+}
+
+/// \[uT\] what swinging has left of the iron of this unit's vehicle.
+fn iron_b_ut(seed: u64, site: &Site) -> Vector3<f64> {
+    let sd_ut = site.launch.map_or(0.0, |launch| f64::from(launch.iron_sd_ut));
+    let drawn = Noise::new(seed).stream(0x1204);
+    Vector3::from_fn(|axis, _| sd_ut * drawn.normal(axis as u64))
+}
+
 /// Flies the unit of this seed.
 fn fly(seed: u64, levels: Option<Levels>) -> Vec<Sent> {
     let environment = Environment::alcantara();
     let motion = SoundingRocket::new(LIFT_OFF_S, environment.gravity);
-    let smooth = World {
-        motion: motion.clone(),
-        environment,
+    let settings = Settings {
+        site: told(seed, levels),
+        ..Settings::NOMINAL
+    };
+    let smooth = InVehicle {
+        source: World {
+            motion: motion.clone(),
+            environment,
+        },
+        iron_b_ut: iron_b_ut(seed, &settings.site),
     };
     let world: Arc<dyn TruthSource> = match levels {
         Some(levels) => Arc::new(Rough::new(smooth, LIFT_OFF_S, levels, seed)),
         None => Arc::new(smooth),
-    };
-    let settings = Settings {
-        site: told(seed, levels),
-        ..Settings::NOMINAL
     };
     let mut listener = Listener::default();
     let plant = Plant::with(world, seed, Quality::FREE_CLOCKS);

@@ -30,6 +30,8 @@ fn known(draws: &mut Draws, spin: f32) -> Known {
         covariance: root * root.transpose() + SMatrix::from_diagonal_element(1e-5),
         sees_spin_b: draws.vector(0.01),
         sees_spin_variance: Vector3::new(0.5 * spin, spin, 2.0 * spin),
+        iron_b: draws.vector(1.0),
+        iron_covariance: Matrix3::new(0.2, 0.1, 0.0, 0.1, 0.3, 0.0, 0.0, 0.0, 0.4),
     }
 }
 
@@ -62,6 +64,8 @@ fn it_goes_on_from_what_is_known() {
         );
         assert!(!filter.rested && filter.gyro_b.is_none() && filter.going.is_none() && filter.contradicted.is_none());
         assert_eq!(filter.window.duration_s, 0.0);
+        assert!((filter.iron.iron_b - known.iron_b).norm() < 1e-5);
+        assert!((filter.iron.covariance - known.iron_covariance).norm() < 1e-5);
         assert!(filter.pending.is_done() && filter.settlements == before.settlements);
         for row in 0..3 {
             for column in 0..3 {
