@@ -48,7 +48,7 @@ fn parts_without_noise_are_believed_when_the_set_says_so() {
             .say(5 * S, b"G_CL")
             .say(6 * S, b"G_CK")
             .fly(60 * S);
-        assert!(flown.replied("G_CK ok"), "{:?}", flown.replies());
+        assert!(flown.replied("G_CL ok"), "{:?}", flown.replies());
         let late = flown.derived.iter().filter(|frame| frame.start_us > 45_000_000);
         late.map(|frame| frame.estimate.triad_nb.is_some()).collect::<Vec<_>>()
     };
