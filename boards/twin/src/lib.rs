@@ -12,6 +12,7 @@ pub mod channel;
 pub mod effect;
 pub mod environment;
 pub mod fault;
+pub mod fourier;
 pub mod geometry;
 pub mod host;
 pub mod keys;

@@ -6,9 +6,8 @@
 
 use core::f64::consts::TAU;
 
-use rustfft::{Fft, FftPlanner, num_complex::Complex};
-
 use super::spread::View;
+use crate::fourier::{self, Complex, Fft};
 
 /// Samples of a block, of one line or the other: 100 s at 5 Hz, so that a line may wander by a hundredth of a hertz, or as
 /// long as a flight, for one that does not: it pays for its phase once.
@@ -116,7 +115,7 @@ pub(super) fn first_bin(length: usize) -> usize {
 
 /// Of every block of this length of all of these, how many samples it has and its line in each bin that is looked at.
 pub(super) fn spectra(views: &[View], length: usize) -> Vec<(Block, Vec<f64>)> {
-    let transform = FftPlanner::new().plan_fft_forward(length);
+    let transform = fourier::forward(length);
     let blocks = views.iter().flat_map(|view| Block::all(view, length));
     blocks
         .map(|block| {

@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
-use rustfft::{FftPlanner, num_complex::Complex};
+use twin::fourier::{self, Complex};
 
 use super::terms::Term;
 
@@ -64,7 +64,7 @@ fn flicker(count: usize, step_s: f64, draw: &mut impl FnMut() -> f64) -> Vec<f64
         .chain((1..half).rev())
         .map(|lag| Complex::new(power(lag as i64), 0.0))
         .collect();
-    let forward = FftPlanner::new().plan_fft_forward(2 * half);
+    let forward = fourier::forward(2 * half);
     forward.process(&mut spectrum);
     for bin in &mut spectrum {
         // Rounding makes the bin at zero, where flicker's steps have no power, a little negative.

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 use packets::magnitude::median;
-use rustfft::{FftPlanner, num_complex::Complex};
+use twin::fourier::{self, Complex};
 
 use crate::thresholds::KNOCK_M_S2;
 
@@ -72,7 +72,7 @@ pub fn line(step_s: f64, samples: &[Vector3<f64>]) -> Option<Line> {
     if first + 2 * FAR > SPAN / 2 || spans < LEAST_SPANS {
         return None;
     }
-    let transform = FftPlanner::new().plan_fft_forward(SPAN);
+    let transform = fourier::forward(SPAN);
     let mut powers: Vec<Vec<f64>> = vec![Vec::new(); SPAN / 2];
     for span in samples.chunks_exact(SPAN) {
         let mut sums = vec![0.0; SPAN / 2];

@@ -7,7 +7,7 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use rustfft::{Fft, FftPlanner, num_complex::Complex};
+use twin::fourier::{self, Complex, Fft};
 
 /// Bins on either side that tell the level about a bin.
 const AROUND: usize = 12;
@@ -36,7 +36,7 @@ impl Spectrum {
     /// Of a residual of so many samples, taken as evenly spaced: a hole breaks the phase of a tone and leaves its frequency.
     pub fn new(count: usize) -> Self {
         Spectrum {
-            transform: FftPlanner::new().plan_fft_forward(count),
+            transform: fourier::forward(count),
         }
     }
 
