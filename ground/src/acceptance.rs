@@ -15,6 +15,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use flight::interrupt::Interrupt;
+use logs::folder::{self, FolderError};
+
 pub mod evidence;
 pub mod fit;
 pub mod judge;
@@ -36,8 +39,7 @@ use self::{
 };
 use crate::{
     console::{serial::SerialLine, stream::Item},
-    fly::{board::BoardError, interrupt::Interrupt},
-    folder::{self, FolderError},
+    fly::board::BoardError,
 };
 
 /// Tests a freshly soldered unit over its umbilical: parts, wiring, noise, timing, recorder; a page and a first calibration set

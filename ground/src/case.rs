@@ -7,24 +7,11 @@
 pub mod checked;
 pub mod clock;
 mod described;
-pub mod instrument;
 pub mod made;
 mod place;
 pub mod reference;
-pub mod windows;
 
-use std::{fmt::Write, path::PathBuf};
-
-use twin::environment::Environment;
-
-use self::windows::Parted;
-
-/// File names in a case's folder.
-pub const CASE: &str = "case.toml";
-/// The unit's description.
-pub const UNIT: &str = "unit.toml";
-/// What the unit was made to do.
-pub const MOTION: &str = "motion.csv";
+use std::path::PathBuf;
 
 /// Makes a gap case of a real unit's log, and says what a case lacks
 #[derive(Clone, Debug, clap::Subcommand)]
@@ -78,80 +65,4 @@ pub fn case(step: &Step) -> Result<(), StepError> {
         }
     }
     Ok(())
-}
-
-/// What `case.toml` says.
-pub struct Text<'a> {
-    /// What the case is called in verdicts.
-    pub name: &'a str,
-    /// `packets` or `csv`.
-    pub kind: &'a str,
-    /// What anyone on the bench could see.
-    pub about: &'a str,
-    /// File of the log.
-    pub measured: &'a str,
-    /// The place.
-    pub environment: &'a Environment,
-    /// \[uT\] how well the field is known; 0 for exactly.
-    pub field_sigma_ut: f64,
-    /// \[rad\] and \[m\] of the reference; zeros for an exact one.
-    pub reference: [f64; 2],
-    /// What is fitted and what judges.
-    pub windows: &'a Parted,
-}
-
-impl Text<'_> {
-    /// The file.
-    pub fn toml(&self) -> String {
-        let mut text = String::new();
-        // Writing to a string cannot fail.
-        let _ = self.write(&mut text);
-        text
-    }
-
-    fn write(&self, text: &mut String) -> std::fmt::Result {
-        let quoted = |words: &str| toml::Value::String(words.into()).to_string();
-        writeln!(text, "format = \"gap-case/1\"\nname = {}", quoted(self.name))?;
-        writeln!(text, "kind = \"{}\"\nabout = {}", self.kind, quoted(self.about))?;
-        writeln!(
-            text,
-            "unit = \"{UNIT}\"\nmeasured = {}\nmotion = \"{MOTION}\"\n",
-            quoted(self.measured)
-        )?;
-        let Environment {
-            gravity,
-            latitude,
-            field_n_ut: field,
-            temperature_c,
-        } = self.environment;
-        writeln!(
-            text,
-            "[environment]\ngravity_m_s2 = {gravity:?}\nlatitude_deg = {:.6}",
-            latitude.to_degrees()
-        )?;
-        writeln!(text, "field_n_ut = [{:.4}, {:.4}, {:.4}]", field.x, field.y, field.z)?;
-        if self.field_sigma_ut > 0.0 {
-            writeln!(text, "field_sigma_ut = {:.3}", self.field_sigma_ut)?;
-        }
-        writeln!(text, "temperature_c = {temperature_c:?}\n")?;
-        let [attitude_rad, position_m] = self.reference;
-        if attitude_rad > 0.0 {
-            writeln!(text, "[reference]\nattitude_sigma_rad = {attitude_rad:?}")?;
-            if position_m > 0.0 {
-                writeln!(text, "position_sigma_m = {position_m:?}")?;
-            }
-            writeln!(text)?;
-        }
-        writeln!(
-            text,
-            "[windows]\nfit = {}\nhold = {}",
-            spans(&self.windows.fit),
-            spans(&self.windows.hold)
-        )
-    }
-}
-
-fn spans(spans: &[[f64; 2]]) -> String {
-    let pairs: Vec<String> = spans.iter().map(|[from, to]| format!("[{from:?}, {to:?}]")).collect();
-    format!("[{}]", pairs.join(", "))
 }

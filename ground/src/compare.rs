@@ -9,16 +9,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use attitude::{plots, recording::Row, reference};
+use attitude::reference;
 use chart::{Block, ChartError, Figure, Panel};
-use packets::{input, output, stream::Bytes5To8};
-
-use crate::{
-    decode::cycle::{Contradicted, Cycle},
+use logs::{
     digest::Digest,
     plot::{self, times::Times},
     record::Record,
+    recording::{RecordingError, Row},
 };
+use packets::{input, output, stream::Bytes5To8};
+
+use crate::decode::cycle::{Contradicted, Cycle};
 
 /// The packets of a flight's folder, and how it was turned.
 const PACKETS: &str = "packets.txt";
@@ -72,7 +73,7 @@ pub enum CompareError {
     },
     /// Its motion is none.
     #[error(transparent)]
-    Motion(#[from] attitude::recording::RecordingError),
+    Motion(#[from] RecordingError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Chart(#[from] ChartError),
@@ -210,7 +211,7 @@ fn page(flown: &[Flown; 2]) -> Result<String, ChartError> {
         .unwrap_or_default()
         .replace("time", if is_launch { "time since lift-off" } else { "time" });
     for times in &mut times {
-        let clock = plots::Clock {
+        let clock = plot::attitude::Clock {
             label: label.clone(),
             unit_s,
             ..times.clock.clone()
@@ -264,13 +265,13 @@ fn page(flown: &[Flown; 2]) -> Result<String, ChartError> {
             .collect()
     };
     if turned.iter().all(|flight| !flight.estimates.is_empty()) {
-        let angles = [0, 1].map(|k| plots::angles(&turned[k], flown[k].motion.as_deref(), &times[k].clock));
+        let angles = [0, 1].map(|k| plot::attitude::angles(&turned[k], flown[k].motion.as_deref(), &times[k].clock));
         blocks.push(Block::Figure(Figure::of("Attitude", 2, &both(angles))?));
         if let [Some(one), Some(other)] = [0, 1].map(|k| flown[k].motion.as_deref()) {
             let errors = [one, other]
                 .into_iter()
                 .enumerate()
-                .map(|(k, rows)| plots::errors(&turned[k], rows, &times[k].clock));
+                .map(|(k, rows)| plot::attitude::errors(&turned[k], rows, &times[k].clock));
             let errors: Vec<Vec<Panel>> = errors.collect();
             let [one, other]: [Vec<Panel>; 2] = errors.try_into().unwrap_or_default();
             blocks.push(Block::Figure(Figure::of(

@@ -16,6 +16,11 @@ use std::{
 };
 
 use emems::nand::PAGE_BYTES;
+use logs::{
+    digest::{Digest, Entry},
+    folder::{self, Folder, FolderError},
+    table,
+};
 use packets::{
     input::looks_like,
     stream::{Bytes5To8, sequence::CYCLE_S},
@@ -25,11 +30,6 @@ use recorder::log::{self, LogError};
 use self::{
     cycle::{Contradicted, Cycle},
     input::Input,
-};
-use crate::{
-    digest::{Digest, Entry},
-    folder::{self, Folder, FolderError},
-    table,
 };
 
 /// \[bytes\] 62 blocks of an image, four of them the superblock's.

@@ -19,20 +19,26 @@ use std::{
 
 use chart::{Axis, Block, Figure, Layer, Marks, Panel};
 use clap::Parser;
+use flight::{
+    case::{
+        ANSWER,
+        text::{CASE, MOTION},
+    },
+    interrupt::Interrupt,
+    plan,
+};
 use gap::{
     against::{Against, against},
     command::{CORRECTED, UNIT, VERDICT, asked},
     input::case::Subject,
     kept::text,
 };
+use logs::folder::{self, FolderError};
 use serde::Deserialize;
 use trials::draw::Draw;
 use twin::predict::UnitDescription;
 
-use crate::{
-    fly::{self, board, case::ANSWER, interrupt::Interrupt, plan},
-    folder::{self, FolderError},
-};
+use crate::fly::{self, board};
 
 /// What may be wrong: a few of the effects that a unit most often has, each large enough to matter for its attitude.
 const DECK: [&str; 8] = [
@@ -185,7 +191,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
     let verdict: Verdict = serde_json::from_str(text(&analysis, VERDICT).unwrap_or_default())?;
     let corrected = first.join(CORRECTED).join(UNIT);
     say("flying the twin with what was found in");
-    let motion = first.join(crate::case::MOTION);
+    let motion = first.join(MOTION);
     let twin = flight(&format!(
         "--motion-file {} --unit {} --duration 100s --flight 2",
         motion.display(),
@@ -264,7 +270,7 @@ fn flown(words: &str, seed: u64, host: bool, out: &Path) -> Result<PathBuf, Demo
         .chain(board)
         .chain(words.split(' ').map(str::to_owned));
     let words = Words::try_parse_from(all).map_err(|error| trouble(&error))?;
-    let landed = fly::fly_until(&words.arguments, &Interrupt::default()).map_err(|error| trouble(&error))?;
+    let landed = fly::flown(&words.arguments, &Interrupt::default()).map_err(|error| trouble(&error))?;
     Ok(landed.folder)
 }
 
@@ -275,7 +281,7 @@ fn against_nominal(twin: &Path, unit: &UnitDescription) -> Result<Against, DemoE
     let mut without = UnitDescription::open(&twin.join(UNIT)).map_err(gap::input::case::CaseError::from)?;
     without.effects.clear();
     put(&nominal, &without.text())?;
-    let case = read(&twin.join(crate::case::CASE))?;
+    let case = read(&twin.join(CASE))?;
     let as_nominal = twin.join("nominal-case.toml");
     put(&as_nominal, &case.replacen(UNIT, "nominal.toml", 1))?;
     Ok(against(&as_nominal, unit)?)

@@ -14,6 +14,7 @@ use attitude::AttitudeError;
 use bench::{
     allan::AllanError, calibrate::CalibrateError, design::command::DesignError, drift::DriftError, table::TableError,
 };
+use flight::{FlyError, source::SourceError};
 use gap::GapError;
 use recorder::{dump::DumpError, recover::RecoverError};
 
@@ -24,7 +25,7 @@ use crate::{
     console,
     decode::DecodeError,
     effects::NoEffect,
-    fly::{FlyError, board::BoardError, source::SourceError},
+    fly::board::BoardError,
     size::SizeError,
 };
 
@@ -39,24 +40,6 @@ pub fn code(result: Result<(), Box<dyn Error>>) -> ExitCode {
     }
     eprintln!("error: {error}");
     ExitCode::from(if is_bad_input(error.as_ref()) { 2 } else { 1 })
-}
-
-/// Ends the program where `print!` cannot write: quietly on a closed pipe, with an error on a full disk. The standard
-/// library panics there, since its macros have no other way out; every other panic goes on as it was.
-pub fn without_panic_on_closed_output() {
-    let usual = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let text = panic.payload_as_str().unwrap_or_default();
-        match text.strip_prefix("failed printing to stdout: ") {
-            // As the standard library words EPIPE on every system it has.
-            Some(why) if why.contains("Broken pipe") || why.contains("os error 232") => std::process::exit(0),
-            Some(why) => {
-                eprintln!("error: the output cannot be written: {why}");
-                std::process::exit(1);
-            }
-            None => usual(panic),
-        }
-    }));
 }
 
 /// Lets standard output go nowhere, for `--quiet`: what follows is reports for people. Where the system has no such thing they
@@ -120,8 +103,8 @@ fn is_bad_input(error: &(dyn Error + 'static)) -> bool {
     }
     if let Some(error) = error.downcast_ref::<FlyError>() {
         return match error {
-            FlyError::Board(error) => is_bad_image(error),
-            error => matches!(error, FlyError::Source(_) | FlyError::Plan(_) | FlyError::Disturb(_)),
+            FlyError::Board(error) => error.downcast_ref().is_some_and(is_bad_image),
+            error => error.is_bad_input(),
         };
     }
     if let Some(error) = error.downcast_ref::<AllanError>() {

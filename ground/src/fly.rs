@@ -1,419 +1,44 @@
-//! `ground fly`: the unit in the air, watched.
+//! `ground fly`: the unit in the air, watched, on the emulated board or on the host.
 //!
-//! In: [`plan::Arguments`]. Out: a folder with all that was seen, and the summary on standard output. What flies the unit
-//! (the emulated board or the host one) is a [`board::Flight`]; everything here is the same for both.
+//! In: [`Arguments`]. Out: what [`flight`] leaves, and the summary on standard output. Here is what `cargo fly` builds after its first
+//! page: the image's board, the console at its umbilical, and the comparison with the first flight, whose place it takes.
 
+mod beside;
 pub mod board;
-pub mod case;
-mod disturb;
-pub mod interrupt;
-pub mod plan;
-mod progress;
-pub mod site;
-pub mod source;
-mod taught;
-mod transit;
-pub mod watch;
-mod words;
+mod replace;
 
-use std::{io, path::PathBuf, thread, time::Duration};
+use std::error::Error;
 
-use emems::estimate::Site;
-use trials::flight::{self, Instants};
-use twin::{
-    plant::{Plant, Quality},
-    run::Bench,
-};
-
-use self::{
-    board::{BoardError, Remark},
-    case::{CaseError, Flown},
-    disturb::{DisturbError, Prepared, prepare},
-    interrupt::Interrupt,
-    plan::{Arguments, PlanError},
-    progress::Progress,
-    source::{Source, SourceError},
-    transit::Through,
-    watch::{Seen, Watch},
-};
-use packets::stream::sequence::CYCLE_S;
-
-use crate::{
-    console::{self, line},
-    digest::Digest,
-    folder::{self, Folder, FolderError},
-    plot::Truth,
-};
-
-/// Why a flight was not made, or not to its end.
-#[derive(Debug, thiserror::Error)]
-pub enum FlyError {
-    /// Nothing to fly.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// What was asked for makes no flight.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// What is to be flown, or how it is to be disturbed.
-    #[error(transparent)]
-    Disturb(#[from] DisturbError),
-    /// The case in the folder.
-    #[error(transparent)]
-    Case(#[from] CaseError),
-    /// The board.
-    #[error(transparent)]
-    Board(#[from] BoardError),
-    /// The folder.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The console.
-    #[error(transparent)]
-    Console(#[from] console::Error),
-    /// The operating system's interrupt.
-    #[error("Ctrl-C cannot be listened to: {0}")]
-    Interrupt(#[from] ctrlc::Error),
-    /// The thread of the flight.
-    #[error("the flight cannot be run beside the console: {0}")]
-    Thread(#[from] io::Error),
-    /// A fault of this program, which has said more on standard error.
-    #[error("the flight broke down; please report what is printed above")]
-    Broken,
-}
+use flight::{FlyError, Landed, fly_until, interrupt::Interrupt, plan::Arguments};
 
 /// Runs `ground fly`.
 ///
 /// # Errors
-/// See [`FlyError`].
-pub fn fly(arguments: &Arguments) -> Result<(), FlyError> {
-    let landed = fly_until(arguments, &Interrupt::listen()?)?;
-    let page = landed.folder.join("index.html");
-    if arguments.json {
-        let rows: serde_json::Map<_, _> = (landed.rows.into_iter())
-            .map(|(name, value)| (name.to_owned(), value.into()))
-            .collect();
-        println!("{}", serde_json::json!({ "summary": rows, "page": page }));
-        return Ok(());
-    }
-    if !arguments.quiet {
-        print!("{}", folder::text_of(&landed.rows));
-    }
-    println!("{}", page.display());
+/// See [`FlyError`]; and when the image did not send what the host did.
+pub fn fly(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let landed = flown(arguments, &Interrupt::listen()?)?;
+    let page = match &arguments.in_place_of {
+        Some(first) if landed.whole => replace::replace(first, &landed.folder)?,
+        _ => landed.page(),
+    };
+    print!("{}", landed.text(arguments, &page));
     Ok(())
-}
-
-/// A flight that is over.
-pub struct Landed {
-    /// Its folder.
-    pub folder: PathBuf,
-    /// Its summary.
-    pub rows: Vec<Remark>,
 }
 
 /// Flies until the end or an interrupt.
 ///
 /// # Errors
 /// See [`FlyError`].
-pub fn fly_until(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
-    let source = source::open(arguments)?;
-    let duration = match arguments.duration {
-        // Whoever talks to the unit says when it is enough.
-        None if arguments.console => plan::UNTIL_TOLD,
-        asked => plan::duration_of(asked, source.truth.duration_s()),
+pub fn flown(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
+    let image = arguments.image.as_deref();
+    let board = |site| match arguments.host {
+        true => Ok(flight::board::host(site)),
+        false => board::image(image),
     };
-    let faults = plan::faults(&arguments.silent, duration)?;
-    let end = plan::nanos(duration)?;
-    // An image that cannot be read or built must not leave an empty folder.
-    let flight = if arguments.host {
-        board::host(source.site)
-    } else {
-        board::image(arguments.image.as_deref())?
-    };
-    // Without an end the scene is that of the motion, or of an hour.
-    let scene_s = match duration {
-        plan::UNTIL_TOLD => source.truth.duration_s().unwrap_or(3_600.0),
-        asked => asked.as_secs_f64(),
-    };
-    let mut prepared = prepare(arguments, source.world.as_ref(), &source.truth, scene_s)?;
-    for warning in prepared.iter().flat_map(|prepared| &prepared.warnings) {
-        eprintln!("warning: {warning}");
-    }
-    let name = format!("{}-{}", source.name, arguments.seed);
-    let folder = Folder::create(&arguments.out, &name, CYCLE_S)?;
-    let is_paced = arguments.real_time || arguments.console;
-    let progress = Progress::start(
-        duration,
-        is_paced,
-        arguments.console || arguments.quiet || arguments.json,
-    );
-    let quality = Quality {
-        flight: arguments.flight.into(),
-        ..Quality::NOMINAL
-    };
-    let plant = match &prepared {
-        Some(prepared) => Plant::seeing(&prepared.scene.views, source.truth.clone(), arguments.seed, quality),
-        None => Plant::with(source.truth.clone(), arguments.seed, quality),
-    };
-    let transit = prepared
-        .as_mut()
-        .map(|prepared| std::mem::take(&mut prepared.scene.transit));
-    let flight = move |watch: &mut dyn Bench| {
-        let mut through = Through::new(watch, transit.unwrap_or_default());
-        let remarks = flight(plant, &faults, end, &mut through)?;
-        through.finish();
-        Ok(remarks)
-    };
-    let words = words::before(arguments, &source);
-    let (seen, remarks) = if arguments.console {
-        // With an input that ends, a flight whose length was asked for goes on to its end.
-        let options = console::Options {
-            listen: arguments.duration,
-            ..console::Options::default()
-        };
-        beside_the_console(words, source.site, folder, progress, interrupt, options, flight)?
-    } else {
-        let digest = Digest::at(&source.site);
-        let mut watch = Watch::new(folder, digest, progress, None, words, interrupt.clone());
-        let remarks = flight(&mut watch)?;
-        (watch.finish()?, remarks)
-    };
-    let instants = prepared.as_ref().and_then(|_| flight::instants(arguments.seed));
-    let (case, trouble) = written(arguments, &source, prepared.as_ref(), instants.as_ref(), &seen);
-    // The log's time is zero at the start of the cycle of packet 0.
-    let flown = prepared.as_ref().zip(instants);
-    let motion = flown.map(|(prepared, instants)| (prepared.scene.motion.clone(), instants.zero_s + instants.lead_s));
-    let truth = motion.map(|(motion, zero_s)| move |t_s: f64| motion.at(t_s + zero_s).attitude.q_nb);
-    let truth = truth.as_ref().map(|truth| truth as Truth);
-    let landed = report(
-        arguments,
-        &source,
-        duration,
-        seen,
-        [remarks, vec![case]].concat(),
-        truth,
-    )?;
-    trouble.map_or(Ok(landed), |trouble| Err(trouble.into()))
-}
-
-/// Makes the folder a case; a row of the summary, and what went wrong with it that is not the flight's nature.
-fn written(
-    arguments: &Arguments,
-    source: &Source,
-    prepared: Option<&Prepared>,
-    instants: Option<&Instants>,
-    seen: &Seen,
-) -> (Remark, Option<CaseError>) {
-    let Some(prepared) = prepared else {
-        return (
-            (
-                "gap case",
-                "none: a recording of sensors does not say how the unit was turned".into(),
-            ),
-            None,
-        );
-    };
-    let flown = Flown {
-        scene: &prepared.scene,
-        struck: &prepared.struck,
-        unit: prepared.unit.as_ref(),
-        about: &source.about,
-        seed: arguments.seed,
-        flight: arguments.flight.into(),
-        flown_s: seen.flown.as_secs_f64(),
-        instrument: arguments.reference,
-        instants,
-    };
-    let path = seen.folder.path();
-    match flown.write(path) {
-        Ok(()) if prepared.struck.is_empty() => (("gap case", "this folder".into()), None),
-        Ok(()) => (
-            (
-                "gap case",
-                format!("this folder; what was done to the unit is in {}", case::ANSWER),
-            ),
-            None,
-        ),
-        Err(why @ (CaseError::TooShort(_) | CaseError::Unseen(_) | CaseError::NoInstants(_))) => {
-            (("gap case", format!("none: {why}")), None)
+    fly_until(arguments, interrupt, board, |folder, take_off| {
+        match arguments.console {
+            true => beside::console(arguments, folder, take_off),
+            false => take_off(None),
         }
-        Err(trouble) => (("gap case", "none: it could not be written".into()), Some(trouble)),
-    }
-}
-
-/// Flies in a thread of its own while the user has the terminal; ends when both do.
-fn beside_the_console(
-    words: Vec<u8>,
-    site: Site,
-    folder: Folder,
-    progress: Progress,
-    interrupt: &Interrupt,
-    options: console::Options,
-    flight: impl FnOnce(&mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send + 'static,
-) -> Result<(Seen, Vec<Remark>), FlyError> {
-    let (line, unit) = line::channel("the flying unit");
-    let kept = folder.path().join("umbilical.txt");
-    let digest = Digest::at(&site);
-    let mut watch = Watch::new(folder, digest, progress, Some(unit), words, interrupt.clone());
-    let flying = thread::Builder::new()
-        .name("flight".into())
-        .spawn(move || -> Result<_, FlyError> {
-            let remarks = flight(&mut watch)?;
-            Ok((watch.finish()?, remarks))
-        })?;
-    let talked = console::run(line, &kept, options);
-    let seen = flying.join().map_err(|_| FlyError::Broken)??;
-    talked?;
-    Ok(seen)
-}
-
-/// Writes the page and the summary.
-fn report(
-    arguments: &Arguments,
-    source: &Source,
-    planned: Duration,
-    seen: Seen,
-    remarks: Vec<Remark>,
-    truth: Option<Truth>,
-) -> Result<Landed, FlyError> {
-    let board = match &arguments.image {
-        _ if arguments.host => "host, virtual time".into(),
-        Some(file) => format!("emulated STM32F4, {}", file.display()),
-        None => "emulated STM32F4, release image".into(),
-    };
-    let mut rows = flight_rows(&board, source, arguments.seed, seen.flown, seen.took);
-    if seen.flown < planned && planned != plan::UNTIL_TOLD {
-        rows.push((
-            "ended",
-            format!("when asked to, before the {} s planned", planned.as_secs_f64()),
-        ));
-    }
-    rows.extend(remarks);
-    rows.extend(seen.record.summary.rows());
-    let title = format!("{} flight, unit {}", source.name, arguments.seed);
-    let folder = seen.folder.finish(&title, &source.about, &rows, &seen.record, truth)?;
-    Ok(Landed { folder, rows })
-}
-
-fn flight_rows(
-    board: &str,
-    source: &Source,
-    seed: u64,
-    flown: Duration,
-    took: Duration,
-) -> Vec<(&'static str, String)> {
-    let (flown_s, took_s) = (flown.as_secs_f64(), took.as_secs_f64());
-    vec![
-        ("flown", format!("{}, seed {seed}", source.name)),
-        ("board", board.into()),
-        (
-            "virtual time",
-            format!(
-                "{flown_s:.1} s in {took_s:.1} s, {:.0} times real time",
-                flown_s / took_s.max(1e-3)
-            ),
-        ),
-    ]
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use clap::Parser;
-
-    use super::*;
-
-    #[derive(Parser)]
-    struct Words {
-        #[command(flatten)]
-        arguments: Arguments,
-    }
-
-    fn words(words: &[&str]) -> Result<Arguments, clap::Error> {
-        Words::try_parse_from([&["fly"], words].concat()).map(|words| words.arguments)
-    }
-
-    #[test]
-    fn the_same_words_give_the_same_packets_in_a_folder_of_their_own() {
-        let place = tempfile::tempdir().expect("temporary folder");
-        let out = place.path().to_string_lossy();
-        let arguments = words(&[
-            "--host",
-            "--motion",
-            "tumble",
-            "--duration",
-            "5s",
-            "--seed",
-            "7",
-            "--silent",
-            "a2@2s",
-            "--out",
-            &out,
-        ]);
-        let arguments = arguments.expect("arguments");
-        fly_until(&arguments, &Interrupt::default()).expect("first flight");
-        fly_until(&arguments, &Interrupt::default()).expect("second flight");
-        let packets = |name: &str| fs::read(place.path().join(name).join("packets.txt")).expect(name);
-        assert_eq!(packets("tumble-7"), packets("tumble-7-2"));
-        let counts = fs::read_to_string(place.path().join("tumble-7/counts.csv")).expect("counts");
-        let last = counts.lines().last().unwrap_or_default();
-        assert!(
-            last.contains(",0002,0,0,") && last.contains(",,,"),
-            "accelerometer 2 is silent: {last}"
-        );
-        let summary = fs::read_to_string(place.path().join("tumble-7/summary.txt")).expect("summary");
-        assert!(summary.contains("accelerometer 2: "), "{summary}");
-    }
-
-    #[test]
-    fn an_interrupted_flight_keeps_what_was_flown_with_its_page_and_summary() {
-        let place = tempfile::tempdir().expect("temporary folder");
-        let out = place.path().to_string_lossy();
-        let arguments = words(&["--host", "--motion", "still", "--duration", "1000h", "--out", &out]);
-        let interrupt = Interrupt::default();
-        assert!(!interrupt.raise() && interrupt.raise(), "the second ends the program");
-        fly_until(&arguments.expect("arguments"), &interrupt).expect("flight");
-        let read = |name: &str| fs::read_to_string(place.path().join("still-1").join(name)).expect(name);
-        assert!(
-            read("summary.txt").contains("before the 3600000 s planned"),
-            "{}",
-            read("summary.txt")
-        );
-        assert!(read("index.html").contains("before the 3600000 s planned"));
-    }
-
-    #[test]
-    fn a_place_goes_with_a_motion_file_only() {
-        assert!(
-            words(&[
-                "--motion-file",
-                "x.csv",
-                "--latitude-deg",
-                "-2.37",
-                "--field-n-ut",
-                "-1,2,3"
-            ])
-            .is_ok()
-        );
-        assert!(words(&["--motion", "still", "--latitude-deg", "-2.37"]).is_err());
-        assert!(words(&["--motion-file", "x.csv", "--latitude-deg", "237"]).is_err());
-    }
-
-    #[test]
-    fn two_sources_at_once_are_refused() {
-        assert!(words(&["--motion", "still", "--recording", "x.csv"]).is_err());
-        assert!(words(&["--recording", "x.csv", "--motion-file", "y.csv"]).is_err());
-    }
-
-    #[test]
-    fn a_flight_that_cannot_start_leaves_no_folder() {
-        let place = tempfile::tempdir().expect("temporary folder");
-        let out = place.path().to_string_lossy();
-        let arguments = words(&["--host", "--recording", "no-such-file.csv", "--out", &out]).expect("arguments");
-        let error = fly_until(&arguments, &Interrupt::default())
-            .err()
-            .map(|error| error.to_string())
-            .unwrap_or_default();
-        assert!(error.contains("no-such-file.csv"), "{error}");
-        assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 0);
-    }
+    })
 }

@@ -17,8 +17,8 @@ struct Words {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    Fly(ground::fly::plan::Arguments),
-    Sources(ground::fly::source::List),
+    Fly(flight::plan::Arguments),
+    Sources(flight::source::List),
     /// Makes a gap case of a real unit's log, and says what a case lacks
     #[command(subcommand)]
     Case(ground::case::Step),
@@ -66,7 +66,7 @@ enum Challenge {
 }
 
 fn main() -> ExitCode {
-    ground::exit::without_panic_on_closed_output();
+    flight::exit::without_panic_on_closed_output();
     let words = Words::parse();
     if words.quiet && !prints_what_was_asked_for(&words.command) {
         ground::exit::print_nothing();
@@ -101,7 +101,7 @@ fn prints_what_was_asked_for(command: &Command) -> bool {
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
         Command::Fly(arguments) => ground::fly::fly(&arguments)?,
-        Command::Sources(arguments) => print!("{}", ground::fly::source::list(arguments)),
+        Command::Sources(arguments) => print!("{}", flight::source::list(arguments)),
         Command::Case(step) => ground::case::case(&step)?,
         Command::Compare(arguments) => ground::compare::compare(&arguments)?,
         Command::Demo(arguments) => ground::demo::demo(&arguments)?,

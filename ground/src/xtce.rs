@@ -17,9 +17,8 @@ use emems::{
     sample::{NOT_READ, SENSOR_COUNT, SENSORS},
     sensor::hmc5883l::OVERFLOW,
 };
+use logs::table::SLOT_NAMES;
 use packets::channel::{CHANNELS, Channel, Quantity};
-
-use crate::table::SLOT_NAMES;
 
 /// Prints the packet as an XTCE 1.2 definition, for Yamcs and other ground stations
 ///

@@ -6,6 +6,7 @@ use std::{
 };
 
 use clap::Parser;
+use flight::{interrupt::Interrupt, plan};
 use gap::{
     against::against,
     command::{analysed, taught},
@@ -18,7 +19,7 @@ use ground::{
         checked::checked,
         made::{self, made},
     },
-    fly::{self, interrupt::Interrupt, plan},
+    fly,
 };
 use twin::predict::UnitDescription;
 
@@ -41,7 +42,7 @@ fn flown(out: &Path, words: &str) -> PathBuf {
         .chain([out.display().to_string()])
         .chain(words.split(' ').map(str::to_owned));
     let words = Words::try_parse_from(all).unwrap_or_else(|error| panic!("{error}"));
-    let landed = fly::fly_until(&words.arguments, &Interrupt::default()).unwrap_or_else(|error| panic!("{error}"));
+    let landed = fly::flown(&words.arguments, &Interrupt::default()).unwrap_or_else(|error| panic!("{error}"));
     landed.folder
 }
 

@@ -6,13 +6,12 @@
 //! Near its minimum the mean square is `J0 + c d^2` with `c` the mean square of the rate across; its errors make `d` uncertain
 //! by `sqrt(J0 / (c n))`, `n` independent errors.
 
-use nalgebra::Vector3;
-use packets::magnitude;
-
-use crate::{
+use logs::{
     flight::{Estimate, Flight},
     recording::{Row, attitude_at},
 };
+use nalgebra::Vector3;
+use packets::magnitude;
 
 /// \[s\] looked for at most, on either side.
 const SPAN_S: f64 = 2.0;

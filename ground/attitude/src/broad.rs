@@ -13,13 +13,13 @@ use emems::{
     increments::forces::READINGS,
     kalman::{Delays, Filter, Params, Step},
 };
-use nalgebra::Vector3;
-
-use crate::{
+use logs::{
     recording::{self, RecordingError, Row},
-    replay::{Noise, Replay},
     score::{Rmse, mean},
 };
+use nalgebra::Vector3;
+
+use crate::replay::{Noise, Replay};
 
 /// Recordings on which parameters were chosen.
 pub const TUNE: [&str; 7] = ["02", "07", "11", "15", "24", "28", "32"];

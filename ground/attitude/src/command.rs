@@ -11,9 +11,17 @@ use std::{
     time::Instant,
 };
 
-use bench::units::Units;
 use emems::{kalman::Params, sample::Reading, unit::Settings};
 use indicatif::ProgressBar;
+use logs::{
+    cycles::{Cycle, Cycles},
+    flight::{Comparison, Flight},
+    plausible::{self, Implausible},
+    plot,
+    recording::{self, RecordingError},
+    score,
+    units::Units,
+};
 use packets::{
     input, output, reach,
     stream::{Bytes5To8, Decoder, Item},
@@ -24,14 +32,9 @@ use crate::{
     broad,
     chapter6::{self, calibrated::NotCalibrated},
     counts,
-    flight::{Comparison, Flight},
-    log::{Cycle, Cycles},
     methods::{self, NoSet},
     orbit, peers,
-    plausible::{self, Implausible},
-    plots,
     rails::{self, NoRails},
-    recording::{self, RecordingError},
     reference,
 };
 
@@ -211,7 +214,7 @@ pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
         }
     }
     if let Some(file) = &arguments.page {
-        let page = plots::page(&flight, reference.as_deref(), rows)?;
+        let page = plot::attitude::page(&flight, reference.as_deref(), rows)?;
         output::replace_with(file, page).map_err(|error| io_error(file, error))?;
         if !arguments.json {
             println!("{}", file.display());
@@ -408,7 +411,7 @@ fn summary(flight: &Flight) -> String {
 
 fn compared(met: &Comparison) -> String {
     let (mean, sd) = (met.mean_deg, met.sd_deg);
-    let rmse = |rmse: &crate::score::Rmse| {
+    let rmse = |rmse: &score::Rmse| {
         format!(
             "total {:.2}, heading {:.2}, inclination {:.2} deg",
             rmse.total_deg, rmse.heading_deg, rmse.inclination_deg

@@ -7,9 +7,8 @@
 use std::io::BufRead;
 
 use emems::sample::{Errors, NOT_READ, Reading};
+use logs::recording::RecordingError;
 use packets::channel::CHANNELS;
-
-use crate::recording::RecordingError;
 
 /// Whether a header is that of such a table.
 pub fn is_one(header: &str) -> bool {

@@ -1,7 +1,8 @@
 //! Attitude from a log: the methods on recorded data, beside a reference and beside peers.
 //!
 //! ```
-//! use attitude::{broad, recording};
+//! use attitude::broad;
+//! use logs::recording;
 //!
 //! let rows = recording::read("../../data/broad/09_undisturbed_fast_rotation_with_breaks_B.csv.gz".as_ref())?;
 //! let error = broad::replay(broad::Mode::FiveHz).score(&rows).expect("an attitude");
@@ -14,19 +15,11 @@ pub mod broad;
 pub mod chapter6;
 pub mod command;
 pub mod counts;
-pub mod flight;
-pub mod follow;
-pub mod log;
 pub mod methods;
 pub mod orbit;
 pub mod peers;
-pub mod plausible;
-pub mod plots;
 pub mod rails;
-pub mod recording;
 pub mod reference;
 pub mod replay;
-pub mod score;
-pub mod whiteness;
 
 pub use command::{Arguments, AttitudeError, run};

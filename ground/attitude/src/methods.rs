@@ -13,14 +13,13 @@ use emems::{
     estimate::Estimator,
     unit::Settings,
 };
-use nalgebra::Vector3;
-
-use crate::{
-    flight::{Comparison, Flight},
-    log::Cycle,
-    rails::Taken,
+use logs::{
+    cycles::Cycle,
+    flight::{Comparison, Estimate, Flight, Taken},
     recording::Row,
+    score::Rmse,
 };
+use nalgebra::Vector3;
 
 /// A log by one set.
 pub struct Run {
@@ -92,7 +91,7 @@ pub fn format(runs: &[Run]) -> String {
         "method", "force [m/s2]", "field [uT]", "TRIAD RMSE [deg]", "filter RMSE [deg]"
     );
     for run in runs {
-        let norms = |vector: fn(&crate::flight::Estimate) -> Option<Vector3<f64>>| {
+        let norms = |vector: fn(&Estimate) -> Option<Vector3<f64>>| {
             let all: Vec<f64> = run
                 .flight
                 .estimates
@@ -104,7 +103,7 @@ pub fn format(runs: &[Run]) -> String {
             let variance = all.iter().map(|norm| (norm - mean).powi(2)).sum::<f64>() / all.len() as f64;
             format!("{mean:.3} sd {:.3}", variance.sqrt())
         };
-        let rmse = |rmse: Option<crate::score::Rmse>| match rmse {
+        let rmse = |rmse: Option<Rmse>| match rmse {
             Some(rmse) => format!(
                 "{:.2} ({:.2}, {:.2})",
                 rmse.total_deg, rmse.heading_deg, rmse.inclination_deg

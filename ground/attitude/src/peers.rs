@@ -9,10 +9,9 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::{
-    broad::{self, CUT_STEP_DEG, GROUPS, Line, Mode, REPORT, TUNE, mean_of},
-    recording::RecordingError,
-};
+use logs::recording::RecordingError;
+
+use crate::broad::{self, CUT_STEP_DEG, GROUPS, Line, Mode, REPORT, TUNE, mean_of};
 
 /// The script, from the project's root.
 const SCRIPT: &str = "peers/broad.py";
@@ -147,8 +146,10 @@ pub fn format_speed(folder: &Path, others: &Totals) -> Result<String, RecordingE
 
 #[cfg(test)]
 mod tests {
+    use logs::score::Rmse;
+
     use super::*;
-    use crate::{broad::MODES, score::Rmse};
+    use crate::broad::MODES;
 
     #[test]
     fn means_are_given_only_where_every_recording_was_run() {

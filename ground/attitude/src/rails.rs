@@ -11,18 +11,10 @@ use std::{
     path::Path,
 };
 
-use emems::{mode::Cause, rail::Rail};
+use emems::mode::Cause;
+use logs::flight::Taken;
 use packets::input;
 use recorder::log::{self, LIMIT, Log, LogError};
-
-/// A rail that the unit's attitude took.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Taken {
-    /// \[us\] when, by the unit's clock.
-    pub at_us: u64,
-    /// What it took.
-    pub rail: Rail,
-}
 
 /// Why no rails are read.
 #[derive(Debug, thiserror::Error)]

@@ -10,9 +10,8 @@ use std::{
     path::Path,
 };
 
+use logs::recording::{self, RecordingError, Row};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-
-use crate::recording::{self, RecordingError, Row};
 
 const COLUMNS: [&str; 5] = ["t_s", "qw", "qx", "qy", "qz"];
 

@@ -9,12 +9,11 @@
 //! each turned to its end, as the unit reads it ([`emems::increments::forces`]).
 
 use emems::kalman::{Filter, Params, Sampled, Step};
-use nalgebra::{UnitQuaternion, Vector3};
-
-use crate::{
+use logs::{
     recording::Row,
     score::{Rmse, Score},
 };
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// White noise of the sensors, per component.
 #[derive(Clone, Copy, Debug, PartialEq)]

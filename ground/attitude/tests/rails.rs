@@ -1,16 +1,16 @@
 //! A unit on the launch rail: with the rails of its flight log its attitude comes back bit for bit.
 
-use attitude::{
-    flight::Flight,
-    log::Cycle,
-    rails::{self, NoRails},
-};
+use attitude::rails::{self, NoRails};
 use emems::{
     estimate::{Estimator, Site},
     sample::Sample,
     unit::Settings,
 };
 use host_tests::{Flight as Flown, MS, S, world};
+use logs::{
+    cycles::Cycle,
+    flight::{Flight, Taken},
+};
 use twin::plant::Plant;
 
 #[test]
@@ -49,7 +49,7 @@ fn the_attitude_is_the_units_with_the_rails_of_its_flight_log() {
             sent: Some(Box::new(*frame)),
         })
         .collect();
-    let replayed = |rails: &[rails::Taken]| Flight::of_unit(Estimator::of(&settings), &cycles, rails);
+    let replayed = |rails: &[Taken]| Flight::of_unit(Estimator::of(&settings), &cycles, rails);
     let all = replayed(&rails);
     assert_eq!((all.replayed[1], all.rails), (0, [2, 0]));
     for fewer in [&rails[..0], &rails[..1]] {

@@ -12,13 +12,13 @@
 
 use std::path::PathBuf;
 
+use logs::units::Units;
 use nalgebra::Vector3;
 use packets::magnitude;
 
 use crate::{
     table::{Row, Table, TableError},
     turntable::{Mount, Pose, Site, Turning},
-    units::Units,
 };
 
 /// What excites the channels.

@@ -3,8 +3,9 @@
 
 use std::path::Path;
 
-use attitude::{counts, recording};
+use attitude::counts;
 use bench::table::Table;
+use logs::recording;
 
 const FILE: &str = "fuzz.csv";
 

@@ -4,18 +4,17 @@
 
 use std::{io, time::Duration};
 
+use flight::interrupt::Interrupt;
+
 use super::{
     heard,
     pose::{POSES, TURNS},
     procedure::{Ask, Patience, Procedure},
     rig::Run,
 };
-use crate::{
-    console::{
-        line::{Heard, Line},
-        stream::Stream,
-    },
-    fly::interrupt::Interrupt,
+use crate::console::{
+    line::{Heard, Line},
+    stream::Stream,
 };
 
 /// Longest wait for the line.

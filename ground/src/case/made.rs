@@ -19,6 +19,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use flight::case::{
+    text::{CASE, MOTION, Text, UNIT},
+    windows::{self, TooShort},
+};
 use gap::{
     input::case::{Kind as LogKind, Subject, read_bytes, read_measured},
     null::problem::Problem,
@@ -26,12 +30,10 @@ use gap::{
 use twin::{motion::Recorded, predict::Kind};
 
 use super::{
-    CASE, MOTION, Text, UNIT,
     clock::{self, ClockError},
     described::{columns, format_of, unit},
     place::{check_units, environment, settled},
     reference::{Axes, Refused, Told},
-    windows::{self, TooShort},
 };
 
 /// Steps that the fine search of the clocks takes at most; three come to a tenth of a sigma from 50 ms off.
@@ -169,7 +171,7 @@ fn make_case(arguments: &Arguments) -> Result<String, MadeError> {
     said.extend(told.taken.iter().map(|line| format!("           {line}")));
     let record = |told: &Told, offset_s: f64, axes: Axes, is_inverse: bool| {
         let text = told.text(offset_s, axes, is_inverse);
-        Recorded::read(io::Cursor::new(text.into_bytes()), MOTION).map(|record| gap::input::reference::used(&record))
+        Recorded::read(io::Cursor::new(text.into_bytes()), MOTION).map(|record| record.used())
     };
     let rates = clock::rates(&log, &unit);
     let (mut offset_s, alike) = match arguments.offset_s {

@@ -4,9 +4,8 @@
 //! frames near each other, or after [`PATIENCE`] packets without. Packets are numbered, not timed, so every time in the
 //! tables hangs on it. Refused: frames that contradict what was told or what was settled on, since their times are the unit's.
 
+use logs::digest::Entry;
 use packets::stream::sequence::CYCLE_S;
-
-use crate::digest::Entry;
 
 /// Packets without two derived frames after which none are waited for: at 50 Hz one packet in nine has one.
 const PATIENCE: usize = 40;

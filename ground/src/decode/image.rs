@@ -5,6 +5,7 @@
 
 use std::{io::Write, path::Path};
 
+use logs::{digest::Digest, folder::Folder};
 use packets::stream::Bytes5To8;
 use recorder::{
     log::{self, LIMIT, Log},
@@ -12,7 +13,6 @@ use recorder::{
 };
 
 use super::{DecodeError, finish, input::Input, stem};
-use crate::{digest::Digest, folder::Folder};
 
 /// \[us\] from packet to packet where no header of a boot is left to say it.
 const PERIOD_US: u32 = 200_000;

@@ -1,25 +1,12 @@
-//! What flies the unit: its release image on the emulated board, or its code on this computer.
+//! What flies the unit: its release image on the emulated board.
 //!
 //! The image is the file that was named; else the one that the program was built with (`EMEMS_IMAGE`, see `build.rs`); else it is
-//! built from the sources that the program was built from. Both take the same plant, faults and bench. Out: remarks on what befell
-//! the unit, as rows of the summary.
+//! built from the sources that the program was built from. Out: remarks on what befell the unit, as rows of the summary.
 
 use std::path::Path;
 
-use emems::{estimate::Site, unit::Settings};
 use emulated::{Image, image::ImageError};
-use twin::{
-    host,
-    part::Nanos,
-    plant::Plant,
-    run::{Bench, Scheduled},
-};
-
-/// Flies a plant, with faults, until an instant or until the bench says stop.
-pub type Flight = Box<dyn FnOnce(Plant, &[Scheduled], Nanos, &mut dyn Bench) -> Result<Vec<Remark>, BoardError> + Send>;
-
-/// A row of the summary.
-pub type Remark = (&'static str, String);
+use flight::board::{Board, Trouble, reset};
 
 /// Why a board could not fly.
 #[derive(Debug, thiserror::Error)]
@@ -30,19 +17,6 @@ pub enum BoardError {
     /// The emulator gave up.
     #[error(transparent)]
     Emulated(#[from] emulated::Error),
-}
-
-/// The unit's code on this computer, in virtual time, told where it is.
-pub fn host(site: Site) -> Flight {
-    Box::new(move |plant, faults, end, bench| {
-        let settings = Settings {
-            site,
-            ..Settings::NOMINAL
-        };
-        let report = host::fly(plant, settings, faults, end, bench);
-        let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
-        Ok(resets.collect())
-    })
 }
 
 /// The image that the program was built with; empty for none.
@@ -64,22 +38,19 @@ pub fn release(file: Option<&Path>) -> Result<Image, ImageError> {
 ///
 /// # Errors
 /// See [`release`].
-pub fn image(file: Option<&Path>) -> Result<Flight, BoardError> {
-    Ok(on_emulated(release(file)?))
-}
-
-fn on_emulated(image: Image) -> Flight {
-    Box::new(move |plant, faults, end, bench| {
-        let report = emulated::fly(&image, plant, faults, end, bench)?;
-        let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
-        let unanswered = report
-            .unanswered
-            .iter()
-            .map(|access| ("unanswered access", access.clone()));
-        Ok(resets.chain(unanswered).collect())
+pub fn image(file: Option<&Path>) -> Result<Board, Trouble> {
+    let image = release(file).map_err(BoardError::from)?;
+    let what = file.map_or("release image".into(), |file| file.display().to_string());
+    Ok(Board {
+        name: format!("emulated STM32F4, {what}"),
+        fly: Box::new(move |plant, faults, end, bench| {
+            let report = emulated::fly(&image, plant, faults, end, bench).map_err(BoardError::from)?;
+            let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
+            let unanswered = report
+                .unanswered
+                .iter()
+                .map(|access| ("unanswered access", access.clone()));
+            Ok(resets.chain(unanswered).collect())
+        }),
     })
-}
-
-fn reset(at: Nanos, cause: &dyn std::fmt::Debug) -> Remark {
-    ("reset", format!("{:.3} s, {cause:?}", 1e-9 * at as f64))
 }

@@ -27,6 +27,9 @@ const ATTITUDE: [&str; 4] = ["qw", "qx", "qy", "qz"];
 const POSITION: [&str; 3] = ["px_m", "py_m", "pz_m"];
 const TEMPERATURE: &str = "temperature_c";
 
+/// \[Hz\] corners to which the record of an instrument that errs is smoothed, of attitude and position.
+pub const CORNERS_HZ: [f64; 2] = [20.0, 10.0];
+
 /// How far from one the norm of a recorded quaternion may be. Rounding to two decimals costs 0.01; a wrong column more.
 const NORM_TOLERANCE: f64 = 0.1;
 /// Cosine of half the largest turn between samples, 120 deg: from 180 deg on the way round is anyone's guess.
@@ -63,6 +66,16 @@ impl Recorded {
                 .map(|position| position.smoothed(position_hz, step_s)),
             temperature_c: self.temperature_c.clone(),
         }
+    }
+
+    /// What is used of the record of an instrument that errs: a hand or a table moves below [`CORNERS_HZ`], what is above is error.
+    pub fn used(&self) -> Self {
+        self.smoothed(CORNERS_HZ[0], CORNERS_HZ[1])
+    }
+
+    /// The same with an octave more.
+    pub fn finer(&self) -> Self {
+        self.smoothed(2.0 * CORNERS_HZ[0], 2.0 * CORNERS_HZ[1])
     }
 
     /// \[s\] its usual step between attitudes: the median.

@@ -29,6 +29,7 @@ use emems::{
     sample::Kind,
     unit::Settings,
 };
+use logs::cycles::Cycle;
 use nalgebra::Vector3;
 use packets::channel::{self, CHANNELS};
 use twin::{
@@ -38,7 +39,6 @@ use twin::{
 };
 
 use super::flown;
-use crate::log::Cycle;
 
 /// \[s\] at rest before a motion begins. Noise is a function of the time since power-on: from here on it is none that a
 /// rotation test has, the longer of which takes 89 s, so no test is flown with the noise its parameters were fitted to.

@@ -12,6 +12,7 @@ use emems::{
     geometry::frame_e::mirror_e_b,
     unit::Settings,
 };
+use logs::cycles::{Cycle, Cycles};
 use nalgebra::{UnitQuaternion, Vector3};
 use packets::stream::{Bytes5To8, Decoder};
 use twin::{
@@ -22,8 +23,6 @@ use twin::{
     plant::Plant,
     run::{Bench, Flow},
 };
-
-use crate::log::{Cycle, Cycles};
 
 /// \[ns\] a second.
 const S: f64 = 1e9;

@@ -16,7 +16,7 @@ use super::{
     series::Series,
     terms::Term,
 };
-use crate::spectrum;
+use logs::spectrum;
 
 /// What a further shape must take off the misfit, in squared standard deviations: one that is chosen out of a dozen and
 /// has a size takes off 9 in a hundredth of records without it.

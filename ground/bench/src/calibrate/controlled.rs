@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use logs::units::Units;
+
 use super::{CalibrateError, Output, Place, checks, read_nominal};
 use crate::{
     controlled::{self, Calibration, Contradicted, Options},
@@ -14,7 +16,6 @@ use crate::{
     set::Entry,
     stretches::{self, Stretch},
     table::{self, Table},
-    units::Units,
     wiring::surely_inverted,
 };
 

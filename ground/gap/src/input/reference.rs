@@ -4,22 +4,16 @@
 //! motion as it is used, and for each channel and row the standard deviation that the instrument puts into the prediction.
 //!
 //! An optical system resolves microns and microradians, which its rate, differentiated once or twice, turns into more than the
-//! unit's own noise. A hand or a table moves below [`CORNERS_HZ`], so what the octave above them holds is error. It changes within
+//! unit's own noise. A hand or a table moves below the corners of [`twin::motion::Recorded::used`], so what the octave above them holds is error. It changes within
 //! a second by ten times, with the markers that are seen, so it is taken over [`ALIKE_S`] to either side, at the pace of the record
 //! and not of the log, which may have one row in that time. How much there is below, the log tells ([`super::level`]): at most
 //! [`BELOW`] times as much for rates, no more than as much for specific forces.
 
 use std::rc::Rc;
 
-use twin::{
-    motion::Recorded,
-    predict::{Accuracy, Kind, Twin},
-};
+use twin::predict::{Accuracy, Kind, Twin};
 
 use crate::input::{level::levels, windows::Fit};
-
-/// \[Hz\] corners to which the record is smoothed, of attitude and position.
-const CORNERS_HZ: [f64; 2] = [20.0, 10.0];
 
 /// Most of the error below a corner over that in the octave above it, of rates. On BROAD's recordings 03 and 32, gyros calibrated
 /// on the spot, it is 1.3 to 1.7, for small errors and large ones, and 0.6 to 0.9 for specific forces.
@@ -59,7 +53,7 @@ impl Reference {
         }
     }
 
-    /// Of two twins, along the record as it is [`used`] and along what is [`finer`]: `close` at even instants that are as close as
+    /// Of two twins, along the record as it is [used](twin::motion::Recorded::used) and along what is [finer](twin::motion::Recorded::finer): `close` at even instants that are as close as
     /// the record's, `spread` all along the log, whose rows are those of `twin`.
     pub fn seen(accuracy: Accuracy, twin: &Twin, fit: &Fit, spread: [&Twin; 2], close: [&Twin; 2]) -> Self {
         let channels = &twin.unit().channels;
@@ -122,16 +116,6 @@ fn octave(channel: usize, [used, finer]: [&Twin; 2]) -> Vec<f64> {
         .zip(used.iter())
         .map(|(finer, used)| finer - used)
         .collect()
-}
-
-/// The record as it is used.
-pub fn used(record: &Recorded) -> Recorded {
-    record.smoothed(CORNERS_HZ[0], CORNERS_HZ[1])
-}
-
-/// The record with an octave more.
-pub fn finer(record: &Recorded) -> Recorded {
-    record.smoothed(2.0 * CORNERS_HZ[0], 2.0 * CORNERS_HZ[1])
 }
 
 /// A series whose mean square is asked for over [`ALIKE_S`] to either side of an instant, of what is finite there.

@@ -18,7 +18,7 @@ use crate::input::{
     gross::{Gross, put_right},
     hold::Held,
     log::{Column, Log, Masked, Stream},
-    reference::{self, Reference, SPREAD_S, finer},
+    reference::{Reference, SPREAD_S},
     windows::{Fit, Span},
 };
 
@@ -138,7 +138,7 @@ impl Subject {
         let (twin, reference) = if is_exact {
             (along(&record, &start_s)?, Reference::stated(stated))
         } else {
-            let used = reference::used(&record);
+            let used = record.used();
             let even = |step_s: f64, most: usize| -> Vec<f64> {
                 let instants = (0..most).map(|row| from_s + row as f64 * step_s);
                 instants.take_while(|t_s| *t_s < to_s).collect()
@@ -146,7 +146,7 @@ impl Subject {
             let twin = along(&used, &start_s)?;
             let close = even(step_s, MOST_ROWS);
             let spread = even(step_s.max(SPREAD_S), usize::MAX);
-            let finer = finer(&record);
+            let finer = record.finer();
             let [spread, close] = [spread, close].map(|t_s| [along(&used, &t_s), along(&finer, &t_s)]);
             let [[own, more], [close, closer]] = [spread, close];
             let reference = Reference::seen(stated, &twin, &fit, [&own?, &more?], [&close?, &closer?]);

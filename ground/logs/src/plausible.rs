@@ -6,7 +6,7 @@
 //! changes in b by `dv = -w x v dt`. So the regression of `dv` on `-w x v dt` has a slope of one, whatever the sensors'
 //! errors; of 1/57.3 with rates in deg/s, of 1/1000 with times in ms ([`magnitude::likely`]).
 
-use bench::units::Units;
+use crate::units::Units;
 use nalgebra::Vector3;
 use packets::magnitude::{self, Doubt, Kind, digits};
 

@@ -7,6 +7,10 @@
 //!
 //! A reference records an hour at most: a diagnosis uses 40 min of packets.
 
+pub mod instrument;
+pub mod text;
+pub mod windows;
+
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -22,10 +26,10 @@ use trials::{
 };
 use twin::predict::{Kind, UnitDescription, emems};
 
-use crate::case::{
-    self,
+use self::{
     instrument::{Instrument, Scenery, Unseen},
-    windows::{self, TooShort},
+    text::{CASE, MOTION, Text, UNIT},
+    windows::TooShort,
 };
 
 /// What was done to the unit.
@@ -71,6 +75,8 @@ pub enum CaseError {
 
 /// A flight that was made.
 pub struct Flown<'a> {
+    /// What the case is called.
+    pub name: &'a str,
     /// What was flown.
     pub scene: &'a Scene,
     /// What was done to it.
@@ -145,9 +151,8 @@ impl Flown<'_> {
         };
         let errors = self.seed.wrapping_add(self.flight << 32);
         let motion = (self.instrument).record(&scenery, zero_s, [-BEYOND_S, end_s + BEYOND_S], errors)?;
-        let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        let text = case::Text {
-            name: &name,
+        let text = Text {
+            name: self.name,
             kind: "packets",
             about: self.about,
             measured: "packets.txt",
@@ -159,9 +164,9 @@ impl Flown<'_> {
             ],
             windows: &windows,
         };
-        put(folder, case::MOTION, &motion)?;
-        put(folder, case::UNIT, &described(self.unit, instants).text())?;
-        put(folder, case::CASE, &text.toml())
+        put(folder, MOTION, &motion)?;
+        put(folder, UNIT, &described(self.unit, instants).text())?;
+        put(folder, CASE, &text.toml())
     }
 
     fn answer(&self) -> Result<String, toml::ser::Error> {

@@ -1,7 +1,7 @@
 //! What a flight is of: the unit as designed or as described, with what `--with` does to it.
 //!
 //! In: the command line and the world. Out: a [`Scene`] of [`trials`], whose physics is written apart from the effect library, so
-//! that the diagnosis is never checked against its own equations; `--unit` alone is the twin itself ([`super::taught`]).
+//! that the diagnosis is never checked against its own equations; `--unit` alone is the twin itself ([`crate::taught`]).
 //!
 //! Refused: what [`Refused`] and [`TaughtError`] list.
 
@@ -15,7 +15,7 @@ use trials::{
 };
 use twin::{motion::AnyWorld, plant::Views, predict::UnitDescription, truth::TruthSource};
 
-use super::{
+use crate::{
     case::LONGEST_S,
     plan::Arguments,
     taught::{self, TaughtError},

@@ -13,8 +13,8 @@ use emems::{
 use packets::stream::Item;
 
 use crate::{
+    cycles::{Cycle, Cycles},
     flight::{Estimate, Flight},
-    log::{Cycle, Cycles},
 };
 
 /// Estimates that are kept: seven hours at 5 Hz, some 36 MB.

@@ -3,14 +3,17 @@
 //! In: a [`Record`], and in simulation the true attitude. Out: [`Block`]s of a page. Values are nominal SI; plates share an axis, so
 //! that one that disagrees is seen. Where a bin holds several packets, its least and most are joined, so a peak is never drawn away.
 
+pub mod attitude;
 pub mod times;
 
-use attitude::{plots, recording::Row};
 use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel};
 use nalgebra::{UnitQuaternion, Vector3};
 use packets::channel::{CHANNELS, Quantity};
 
-use crate::{envelope::Bin, events::Events, record::Record, spectra::Spectra, summary::Summary, table::SLOT_NAMES};
+use crate::{
+    envelope::Bin, events::Events, record::Record, recording::Row, spectra::Spectra, summary::Summary,
+    table::SLOT_NAMES,
+};
 use times::Times;
 
 /// A channel that hardly changes is not blown up beyond this many counts.
@@ -202,7 +205,7 @@ fn attitude(record: &Record, times: &Times, truth: Option<Truth>) -> Result<Vec<
         instants.sort_by(f64::total_cmp);
         instants.into_iter().map(|t_s| at(t_s, truth)).collect()
     });
-    let figures = plots::attitude(&flight, rows.as_deref(), &times.clock)?;
+    let figures = attitude::attitude(&flight, rows.as_deref(), &times.clock)?;
     let about = match truth {
         Some(_) => format!("{} The reference is the motion that was flown.", follow.about()),
         None => follow.about(),

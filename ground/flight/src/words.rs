@@ -10,7 +10,7 @@ use emems::{
 use nalgebra::Vector3;
 use twin::motion::Motion as _;
 
-use super::{plan::Arguments, source::Source};
+use crate::{plan::Arguments, source::Source};
 
 /// [0.1 deg] of azimuth and elevation, standard deviation: marks along a rail of some metres, a bubble.
 const CREW_SD: [u8; 2] = [5, 3];

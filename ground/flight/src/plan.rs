@@ -6,14 +6,14 @@
 use std::{path::PathBuf, time::Duration};
 
 use emems::sample::SENSOR_COUNT;
+use logs::table::SLOT_NAMES;
 use trials::strike::Wish;
 use twin::{
     part::Nanos,
     run::{Fault, Scheduled},
 };
 
-use super::site;
-use crate::{case::instrument::Instrument, table::SLOT_NAMES};
+use crate::{case::instrument::Instrument, site};
 
 /// How long a flight beside a console lasts at most: longer than anybody sits there, and within the unit's clock.
 pub const UNTIL_TOLD: Duration = Duration::from_secs(100 * 365 * 86_400);
@@ -50,7 +50,7 @@ pub struct Arguments {
     pub motion_file: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
-    pub units: bench::units::Units,
+    pub units: logs::units::Units,
     /// Virtual time to fly, such as 90s, 10min, 24h [default: as long as the motion lasts, or 60s; with --console until told]
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub duration: Option<Duration>,
@@ -63,6 +63,9 @@ pub struct Arguments {
     /// Fly this image: the ELF file that cargo build --release leaves [default: the one in this program, else the sources']
     #[arg(long, value_name = "FILE", conflicts_with = "host")]
     pub image: Option<PathBuf>,
+    /// Compare with this folder, the same flight on the host, and take its place where all packets are the same
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["host", "console"])]
+    pub in_place_of: Option<PathBuf>,
     /// Where the flight's folder goes; an existing one is never overwritten
     #[arg(long, value_name = "DIR", default_value = "flights")]
     pub out: PathBuf,

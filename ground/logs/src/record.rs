@@ -3,7 +3,7 @@
 //! In: items of its stream, packets with their number. Out: summary, envelope, events, spectra, attitude. Memory does not grow with
 //! the flight.
 
-use attitude::follow::Follow;
+use crate::follow::Follow;
 use emems::{estimate::Site, unit::Settings};
 use packets::stream::{Item, sequence::Step};
 

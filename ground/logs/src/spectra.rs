@@ -1,10 +1,10 @@
 //! How a flight's readings scatter by frequency.
 //!
 //! In: packets by number. Out: power spectral densities [unit^2/Hz] of gyros, and of accelerometers and magnetometers by axis, the mean
-//! over the plates. Welch's estimate ([`bench::spectrum`]) of each block of [`BLOCK`] packets that follow each other, and the mean of the blocks;
+//! over the plates. Welch's estimate ([`crate::spectrum`]) of each block of [`BLOCK`] packets that follow each other, and the mean of the blocks;
 //! a shorter flight has that of its longest stretch. A channel that was not read throughout a block has no part in it.
 
-use bench::spectrum::welch;
+use crate::spectrum::welch;
 use emems::sample::Reading;
 use packets::channel::{self, CHANNEL_COUNT, CHANNELS, Quantity};
 

@@ -2,7 +2,7 @@
 //!
 //! In: an [`Envelope`]. Out: lines and spans over time. Lines break where nothing was read.
 
-use attitude::plots::Clock;
+use crate::plot::attitude::Clock;
 use chart::Axis;
 
 use crate::envelope::{Bin, Envelope};

@@ -5,13 +5,12 @@
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
-use attitude::{
+use emems::estimate::Site;
+use logs::{
     plausible::{self, Implausible},
     recording::Row,
+    units::Units,
 };
-use bench::units::Units;
-use emems::estimate::Site;
-use gap::input::{case::Opened, reference::used};
 use packets::magnitude::Kind;
 use trials::{
     draw::Draw,
@@ -24,8 +23,7 @@ use twin::{
     truth::{Truth, TruthSource},
 };
 
-use super::plan::Arguments;
-use crate::case::CASE;
+use crate::{case::text, plan::Arguments};
 
 /// Flown when nothing is named.
 const DEFAULT_MOTION: &str = "rocket";
@@ -115,12 +113,8 @@ pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
 /// it: differentiated as it is, a camera's noise would shake the unit.
 fn recorded(path: &Path) -> Result<Recorded, FileError> {
     let record = Recorded::open(path)?;
-    let case = Opened::open(&path.with_file_name(CASE));
-    let errs = case.is_ok_and(|case| {
-        let named = case.text.motion.as_deref().and_then(Path::file_name);
-        named == path.file_name() && case.text.reference.attitude_sigma_rad > 0.0
-    });
-    Ok(if errs { used(&record) } else { record })
+    let sigma_rad = text::reference_of(path);
+    Ok(if sigma_rad > 0.0 { record.used() } else { record })
 }
 
 /// A recording whose numbers can be in their units, or are in those that were said.

@@ -14,18 +14,27 @@ use emems::{
     derived::{self, Derived},
     estimate::Estimator,
     kalman::{Filter, Innovation, Outcome, Params, Quantity, Step},
+    rail::Rail,
     sample::NO_SLOT,
     triad::{Sighting, triad},
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::{
-    log::Cycle,
-    rails::Taken,
+    cycles::Cycle,
     recording::{Row, attitude_at},
     score::{Rmse, Score},
     whiteness::Check,
 };
+
+/// A rail that the unit's attitude took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// \[us\] when, by the unit's clock.
+    pub at_us: u64,
+    /// What it took.
+    pub rail: Rail,
+}
 
 /// One step's estimate.
 #[derive(Clone, Debug)]

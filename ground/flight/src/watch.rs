@@ -5,21 +5,29 @@
 
 use std::time::Duration;
 
+use logs::{
+    digest::{Digest, Entry},
+    folder::{Folder, FolderError},
+    record::Record,
+};
 use twin::{
     part::Nanos,
     run::{Bench, Flow},
 };
 
-use super::{interrupt::Interrupt, progress::Progress};
-use crate::{
-    console::line::UnitEnd,
-    digest::{Digest, Entry},
-    folder::{Folder, FolderError},
-    record::Record,
-};
+use crate::{interrupt::Interrupt, progress::Progress};
 
 /// \[ns\] when the words before a flight are said: the unit has long booted.
 const ASK_AT: Nanos = 300_000_000;
+
+/// Whoever sits at the umbilical of a flying unit.
+pub trait Umbilical: Send {
+    /// Takes what the unit said, or nothing but the time; whether anybody still listens.
+    fn hears(&self, at: Duration, bytes: &[u8]) -> bool;
+
+    /// What was said to the unit since the last call; never waits.
+    fn commands(&self) -> Vec<u8>;
+}
 
 /// What is left of a watched flight.
 pub struct Seen {
@@ -38,7 +46,7 @@ pub struct Watch {
     folder: Folder,
     digest: Digest,
     progress: Progress,
-    console: Option<UnitEnd>,
+    console: Option<Box<dyn Umbilical>>,
     words: Vec<u8>,
     interrupt: Interrupt,
     packets: u64,
@@ -53,7 +61,7 @@ impl Watch {
         folder: Folder,
         digest: Digest,
         progress: Progress,
-        console: Option<UnitEnd>,
+        console: Option<Box<dyn Umbilical>>,
         words: Vec<u8>,
         interrupt: Interrupt,
     ) -> Self {
@@ -99,7 +107,7 @@ impl Watch {
 
     fn tell_console(&mut self, at: Nanos, bytes: &[u8]) {
         if let Some(console) = &self.console {
-            self.closed |= console.send(Duration::from_nanos(at), bytes).is_err();
+            self.closed |= !console.hears(Duration::from_nanos(at), bytes);
         }
     }
 }
@@ -158,12 +166,15 @@ mod tests {
     use emems::{packet::encode, sample::Reading};
 
     use super::*;
-    use crate::console::line;
     use packets::stream::sequence::CYCLE_S;
+    use std::sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    };
 
     const MILLISECOND: Nanos = 1_000_000;
 
-    fn watch(place: &std::path::Path, console: Option<UnitEnd>, words: &[u8]) -> Watch {
+    fn watch(place: &std::path::Path, console: Option<Box<dyn Umbilical>>, words: &[u8]) -> Watch {
         let folder = Folder::create(place, "test-1", CYCLE_S).expect("folder");
         let progress = Progress::start(Duration::from_secs(60), false, true);
         Watch::new(
@@ -174,6 +185,24 @@ mod tests {
             words.to_vec(),
             Interrupt::default(),
         )
+    }
+
+    /// Says one word again and again.
+    #[derive(Clone, Default)]
+    struct Console {
+        heard: Arc<Mutex<Vec<u8>>>,
+        closed: Arc<AtomicBool>,
+    }
+
+    impl Umbilical for Console {
+        fn hears(&self, _: Duration, bytes: &[u8]) -> bool {
+            self.heard.lock().expect("heard").extend(bytes);
+            !self.closed.load(Ordering::Relaxed)
+        }
+
+        fn commands(&self) -> Vec<u8> {
+            b"G_ST".to_vec()
+        }
     }
 
     #[test]
@@ -206,15 +235,13 @@ mod tests {
     #[test]
     fn a_console_hears_the_umbilical_speaks_and_ends_the_flight_when_closed() {
         let place = tempfile::tempdir().expect("temporary folder");
-        let (mut line, unit) = line::channel("flying");
-        let mut watch = watch(place.path(), Some(unit), b"");
+        let console = Console::default();
+        let mut watch = watch(place.path(), Some(Box::new(console.clone())), b"");
         watch.umbilical(7 * MILLISECOND, b">up\n");
-        let heard = line::Line::hear(&mut line, Duration::ZERO);
-        assert!(matches!(heard, line::Heard::Bytes { bytes, .. } if bytes == b">up\n"));
-        line::Line::say(&mut line, b"G_ST").expect("say");
+        assert_eq!(*console.heard.lock().expect("heard"), b">up\n");
         assert_eq!(watch.commands(8 * MILLISECOND), b"G_ST");
         assert_eq!(watch.advanced(9 * MILLISECOND), Flow::Continue);
-        drop(line);
+        console.closed.store(true, Ordering::Relaxed);
         assert_eq!(watch.advanced(10 * MILLISECOND), Flow::Stop);
     }
 

@@ -8,7 +8,7 @@
 
 use std::f64::consts::PI;
 
-use rustfft::{FftPlanner, num_complex::Complex};
+use twin::fourier::{self, Complex};
 
 /// Fewest values with a spectrum.
 pub const SHORTEST: usize = 64;
@@ -31,7 +31,7 @@ pub fn welch(values: &[f64], step_s: f64) -> Vec<(f64, f64)> {
         .map(|k| 0.5 - 0.5 * (2.0 * PI * (k as f64 + 0.5) / length as f64).cos())
         .collect();
     let norm = 2.0 * step_s / window.iter().map(|w| w * w).sum::<f64>();
-    let fft = FftPlanner::new().plan_fft_forward(length);
+    let fft = fourier::forward(length);
     let mut power = vec![0.0; length / 2];
     let mut segments = 0.0;
     for start in (0..=values.len() - length).step_by(length / 2) {
