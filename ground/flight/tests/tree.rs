@@ -32,7 +32,6 @@ fn built(words: &[&str]) -> BTreeSet<(String, String)> {
             "host-tuple",
             "--prefix",
             "none",
-            "--no-dedupe",
         ])
         .args(["--format", "{p}|{f}"])
         .args(words)
@@ -44,7 +43,8 @@ fn built(words: &[&str]) -> BTreeSet<(String, String)> {
     let line = |line: &str| {
         let (package, features) = line.split_once('|')?;
         let named: Vec<&str> = package.split(' ').take(2).collect();
-        Some((named.join(" "), features.to_owned()))
+        // A package that was shown before has a star.
+        Some((named.join(" "), features.trim_end_matches(" (*)").to_owned()))
     };
     text.lines().filter_map(line).collect()
 }
