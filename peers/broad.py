@@ -2,7 +2,7 @@
 
 In: a folder of recordings, and the step [rad/s] of their rates' codes, which were cut towards zero: half of it is put
 back, as for ours (ground/attitude/src/replay.rs). Out, on standard output: CSV
-`filter,recording,mode,total,heading,inclination` in degrees, scored as ground/attitude/src/score.rs scores ours. Modes:
+`filter,recording,mode,total,heading,inclination` in degrees, scored as ground/logs/src/score.rs scores ours. Modes:
 full (285.7 Hz), five (5 Hz, each period's rotation composed of the samples' and given as a rate, three samples of force
 turned to its end, one of the field: what ours is given), single (the same with one sample of force) and motion (begun
 10 s into the motion). Mode speed has updates a second in one thread in place of the total error, the most of five runs.

@@ -48,7 +48,7 @@ fn fly(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
         ..arguments.clone()
     };
     let landed = on_host(&first, &interrupt, "; the image's flight takes this one's place")?;
-    if !landed.whole {
+    if !landed.whole || interrupt.is_raised() {
         print!("{}", landed.text(arguments, &landed.page()));
         return Ok(ExitCode::SUCCESS);
     }

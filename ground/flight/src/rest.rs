@@ -1,10 +1,11 @@
 //! The second step: `ground fly`, built and run with the words of this program.
 //!
-//! In: the folder of the first flight, if there is one. Out: the exit code of `ground fly`. Cargo's progress is on standard error. Refuses
-//! where the sources are gone, or cargo does not start.
+//! In: the folder of the first flight, if there is one. Out: the exit code of `ground fly`. Cargo's progress is on standard error. On
+//! Unix it takes this process, so that Ctrl-C and requests to terminate reach the flight. Refuses where the sources are gone, or cargo
+//! does not start.
 
 use std::{
-    env,
+    env, io,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
 };
@@ -17,7 +18,7 @@ pub enum NoRest {
     Sources(PathBuf),
     /// Cargo.
     #[error("cargo does not start: {0}; --host flies without it")]
-    Cargo(std::io::Error),
+    Cargo(io::Error),
 }
 
 /// Builds `ground` and flies the image.
@@ -47,8 +48,19 @@ pub fn fly(first: Option<&Path>) -> Result<ExitCode, NoRest> {
     if let Some(first) = first {
         cargo.arg("--in-place-of").arg(first);
     }
-    let status = cargo.status().map_err(NoRest::Cargo)?;
-    // Without a code a signal ended it.
-    let code = status.code().and_then(|code| u8::try_from(code).ok());
+    run(cargo).map_err(NoRest::Cargo)
+}
+
+#[cfg(unix)]
+fn run(mut cargo: Command) -> io::Result<ExitCode> {
+    use std::os::unix::process::CommandExt;
+
+    // It returns only where there is no such program.
+    Err(cargo.exec())
+}
+
+#[cfg(not(unix))]
+fn run(mut cargo: Command) -> io::Result<ExitCode> {
+    let code = cargo.status()?.code().and_then(|code| u8::try_from(code).ok());
     Ok(ExitCode::from(code.unwrap_or(1)))
 }
