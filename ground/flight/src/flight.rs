@@ -121,6 +121,9 @@ pub fn fly_until(
     };
     let faults = plan::faults(&arguments.silent, duration)?;
     let end = plan::nanos(duration)?;
+    if let Some(first) = arguments.in_place_of.as_deref().filter(|first| !first.is_dir()) {
+        return Err(PlanError::NoFirst(first.display().to_string()).into());
+    }
     // An image that cannot be read or built must not leave an empty folder.
     let Board { name: board, fly } = board(source.site).map_err(FlyError::Board)?;
     // Without an end the scene is that of the motion, or of an hour.
@@ -389,6 +392,13 @@ mod tests {
             .map(|error| error.to_string())
             .unwrap_or_default();
         assert!(error.contains("no-such-file.csv"), "{error}");
+        let first = place.path().join("rocket-1").display().to_string();
+        let error = on_host(
+            &words(&["--in-place-of", &first]).expect("arguments"),
+            &Interrupt::default(),
+        )
+        .err();
+        assert!(matches!(error, Some(FlyError::Plan(PlanError::NoFirst(_)))));
         assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 0);
     }
 }

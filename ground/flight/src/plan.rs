@@ -129,6 +129,9 @@ pub enum PlanError {
         /// When the flight ends.
         end: Duration,
     },
+    /// There is no first flight.
+    #[error("--in-place-of {0}: there is no such folder")]
+    NoFirst(String),
     /// The time asked for does not fit the unit's clock of 2^64 ns.
     #[error("{0:?} is longer than the 584 years that can be flown")]
     TooLong(Duration),
