@@ -10,7 +10,7 @@ use gap::{
     parity::{
         course::Course,
         flight::Flight,
-        smooth::{self, Smoothed},
+        smooth::{self, About, Smoothed},
         space::Space,
     },
 };
@@ -28,14 +28,17 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
     let flight = Flight::open(folder)?;
     let began = Instant::now();
     let (course, start) = Course::of(&flight.log, &flight.unit, &flight.environment);
-    let smoothed = Smoothed::of(
-        &flight.log,
-        &flight.unit,
-        &flight.environment,
-        (&course, &start),
-        flight.rests(&flight.log, &flight.unit),
-        &|_| (),
-    )?;
+    let about = About {
+        log: &flight.log,
+        unit: &flight.unit,
+        environment: &flight.environment,
+        course: &course,
+        start: &start,
+    };
+    let mut smoothed = Smoothed::of(&about, flight.rests(&flight.log, &flight.unit), &|_| ())?;
+    if smoothed.is_settled() {
+        smoothed.hold(&flight.known, &about, &|_| ())?;
+    }
     let stepped = began.elapsed().as_secs_f64();
     let twin = smoothed.twin(&flight.log, &flight.unit, &flight.environment)?;
     let (fit, reference) = (smooth::fit(&flight.log), Reference::default());

@@ -51,7 +51,9 @@ impl Kept {
         let opened = Opened::open(case)?;
         let text = &opened.text;
         let motion = text.motion.as_ref().filter(|_| sees_motion);
-        let named = [Some(&text.unit), Some(&text.measured), motion];
+        let known = &text.motion_known;
+        let [track, simulated] = [&known.track, &known.simulated].map(|own| own.as_ref().filter(|_| motion.is_none()));
+        let named = [Some(&text.unit), Some(&text.measured), motion, track, simulated];
         let files = named.into_iter().flatten().map(|relative| opened.path(relative));
         let mut sum = Sha256::new();
         // Lengths first, so that a byte that goes from one to the next is another key.
@@ -177,6 +179,28 @@ mod tests {
             assert_eq!(kept(place, &[]).read(), None, "{name}");
             fs::write(place.join(name), before).expect(name);
             assert_eq!(kept(place, &[]).read(), Some(analysis.clone()), "{name}");
+        }
+    }
+
+    #[test]
+    fn another_track_or_simulated_trajectory_is_another_case() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = folder.path();
+        case(place);
+        let text = fs::read_to_string(place.join("case.toml")).expect("a case");
+        let known = "[motion_known]\ntrack = \"track.csv\"\nsimulated = \"s.csv\"\n[motion_known.distrust]\n\
+                     rest = { attitude_deg = 1.0 }\n";
+        let text = text.replace("motion = \"motion.csv\"\n", "") + known;
+        fs::write(place.join("case.toml"), text).expect("a case");
+        for name in ["track.csv", "s.csv"] {
+            fs::write(place.join(name), name).expect(name);
+        }
+        let blind = || Kept::blind(place, &[]).expect("a case");
+        for name in ["track.csv", "s.csv"] {
+            blind().write(&Analysis::new()).expect("kept");
+            assert_eq!(blind().read(), Some(Analysis::new()));
+            fs::write(place.join(name), "another").expect(name);
+            assert_eq!(blind().read(), None, "{name}");
         }
     }
 

@@ -12,7 +12,7 @@
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
 //! | 6 | [`visible`], [`nulls`] | of each effect, what this log can show at all, before anything is sought |
 //! | 7 | [`search`] | which effects the evidence prefers among those that can be seen |
-//! | 8 | [`crate::parity::smooth`], [`followed`] | the motion along the whole log |
+//! | 8 | [`crate::parity::smooth`], [`followed`], [`known`] | the motion along the whole log, with what else is known of it |
 //! | 9 | [`smoothed`] | which others it prefers about that motion, and what the held-out windows say |
 //! | 10 | [`findings`], [`name`] | which of them are said, and where the gap is |
 //! | 11 | [`text`], [`verdict`], [`page`] | how it is told |
@@ -37,6 +37,7 @@ pub mod course;
 pub mod findings;
 pub mod flight;
 pub mod followed;
+pub mod known;
 pub mod name;
 pub mod nulls;
 pub mod packet;
@@ -101,7 +102,7 @@ pub fn analysed(
     let followed = Followed::of(&flight, &flight.log, &coded);
     let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
     let told = Told::along(&followed, &|share| progress("attitude", share))?;
-    let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings))?;
+    let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings, &told))?;
     let screen = text::screen(&flight, &findings, &told);
     let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings, &told)?];
     let mut texts: Vec<(String, String)> = FILES.iter().map(|name| (*name).to_owned()).zip(texts).collect();

@@ -323,6 +323,11 @@ thresholds! {
         larger: "chance is taken for old samples",
         smaller: "few old samples are not found",
         Convention("one healthy log in ten thousand");
+    /// Probability below which what is told of a motion is not of this flight, and is not used.
+    NOT_OF_THIS_FLIGHT: f64 = 1e-3, in "probability",
+        larger: "tracks and simulated trajectories that are right are left unused",
+        smaller: "a motion of another flight bends this one",
+        Convention("once in a thousand: a track that is wrongly left out costs what it would have told, and is said");
     /// Second difference of the specific force from which on it is a knock.
     KNOCK_M_S2: f64 = 50.0, in "m/s^2",
         larger: "light taps are not counted",
@@ -371,8 +376,8 @@ mod tests {
 
     /// Fewer is better: fewer than fifty of the diagnosis with a reference, and whoever adds one takes another out or says why
     /// here. Four more are of logs without a reference, which are judged by other numbers; six of one plate, whose names rest on no evidence of
-    /// the library; two of chips, which are told and not judged.
-    const MOST: usize = 49 + 4 + 6 + 2;
+    /// the library; two of chips, which are told and not judged; one of what is told of a motion, which no fewer words refuse.
+    const MOST: usize = 49 + 4 + 6 + 2 + 1;
 
     #[test]
     fn every_threshold_is_listed_whole_and_once() {

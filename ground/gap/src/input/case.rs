@@ -10,6 +10,7 @@
 
 mod allowance;
 mod environment;
+mod known;
 mod measured;
 mod plausible;
 mod subject;
@@ -30,6 +31,7 @@ use crate::input::{
 
 pub use allowance::{Bars, SlowErrors};
 pub use environment::environment as environment_of;
+pub use known::{Distrust, Distrusts, MotionKnown};
 pub use measured::read_measured;
 pub use subject::{Subject, columns as columns_of};
 pub use table::{Position, read_table};
@@ -125,15 +127,6 @@ pub struct CaseFile {
     pub matters: Matters,
     /// What is fitted and what only judges; a log without a reference is parted by itself where nobody says it.
     pub windows: Option<WindowPairs>,
-}
-
-/// `[motion_known]`.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MotionKnown {
-    /// Nothing.
-    #[serde(default)]
-    pub none: bool,
 }
 
 /// `[phases]`: pairs of seconds each.
@@ -264,10 +257,7 @@ impl Opened {
                 format!("is {:?}, known is \"gap-case/1\"", text.format),
             ));
         }
-        if text.motion_known.none && text.motion.is_some() {
-            let problem = "says that no motion is known, and motion names one; keep one of the two";
-            return Err(CaseError::key(&file, "motion_known.none", problem));
-        }
+        text.motion_known.check(&file, text.motion.is_some())?;
         let (fit, hold) = match &text.windows {
             Some(pairs) => (
                 spans(&file, "windows.fit", &pairs.fit)?,

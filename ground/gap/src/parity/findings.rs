@@ -30,6 +30,7 @@ use crate::{
         name::{By, Name},
         nulls,
         packet::Motion,
+        phases::shown,
         search::{self, First, Offered, residual_of},
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
@@ -161,6 +162,9 @@ impl Findings {
             is_believed
         });
         let model: Vec<Component> = causes.iter().map(|(_, (component, _))| component.clone()).collect();
+        for (at, (name, _)) in causes.iter_mut().enumerate() {
+            name.alone = shown::only_in(&problem, &model, at, &flight.phases);
+        }
         let kept = space.kept(&residual);
         let before = gap(&kept);
         let left = Left::of(&space, &projected(&space, &model));

@@ -18,6 +18,7 @@ use crate::{
         windows::{Span, Windows},
     },
     parity::{
+        known::Known,
         phases::{self, Stretch},
         smooth::rests::rests,
     },
@@ -41,6 +42,8 @@ pub struct Flight {
     pub phases: Vec<Stretch>,
     /// Whether its file says so.
     pub are_phases_told: bool,
+    /// What else is known of its motion.
+    pub known: Known,
     /// All rows, none thinned.
     pub whole: Log,
     /// The rows of the fit windows.
@@ -84,6 +87,7 @@ impl Flight {
             None => phases::found(&log, &unit, &environment),
         };
         Ok(Flight {
+            known: Known::open(&opened, &phases)?,
             phases,
             are_phases_told: opened.text.phases.is_some(),
             log: only(&log, &rows),

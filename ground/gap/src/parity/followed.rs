@@ -17,7 +17,8 @@ use crate::{
         codes::{self, Finding},
         course::{Course, Start},
         flight::Flight,
-        smooth::{self, Smoothed, smoothing::Smoothing},
+        known::Known,
+        smooth::{self, About, Smoothed, smoothing::Smoothing},
         space::Space,
     },
 };
@@ -34,6 +35,7 @@ pub struct Followed {
     motion: OnceCell<Smoothing>,
     calibrated: OnceCell<DMatrix<f64>>,
     environment: Environment,
+    known: Known,
     rests: Vec<(f64, f64)>,
     start: Start,
 }
@@ -54,6 +56,7 @@ impl Followed {
             log,
             unit,
             environment,
+            known: flight.known.clone(),
             start,
         }
     }
@@ -66,15 +69,17 @@ impl Followed {
         if let Some(known) = self.smoothed.get() {
             return Ok(known);
         }
-        let course = (&self.course, &self.start);
-        let smoothed = Smoothed::of(
-            &self.log,
-            &self.unit,
-            &self.environment,
-            course,
-            self.rests.clone(),
-            progress,
-        )?;
+        let about = About {
+            log: &self.log,
+            unit: &self.unit,
+            environment: &self.environment,
+            course: &self.course,
+            start: &self.start,
+        };
+        let mut smoothed = Smoothed::of(&about, self.rests.clone(), progress)?;
+        if smoothed.is_settled() {
+            smoothed.hold(&self.known, &about, progress)?;
+        }
         Ok(self.smoothed.get_or_init(|| smoothed))
     }
 

@@ -8,7 +8,7 @@ use crate::{
     holdout::strength::Promise,
     library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
-    parity::{codes::Finding, search::Chosen, smoothed::Fitted},
+    parity::{codes::Finding, phases::shown::Alone, search::Chosen, smoothed::Fitted},
     probability::cause::Sized,
 };
 
@@ -47,6 +47,8 @@ pub struct Name {
     pub snr: Option<[f64; 2]>,
     /// What the held-out windows say of its strength; none where they were not asked.
     pub promise: Option<Promise>,
+    /// The phase it shows in alone; none of what codes say.
+    pub alone: Option<Alone>,
     /// Its parameters.
     pub parameters: Vec<Sized>,
     /// What was seen, or which of what it may be.
@@ -81,6 +83,7 @@ impl Name {
             gain: None,
             snr: None,
             promise: None,
+            alone: None,
             parameters: Vec::new(),
             which: Some(finding.what.clone()),
             physics: page.map_or("", |page| page.physics),
@@ -107,6 +110,7 @@ impl Name {
             gain: Some(chosen.gain),
             snr: Some([chosen.snr, chosen.found_snr]),
             promise: None,
+            alone: None,
             parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
             which: hypothesis.cause.effect.told(hypothesis.cause.variant),
             physics: page.physics,

@@ -1,18 +1,22 @@
 //! What a flight does when: rest, thrust, coast, spin, entry, parachute, landed.
 //!
 //! In: a log ([`found()`]), or `[phases]` of `case.toml` ([`told`]), which is taken instead. Out: [`Stretch`]es in the order of time; those of spin lie
-//! across the others.
+//! across the others. Which phase an effect shows in alone is [`shown`]'s.
 
 mod found;
+pub mod shown;
 
 use std::{fmt::Write, path::Path};
+
+use serde::Serialize;
 
 use crate::input::case::{CaseError, PhasePairs};
 
 pub use found::{BIN_S, found};
 
 /// What it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Phase {
     /// Before a flight, or of a unit that does not fly.
     Rest,
@@ -65,7 +69,7 @@ impl Phase {
 }
 
 /// A phase from an instant to another \[s\].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Stretch {
     /// Which.
     pub phase: Phase,
@@ -147,6 +151,22 @@ pub fn flies(stretches: &[Stretch], t_s: f64) -> bool {
     stretches
         .iter()
         .any(|own| own.phase.is_flight() && (own.from_s - BIN_S..own.to_s + BIN_S).contains(&t_s))
+}
+
+/// To a thousandth of a second, for a file.
+pub fn rounded(stretches: &[Stretch]) -> Vec<Stretch> {
+    let own = |time_s: f64| (1e3 * time_s).round() / 1e3;
+    let each = stretches.iter().map(|stretch| Stretch {
+        phase: stretch.phase,
+        from_s: own(stretch.from_s),
+        to_s: own(stretch.to_s),
+    });
+    each.collect()
+}
+
+/// By what phases are known, for a file.
+pub fn told_by(are_told: bool) -> &'static str {
+    if are_told { "case.toml" } else { "found" }
 }
 
 /// Whether the first phase of a flight that the log has is one under way: it began before the log did.

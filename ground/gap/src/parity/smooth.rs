@@ -10,6 +10,7 @@
 //! | 3 | [`rows`], [`basis`] | how a turn and an acceleration change each sample |
 //! | 4 | [`prior`], [`smoothing`], [`banded`] | the normal matrix of the motion, its factor, its covariance |
 //! | 5 | this one | Gauss and Newton's steps with the calibration beside, until no attitude turns any more |
+//! | 6 | [`holding`], [`tied`] (by [`crate::parity::known`]) | further steps with what else is known of the motion, once it has settled without |
 //!
 //! A step that does not make the energy of residuals and prior smaller is halved. Within [`LINEAR_RAD`] one factor serves several
 //! steps (the chord method: Ortega and Rheinboldt 1970, 7.1). It has settled where the last step turned nothing by more than
@@ -22,10 +23,12 @@
 
 pub mod banded;
 pub mod basis;
+mod holding;
 pub mod prior;
 pub mod rests;
 pub mod rows;
 pub mod smoothing;
+pub mod tied;
 pub mod told;
 pub mod trajectory;
 
@@ -41,6 +44,10 @@ use crate::{
     null::problem::Problem,
     parity::{
         course::{Course, Start},
+        known::{
+            simulated::Belief,
+            ties::{Ties, Use},
+        },
         smooth::{
             basis::Knots,
             rows::{UNKNOWNS, past_s},
@@ -73,6 +80,21 @@ const STILL: f64 = 0.003;
 /// Knots a packet: two instants of field and force, and gyros between.
 const KNOTS_A_ROW: f64 = 2.0;
 
+/// A log, and what its motion begins with.
+#[derive(Clone, Copy)]
+pub struct About<'a> {
+    /// It.
+    pub log: &'a Log,
+    /// Whose it is.
+    pub unit: &'a UnitDescription,
+    /// Where.
+    pub environment: &'a Environment,
+    /// How lively the motion is.
+    pub course: &'a Course,
+    /// Where it begins.
+    pub start: &'a Start,
+}
+
 /// What is left along a trajectory.
 struct At {
     /// What a step makes smaller: the energy of the residuals with the calibration fitted, and that of the prior rows.
@@ -81,17 +103,21 @@ struct At {
     residuals: Entries,
     /// In their sigmas.
     prior: Vec<f64>,
+    /// Rows of a track, in theirs.
+    track: Option<DVector<f64>>,
 }
 
 impl At {
     /// Standard deviation of a sum of as many squares of normal numbers.
     fn chance(&self) -> f64 {
         let samples: usize = self.residuals.iter().map(|(_, values)| values.len()).sum();
-        (2.0 * (samples + self.prior.len()) as f64).sqrt()
+        let track = self.track.as_ref().map_or(0, DVector::len);
+        (2.0 * (samples + self.prior.len() + track) as f64).sqrt()
     }
 }
 
 /// A flight as its log tells it.
+#[derive(Clone)]
 pub struct Smoothed {
     /// The motion.
     pub trajectory: Trajectory,
@@ -101,6 +127,12 @@ pub struct Smoothed {
     pub knots: Knots,
     /// \[rad\] the largest turn of each step.
     pub turns: Vec<f64>,
+    /// What it is tied to besides.
+    pub ties: Ties,
+    /// What became of the track; none where there is none.
+    pub track: Option<Use>,
+    /// What became of the simulated trajectory.
+    pub belief: Option<Belief>,
     /// By how much the last step made the energy of residuals and prior smaller.
     gain: f64,
     /// Standard deviation that this energy has by chance.
@@ -112,14 +144,14 @@ impl Smoothed {
     ///
     /// # Errors
     /// When the unit's description names an effect there is not.
-    pub fn of(
-        log: &Log,
-        unit: &UnitDescription,
-        environment: &Environment,
-        (course, start): (&Course, &Start),
-        rests: Vec<(f64, f64)>,
-        progress: &dyn Fn(f64),
-    ) -> Result<Self, CaseError> {
+    pub fn of(about: &About, rests: Vec<(f64, f64)>, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+        let About {
+            log,
+            unit,
+            environment,
+            course,
+            start,
+        } = about;
         let (first_s, last_s) = (log.start_s[0], log.start_s[log.start_s.len() - 1]);
         let slots_s = || unit.channels.iter().map(|channel| channel.slot_s);
         let (earliest_s, latest_s) = (slots_s().fold(0.0, f64::min), slots_s().fold(0.0, f64::max));
@@ -131,37 +163,41 @@ impl Smoothed {
             rests,
             knots,
             turns: Vec::new(),
+            ties: Ties::default(),
+            track: None,
+            belief: None,
             gain: f64::INFINITY,
             chance: 0.0,
         };
-        while smoothed.turns.len() < MOST_STEPS && !smoothed.is_settled() {
-            if !smoothed.steps(log, unit, environment, (course, start), progress)? {
+        smoothed.settle(about, progress)?;
+        Ok(smoothed)
+    }
+
+    /// Steps until it has settled, or none helps any more.
+    fn settle(&mut self, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
+        let until = self.turns.len() + MOST_STEPS;
+        while self.turns.len() < until && !self.is_settled() {
+            if !self.steps(about, until, progress)? {
                 break;
             }
         }
-        Ok(smoothed)
+        Ok(())
     }
 
     /// Linearises about the trajectory, and steps as long as that holds. A step that makes the cost no smaller is halved; whether
     /// some part of each did.
-    fn steps(
-        &mut self,
-        log: &Log,
-        unit: &UnitDescription,
-        environment: &Environment,
-        course: (&Course, &Start),
-        progress: &dyn Fn(f64),
-    ) -> Result<bool, CaseError> {
+    fn steps(&mut self, about: &About, until: usize, progress: &dyn Fn(f64)) -> Result<bool, CaseError> {
+        let (log, course) = (about.log, (about.course, about.start));
         let (fit, reference) = (fit(log), Reference::default());
-        let twin = self.twin(log, unit, environment)?;
+        let twin = self.twin(log, about.unit, about.environment)?;
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = self.smoothing(&problem, course.0, course.1);
         let space = Space::new(&problem, &motion, Vec::new());
         let mut now = self.at(&problem, log, course)?;
         let mut turned = 0.0;
-        while self.turns.len() < MOST_STEPS && turned < LINEAR_RAD && !self.is_settled() {
+        while self.turns.len() < until && turned < LINEAR_RAD && !self.is_settled() {
             progress(self.turns.len() as f64 / MOST_STEPS as f64);
-            let prior = motion.prior_of(now.prior.iter().copied());
+            let prior = motion.prior_of(now.prior.iter().copied(), now.track.as_ref());
             let residual = space.project_residual(now.residuals, &prior);
             let correction = motion.correction(&space.motion_part(&residual));
             let turn = self.trajectory.turn(&self.knots, &correction);
@@ -194,8 +230,11 @@ impl Smoothed {
     /// What the log leaves along the trajectory, with the calibration as a problem has it.
     fn at(&self, problem: &Problem, log: &Log, course: (&Course, &Start)) -> Result<At, CaseError> {
         let twin = self.twin(log, problem.twin.unit(), problem.twin.environment())?;
-        let prior = prior::off(&log.start_s, &self.trajectory, course, &self.knots, &self.still());
+        let mut prior = prior::off(&log.start_s, &self.trajectory, course, &self.knots, &self.still());
+        prior.extend(self.ties.rows(&self.trajectory, &self.knots).iter().map(|row| row.off));
+        let track = self.ties.aligned(&self.trajectory).map(|aligned| aligned.off);
         let mut cost: f64 = prior.iter().map(|off| off * off).sum();
+        cost += track.as_ref().map_or(0.0, DVector::norm_squared);
         let mut residuals = Entries::new();
         let mut memory = Memory::default();
         for (channel, frame) in problem.frames.iter().enumerate() {
@@ -206,7 +245,12 @@ impl Smoothed {
             cost += residual.norm_squared() - frame.open_part(&residual).norm_squared();
             residuals.push((channel, residual));
         }
-        Ok(At { cost, residuals, prior })
+        Ok(At {
+            cost,
+            residuals,
+            prior,
+            track,
+        })
     }
 
     /// Whether the last step turned nothing any more, and made the residuals no smaller than chance makes them.
@@ -225,7 +269,19 @@ impl Smoothed {
 
     /// The motion about it, to be eliminated.
     pub fn smoothing(&self, problem: &Problem, course: &Course, start: &Start) -> Smoothing {
-        Smoothing::of(problem, &self.trajectory, (course, start), self.knots, &self.still())
+        let beside = self.ties.rows(&self.trajectory, &self.knots);
+        let motion = Smoothing::of(
+            problem,
+            &self.trajectory,
+            (course, start),
+            self.knots,
+            &self.still(),
+            beside,
+        );
+        match self.ties.aligned(&self.trajectory) {
+            Some(aligned) => motion.tied(&self.ties.fixes, &aligned, &self.trajectory),
+            None => motion,
+        }
     }
 
     fn still(&self) -> Vec<((f64, f64), f64)> {

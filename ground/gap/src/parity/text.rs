@@ -53,6 +53,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     out += &places(findings);
     out += &why(flight, findings);
     let _ = writeln!(out, "{}", told.line());
+    out += &told.known_lines(&flight.known);
     let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
     wrapped(&out)
 }
@@ -136,6 +137,9 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
         }
         if !name.or_at.is_empty() {
             let _ = writeln!(out, "        or, as likely from this log, at {}", name.or_at.join(", "));
+        }
+        if let Some(alone) = &name.alone {
+            let _ = writeln!(out, "        {}", alone.told());
         }
         if let Some(which) = &name.which {
             let _ = writeln!(out, "        which: {which}");

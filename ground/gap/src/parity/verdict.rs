@@ -14,6 +14,8 @@ use crate::{
         flight::Flight,
         name::{By, Name},
         nulls::NULLS,
+        phases::{self, Phase, Stretch},
+        smooth::told::Told,
         text,
     },
     report::verdict::{self as report, Alternative, Parameter},
@@ -26,8 +28,12 @@ pub struct Verdict {
     format: &'static str,
     from: &'static str,
     gap: Gap,
+    phases: Vec<Stretch>,
+    phases_from: &'static str,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     chips: Vec<serde_json::Value>,
+    #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
+    motion_known: serde_json::Map<String, serde_json::Value>,
     causes: Vec<Cause>,
     alternatives: Vec<Alternative>,
     none_of_these: f64,
@@ -53,6 +59,8 @@ struct Cause {
     or_at: Vec<String>,
     probability: f64,
     by: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    only_in: Option<Phase>,
     parameters: BTreeMap<String, Parameter>,
 }
 
@@ -80,8 +88,8 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl Verdict {
-    /// Of findings.
-    pub fn new(flight: &Flight, findings: &Findings) -> Self {
+    /// Of findings, and what is told of the motion.
+    pub fn new(flight: &Flight, findings: &Findings, told: &Told) -> Self {
         let cause = |name: &Name| Cause {
             effect: name.effect,
             channels: flight.names(&name.channels),
@@ -92,6 +100,7 @@ impl Verdict {
                 By::Parity => "evidence",
                 By::Smoothing => "smoothing",
             },
+            only_in: name.alone.map(|alone| alone.phase),
             parameters: (name.parameters.iter())
                 .map(|sized| {
                     let parameter = Parameter {
@@ -125,7 +134,10 @@ impl Verdict {
                 floor: 1.0,
                 units: "sigma",
             },
+            phases: phases::rounded(&flight.phases),
+            phases_from: phases::told_by(flight.are_phases_told),
             chips: chips::text::json(&findings.chips),
+            motion_known: told.known_json(&flight.known),
             causes: findings.names.iter().map(cause).collect(),
             alternatives: findings.alternatives.iter().map(alternative).collect(),
             none_of_these: rounded(findings.none_of_these),

@@ -8,6 +8,7 @@ use crate::{
     parity::{
         flight::Flight,
         nulls::NULLS,
+        phases,
         plate::{Findings, filter::At, text},
         smooth::told::{Attitude, Told},
     },
@@ -51,6 +52,8 @@ pub fn verdict(flight: &Flight, findings: &Findings) -> serde_json::Value {
         "format": "gap-verdict/2",
         "from": "one-plate",
         "gap": { "before": before, "after": after, "floor": 1.0, "units": "sigma" },
+        "phases": phases::rounded(&flight.phases),
+        "phases_from": phases::told_by(flight.are_phases_told),
         "causes": findings.names(flight).into_iter().map(cause).collect::<Vec<_>>(),
         "alternatives": untold.iter().map(alternative).collect::<Vec<_>>(),
         "none_of_these": rounded(if is_off { SAID } else { UNSAID }, 4),
@@ -74,6 +77,8 @@ pub fn attitude(findings: &Findings) -> Told {
         attitudes: findings.attitude.iter().flatten().map(one).collect(),
         rests: rests(&findings.field),
         turns: Vec::new(),
+        track: None,
+        belief: None,
     }
 }
 

@@ -49,6 +49,24 @@ pub fn off(
     priors.map(|prior| prior.off).collect()
 }
 
+/// A row at an instant that says that something is none within a sigma, and is what it is. Of each term: the order of the derivative, the
+/// first of the three unknowns of a knot, and by how much each changes it.
+pub fn row(knots: &Knots, t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64) -> Prior {
+    let first = knots.weights(t_s, 0).0;
+    let mut slopes = vec![0.0; UNKNOWNS * SUPPORT];
+    for (order, from, by) in terms {
+        let (_, weights) = knots.weights(t_s, *order);
+        for (at, weight) in weights.iter().enumerate() {
+            (0..3).for_each(|axis| slopes[UNKNOWNS * at + from + axis] += weight * by[axis] / sigma);
+        }
+    }
+    Prior {
+        first: UNKNOWNS * first,
+        slopes,
+        off: -is / sigma,
+    }
+}
+
 /// All rows.
 pub fn priors<'a>(
     starts_s: &'a [f64],
@@ -63,19 +81,7 @@ pub fn priors<'a>(
             .min(starts_s.len() - 1)
     };
     let one = move |t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64| {
-        let first = knots.weights(t_s, 0).0;
-        let mut slopes = vec![0.0; UNKNOWNS * SUPPORT];
-        for (order, from, by) in terms {
-            let (_, weights) = knots.weights(t_s, *order);
-            for (at, weight) in weights.iter().enumerate() {
-                (0..3).for_each(|axis| slopes[UNKNOWNS * at + from + axis] += weight * by[axis] / sigma);
-            }
-        }
-        Prior {
-            first: UNKNOWNS * first,
-            slopes,
-            off: -is / sigma,
-        }
+        self::row(knots, t_s, terms, sigma, is)
     };
     (0..knots.intervals).flat_map(move |interval| {
         let t_s = knots.from_s + (interval as f64 + 0.5) * knots.step_s;

@@ -5,7 +5,7 @@
 //! is what is left of a product once the motion is marginalised. This is a smoother in information form, with the same gains
 //! for residual, calibration and every effect (Rosenberg 1973, de Jong 1991).
 //!
-//! The prior rows are those of [`crate::parity::smooth::prior`].
+//! The prior rows are those of [`crate::parity::smooth::prior`]. A track is tied to it beside ([`crate::parity::smooth::tied`]).
 //!
 //! The temperature of a row is free, as it is in [`crate::parity::packet`].
 
@@ -22,10 +22,12 @@ use crate::{
         basis::Knots,
         prior::{Prior, priors},
         rows::{Rows, UNKNOWNS, width},
+        tied::Tie,
         trajectory::Trajectory,
     },
     parity::{
         course::{Course, Start},
+        known::track::{Aligned, Fix},
         space::Elimination,
     },
 };
@@ -38,6 +40,7 @@ pub struct Smoothing {
     factor: Factor,
     inverse: OnceCell<Inverse>,
     priors: Vec<Prior>,
+    tie: Option<(Tie, DVector<f64>)>,
     /// Rows of the log, and of each thermometer the row of every sample and its part of the temperature.
     log_rows: usize,
     warm: Vec<Vec<(usize, f64)>>,
@@ -45,13 +48,14 @@ pub struct Smoothing {
 
 impl Smoothing {
     /// About a trajectory; `rests` are the spans \[s\] in which the unit does not move from its place, with the standard deviation of its
-    /// acceleration there.
+    /// acceleration there; `beside` are further rows.
     pub fn of(
         problem: &Problem,
         trajectory: &Trajectory,
         course: (&Course, &Start),
         knots: Knots,
         rests: &[((f64, f64), f64)],
+        beside: Vec<Prior>,
     ) -> Self {
         let scene = trajectory.scene();
         let feel = |t_s: f64| -> Feel { scene.feel(t_s) };
@@ -68,7 +72,8 @@ impl Smoothing {
                 normal.add(UNKNOWNS * own.first[sample], own.whole(sample, &mut whole));
             }
         }
-        let priors: Vec<Prior> = priors(problem.twin.starts_s(), trajectory, course, &knots, rests).collect();
+        let priors = priors(problem.twin.starts_s(), trajectory, course, &knots, rests);
+        let priors: Vec<Prior> = priors.chain(beside).collect();
         priors.iter().for_each(|prior| normal.add(prior.first, &prior.slopes));
         Self {
             knots,
@@ -76,25 +81,45 @@ impl Smoothing {
             inverse: OnceCell::new(),
             factor: normal.factor(),
             priors,
+            tie: None,
             log_rows: problem.twin.starts_s().len(),
             warm: warm(problem),
         }
     }
 
-    /// `L^-1 P'r` of the prior rows, with what they are off by along the trajectory that they were made about.
-    pub fn prior(&self) -> DVector<f64> {
-        self.prior_of(self.priors.iter().map(|prior| prior.off))
+    /// The same, tied to a track along the trajectory that it was made about.
+    pub fn tied(mut self, fixes: &[Fix], aligned: &Aligned, trajectory: &Trajectory) -> Self {
+        let tie = Tie::of(fixes, aligned, trajectory, &self.knots, &self.factor);
+        self.tie = Some((tie, aligned.off.clone()));
+        self
     }
 
-    /// The same with what they are off by along another.
-    pub fn prior_of(&self, off: impl Iterator<Item = f64>) -> DVector<f64> {
+    /// \[s\] one sigma of the offset of the track's clock; none without a track, and where the log does not tell it.
+    pub fn offset_sigma_s(&self) -> Option<f64> {
+        self.tie.as_ref()?.0.offset_sigma_s
+    }
+
+    /// `L^-1 P'r` of the prior rows, with what they are off by along the trajectory that they were made about.
+    pub fn prior(&self) -> DVector<f64> {
+        let track = self.tie.as_ref().map(|(_, off)| off.clone());
+        self.prior_of(self.priors.iter().map(|prior| prior.off), track.as_ref())
+    }
+
+    /// The same with what they, and the rows of the track, are off by along another.
+    pub fn prior_of(&self, off: impl Iterator<Item = f64>, track: Option<&DVector<f64>>) -> DVector<f64> {
         let mut right = vec![0.0; self.factor.size()];
         for (prior, off) in self.priors.iter().zip(off) {
             let own = right[prior.first..].iter_mut().zip(&prior.slopes);
             own.for_each(|(sum, slope)| *sum += slope * off);
         }
         self.factor.forward(right.as_chunks_mut::<1>().0);
-        DVector::from_vec(right)
+        let mut right = DVector::from_vec(right);
+        if let (Some((tie, _)), Some(track)) = (&self.tie, track) {
+            right += tie.prior(track);
+            let size = right.len();
+            tie.apply(&mut right.view_mut((0, 0), (size, 1)));
+        }
+        right
     }
 
     fn inverse(&self) -> &Inverse {
@@ -103,7 +128,11 @@ impl Smoothing {
 
     /// The correction that a part comes to: coefficients of turn and force, knot by knot.
     pub fn correction(&self, part: &DVector<f64>) -> Vec<f64> {
-        let mut solved = part.as_slice()[..self.factor.size()].to_vec();
+        let mut solved = part.rows(0, self.factor.size()).into_owned();
+        if let Some((tie, _)) = &self.tie {
+            tie.apply(&mut solved.view_mut((0, 0), (self.factor.size(), 1)));
+        }
+        let mut solved = solved.as_slice().to_vec();
         self.factor.backward(solved.as_chunks_mut::<1>().0);
         solved
     }
@@ -111,7 +140,13 @@ impl Smoothing {
     /// Covariance of the turn at an instant \[rad2\] with the calibration known.
     pub fn covariance(&self, t_s: f64) -> [[f64; 3]; 3] {
         let (first, own) = self.turn_rows(t_s);
-        from_fn(|one| from_fn(|other| self.inverse().between(UNKNOWNS * first, &own[one], &own[other])))
+        from_fn(|one| from_fn(|other| self.between(UNKNOWNS * first, &own[one], &own[other])))
+    }
+
+    /// `one' N^-1 other` with everything in `N`.
+    fn between(&self, first: usize, one: &[f64], other: &[f64]) -> f64 {
+        let less = self.tie.as_ref().map_or(0.0, |(tie, _)| tie.less(first, one, other));
+        self.inverse().between(first, one, other) - less
     }
 
     /// The first knot of a turn at an instant, and the weights of its three components from there on.
@@ -171,11 +206,20 @@ impl Elimination for Smoothing {
                     .for_each(|(own, row)| *own = row[lane]);
             }
         }
+        if let Some((tie, _)) = &self.tie {
+            tie.apply(&mut parts.view_mut((0, 0), (size, columns.len())));
+        }
         parts
     }
 
     fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
         let size = self.factor.size();
+        let tied = self.tie.as_ref().map(|(tie, _)| {
+            let mut own = parts.clone();
+            tie.apply(&mut own.view_mut((0, 0), (size, parts.ncols())));
+            own
+        });
+        let parts = tied.as_ref().unwrap_or(parts);
         let mut panel = vec![[0.0; LANES]; size];
         for block in 0..parts.ncols().div_ceil(LANES) {
             let lanes = LANES * block..parts.ncols().min(LANES * (block + 1));
@@ -209,7 +253,7 @@ impl Elimination for Smoothing {
         let taken: f64 = (0..own.first.len())
             .map(|sample| {
                 let slopes = own.whole(sample, &mut whole);
-                self.inverse().between(UNKNOWNS * own.first[sample], slopes, slopes)
+                self.between(UNKNOWNS * own.first[sample], slopes, slopes)
             })
             .sum();
         own.first.len() as f64 - taken

@@ -7,6 +7,7 @@ use std::fmt::Write;
 
 use chart::{Axis, ChartError, Figure, Layer, Marks, Panel};
 use nalgebra::{UnitQuaternion, Vector3};
+use serde_json::{Map, Value, json};
 
 use crate::{
     input::{case::CaseError, reference::Reference},
@@ -16,8 +17,12 @@ use crate::{
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
+        known::{Known, simulated::Belief, ties::Use},
     },
 };
+
+/// Why nothing else that is known of a motion was looked at.
+const NOT_SETTLED: &str = "the motion did not settle without it";
 
 /// What an attitude is at a row.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +43,10 @@ pub struct Told {
     pub rests: Vec<(f64, f64)>,
     /// \[rad\] largest turn of each step of the smoother.
     pub turns: Vec<f64>,
+    /// What became of the track, and \[s\] one sigma of its clock's offset; none where there is none.
+    pub track: Option<(Use, Option<f64>)>,
+    /// What became of the simulated trajectory; none where there is none.
+    pub belief: Option<Belief>,
 }
 
 impl Told {
@@ -60,6 +69,8 @@ impl Told {
             attitudes: Vec::new(),
             rests: smoothed.rests.clone(),
             turns: smoothed.turns.clone(),
+            track: smoothed.track.map(|own| (own, None)),
+            belief: smoothed.belief,
         };
         if !smoothed.is_settled() {
             return Ok(told);
@@ -68,6 +79,9 @@ impl Told {
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
         let space = followed.space(&problem, motion);
+        if let Some((_, sigma_s)) = &mut told.track {
+            *sigma_s = motion.offset_sigma_s();
+        }
         let log = &followed.log;
         let covariances = covariances(&space, motion, &log.start_s);
         told.attitudes = (log.start_s.iter().zip(&covariances))
@@ -95,6 +109,39 @@ impl Told {
             );
         }
         (!self.attitudes.is_empty()).then_some(out)
+    }
+
+    /// A line of each thing that is known besides; of one that could not be looked at too.
+    pub fn known_lines(&self, known: &Known) -> String {
+        let mut out = String::new();
+        match (&self.belief, &known.simulated) {
+            (Some(belief), _) => out += &belief.line(),
+            (None, Some(_)) => out += &format!("NOMINAL the simulated trajectory: not used: {NOT_SETTLED}\n"),
+            (None, None) => {}
+        }
+        match (&self.track, &known.track) {
+            (Some((found, sigma_s)), _) => out += &found.line(*sigma_s),
+            (None, Some(_)) => out += &format!("TRACK   not used: {NOT_SETTLED}\n"),
+            (None, None) => {}
+        }
+        out
+    }
+
+    /// The same as JSON; nothing where nothing is known.
+    pub fn known_json(&self, known: &Known) -> Map<String, Value> {
+        let not_settled = || json!({ "is_used": false, "why": NOT_SETTLED });
+        let simulated = self.belief.as_ref().map(Belief::json);
+        let track = self.track.as_ref().map(|(found, sigma_s)| found.json(*sigma_s));
+        let all = [
+            (
+                "simulated",
+                simulated.or_else(|| known.simulated.as_ref().map(|_| not_settled())),
+            ),
+            ("track", track.or_else(|| known.track.as_ref().map(|_| not_settled()))),
+        ];
+        all.into_iter()
+            .filter_map(|(key, value)| Some((key.to_owned(), value?)))
+            .collect()
     }
 
     /// One line.

@@ -89,6 +89,16 @@ impl Trajectory {
         }
     }
 
+    /// \[s\] between nodes.
+    pub fn step_s(&self) -> f64 {
+        STEP_S
+    }
+
+    /// \[s\] of the first node and of the last.
+    pub fn span_s(&self) -> (f64, f64) {
+        (self.from_s, self.at_s(self.states.len() - 1))
+    }
+
     /// \[s\] of a node.
     pub fn at_s(&self, node: usize) -> f64 {
         self.from_s + node as f64 * STEP_S

@@ -1,0 +1,93 @@
+//! A motion that has settled is held to what else is known of it, and settles again; what does not fit is left out, and said.
+//!
+//! In: [`Known`]. A simulated trajectory is held against the log alone before anything else is in, a track against a motion that was
+//! smoothed with it: its fixes say nothing of an attitude one by one.
+
+use twin::predict::{Channel, Kind};
+
+use crate::{
+    input::{case::CaseError, reference::Reference},
+    null::problem::Problem,
+    parity::{
+        known::{
+            Known,
+            simulated::{Belief, Simulated},
+            ties::{Ties, Use},
+            track::{self, Fixes},
+        },
+        smooth::{About, Smoothed, covariances, fit},
+        space::Space,
+    },
+};
+
+impl Smoothed {
+    /// Takes in what is known.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn hold(&mut self, known: &Known, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
+        if let Some(simulated) = &known.simulated {
+            self.believe(simulated, about, progress)?;
+        }
+        if let Some(track) = &known.track {
+            self.follow(track, about, progress)?;
+        }
+        Ok(())
+    }
+
+    fn believe(&mut self, simulated: &Simulated, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
+        let fit = fit(about.log);
+        let reference = Reference::default();
+        let twin = self.twin(about.log, about.unit, about.environment)?;
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = self.smoothing(&problem, about.course, about.start);
+        let space = Space::new(&problem, &motion, Vec::new());
+        let known = covariances(&space, &motion, &simulated.middles_s(&self.knots));
+        let own = about
+            .unit
+            .channels
+            .iter()
+            .filter(|own| own.sensor == Kind::Accelerometer);
+        let noise = own.map(Channel::sigma).fold(0.0, f64::max);
+        let mut belief = simulated.judged(&self.trajectory, &self.knots, &known, noise);
+        if matches!(belief, Belief::Used { .. }) {
+            let alone = self.clone();
+            self.ties.simulated = Some(simulated.clone());
+            if !self.settles_again(about, progress)? {
+                (*self, belief) = (alone, Belief::Unsettled);
+            }
+        }
+        self.belief = Some(belief);
+        Ok(())
+    }
+
+    fn follow(&mut self, track: &Fixes, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
+        self.track = Some(Use::Elsewhere);
+        let Some(offset_s) = track::begin(track, &self.trajectory) else {
+            return Ok(());
+        };
+        let alone = self.clone();
+        self.ties = Ties {
+            fixes: track.within(self.trajectory.span_s(), offset_s).fixes,
+            offset_s,
+            ..self.ties.clone()
+        };
+        let is_settled = self.settles_again(about, progress)?;
+        let found = match self.ties.aligned(&self.trajectory) {
+            Some(aligned) if is_settled => Use::of(&aligned),
+            _ => Use::Unsettled,
+        };
+        match found {
+            Use::Used(fit) => self.ties.offset_s = fit.offset_s,
+            _ => *self = alone,
+        }
+        self.track = Some(found);
+        Ok(())
+    }
+
+    fn settles_again(&mut self, about: &About, progress: &dyn Fn(f64)) -> Result<bool, CaseError> {
+        self.gain = f64::INFINITY;
+        self.settle(about, progress)?;
+        Ok(self.is_settled())
+    }
+}

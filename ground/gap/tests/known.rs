@@ -1,0 +1,363 @@
+//! What is known of a motion that nobody recorded: a track on a clock of its own, and a trajectory that was simulated.
+
+use std::{fmt::Write, fs, path::Path};
+
+use gap::parity::{
+    analysed, codes,
+    flight::Flight,
+    followed::Followed,
+    known::{simulated::Belief, ties::Use},
+    smooth::told::Told,
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use serde_json::Value;
+use tempfile::TempDir;
+use twin::{
+    environment::Environment,
+    kinematics::{Attitude, Motion, Pose, Profile},
+    predict::{Scene, Twin, emems, thesis_slot_s},
+};
+
+/// \[s\] of a log.
+const SECONDS: f64 = 100.0;
+
+/// \[s\] the track's clock is behind the log's.
+const OFFSET_S: f64 = 37.4;
+
+/// \[m\] one sigma of a fix along each axis.
+const SIGMA_M: f64 = 3.0;
+
+/// 15 s on a rail, 12 s of a push of four times gravity up and to the north, then free fall, slowly turning.
+struct Thrown {
+    along: [Profile; 3],
+    angles: [Profile; 3],
+    /// \[s\] when the push ends.
+    burnt_s: f64,
+}
+
+impl Thrown {
+    /// Whose push takes so many seconds.
+    fn new(pushed_s: f64) -> Self {
+        let from_rest = |value: f64| Profile::from_rest(value).coast(15.0);
+        let pushed = |rate: f64| from_rest(0.0).ramp_to_rate(rate, pushed_s).coast(90.0);
+        Self {
+            along: [pushed(130.0), pushed(-20.0), pushed(-450.0)],
+            angles: [
+                from_rest(0.2).ramp_to_rate(0.25, 20.0).coast(90.0),
+                from_rest(1.2).move_to(0.5, 50.0).coast(90.0),
+                from_rest(0.4).ramp_to_rate(-0.05, 20.0).coast(90.0),
+            ],
+            burnt_s: 15.0 + pushed_s,
+        }
+    }
+
+    /// [m/s2] and \[m\] that gravity gives it, from burn-out on within a second whole.
+    fn fallen(&self, t_s: f64) -> [f64; 2] {
+        let gravity = Environment::alcantara().gravity;
+        let (begun, whole) = (
+            (t_s - self.burnt_s).clamp(0.0, 1.0),
+            (t_s - self.burnt_s - 1.0).max(0.0),
+        );
+        [
+            gravity * begun,
+            gravity * (begun.powi(3) / 6.0 + 0.5 * whole + 0.5 * whole.powi(2)),
+        ]
+    }
+}
+
+impl Motion for Thrown {
+    fn at(&self, t_s: f64) -> Pose {
+        let [roll, pitch, yaw] = [0, 1, 2].map(|axis| self.angles[axis].at(t_s));
+        let acc = |axis: usize| self.along[axis].at(t_s).acc;
+        Pose {
+            acc_n: Vector3::new(acc(0), acc(1), acc(2) + self.fallen(t_s)[0]),
+            ..Pose::turning(Attitude::level().yawed(yaw).pitched(pitch).rolled(roll))
+        }
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        None
+    }
+
+    fn position_n(&self, t_s: f64) -> Vector3<f64> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.along[axis].at(t_s).value);
+        Vector3::new(x, y, z + self.fallen(t_s)[1])
+    }
+}
+
+/// Of a flight whose log is of one push, with these other lines in case.toml.
+fn flown(seed: u64, more: &str) -> (TempDir, Thrown) {
+    let motion = Thrown::new(12.0);
+    let environment = Environment::alcantara();
+    let unit = emems(thesis_slot_s);
+    let scene = Scene::new(&motion, &environment, -2.0, SECONDS + 2.0, 0.01);
+    let starts_s: Vec<f64> = (0..(SECONDS / 0.2) as usize).map(|row| 0.2 * row as f64).collect();
+    let twin = Twin::new(unit.clone(), environment, scene, starts_s.clone()).expect("a twin");
+    let readings = twin.predict(&[]);
+    let mut normal = noise(seed);
+    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
+    let mut text = format!("t_s,{}\n", names.join(","));
+    for (row, start_s) in starts_s.iter().enumerate() {
+        let cells = unit
+            .channels
+            .iter()
+            .zip(&readings)
+            .map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
+        let _ = writeln!(text, "{start_s:.1},{}", cells.collect::<Vec<_>>().join(","));
+    }
+    let field = environment.field_n_ut;
+    let case = format!(
+        "format = \"gap-case/1\"\nname = \"thrown\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
+         [environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
+         [windows]\nfit = [[0.0, 90.0]]\nhold = [[90.0, 100.0]]\n{more}",
+        environment.gravity,
+        environment.latitude.to_degrees(),
+        field.x,
+        field.y,
+        field.z
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in [("case.toml", case), ("unit.toml", unit.text()), ("measured.csv", text)] {
+        fs::write(folder.path().join(name), text).expect("a file");
+    }
+    (folder, motion)
+}
+
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    move || StandardNormal.sample(&mut random)
+}
+
+const TRACK: &str = "[motion_known]\ntrack = \"track.csv\"\n";
+
+/// A track of a motion, one fix a second, beside a case.
+fn tracked(folder: &Path, motion: &Thrown, sigma_m: f64) {
+    let mut normal = noise(7);
+    let mut text = "t_s,px_m,py_m,pz_m,sx_m,sy_m,sz_m\n".to_owned();
+    for second in 0..100 {
+        let t_s = f64::from(second) + 0.3;
+        let seen =
+            motion.position_n(t_s) + Vector3::new(200.0, -50.0, -40.0) + sigma_m * Vector3::from_fn(|_, _| normal());
+        let [x, y, z] = seen.into();
+        let _ = writeln!(
+            text,
+            "{:.3},{x:.3},{y:.3},{z:.3},{SIGMA_M},{SIGMA_M},{SIGMA_M}",
+            t_s - OFFSET_S
+        );
+    }
+    fs::write(folder.join("track.csv"), text).expect("a track");
+}
+
+fn told(folder: &TempDir) -> Told {
+    let flight = Flight::open(folder.path()).expect("opens");
+    let coded = codes::look(&flight.log, &flight.unit);
+    Told::along(&Followed::of(&flight, &flight.log, &coded), &|_| ()).expect("follows")
+}
+
+/// Error and stated sigma of an attitude as root mean squares \[deg\].
+fn off(told: &Told, motion: &Thrown) -> (f64, f64) {
+    let (mut error, mut stated) = (0.0, 0.0);
+    for own in &told.attitudes {
+        error += own
+            .q_nb
+            .angle_to(&motion.at(own.t_s).attitude.q_nb)
+            .to_degrees()
+            .powi(2);
+        stated += own.sigmas_b_deg.norm_squared();
+    }
+    let count = told.attitudes.len() as f64;
+    ((error / count).sqrt(), (stated / count).sqrt())
+}
+
+#[test]
+fn a_track_on_another_clock_holds_the_attitude_and_tells_its_offset() {
+    let (folder, motion) = flown(1, TRACK);
+    tracked(folder.path(), &motion, SIGMA_M);
+    let with = told(&folder);
+    let (found, sigma_s) = with.track.expect("is known");
+    println!("{}", found.line(sigma_s));
+    let Use::Used(fit) = found else {
+        panic!("{found:?}");
+    };
+    let sigma_s = sigma_s.expect("the push shows the clock");
+    assert!((fit.offset_s - OFFSET_S).abs() < 4.0 * sigma_s, "{fit:?} {sigma_s}");
+    assert!(sigma_s < 0.05 && (0.8..1.2).contains(&fit.gap), "{fit:?} {sigma_s}");
+    forget(&folder);
+    let without = told(&folder);
+    let (own, alone) = (off(&with, &motion), off(&without, &motion));
+    println!("with {own:?} without {alone:?}");
+    assert!(own.1 < 0.9 * alone.1 && own.0 < 2.5 * own.1, "{own:?} {alone:?}");
+}
+
+/// Says that nothing is known of the motion of a case.
+fn forget(folder: &TempDir) {
+    let case = folder.path().join("case.toml");
+    let text = fs::read_to_string(&case).expect("a case");
+    let (before, _) = text.split_once("[motion_known]").expect("knows something");
+    fs::write(&case, before).expect("writes");
+}
+
+#[test]
+fn a_track_of_another_flight_is_not_used_and_said_so() {
+    let (folder, _) = flown(1, TRACK);
+    tracked(folder.path(), &Thrown::new(20.0), SIGMA_M);
+    let with = told(&folder);
+    let (found, sigma_s) = with.track.expect("is known");
+    println!("{}", found.line(sigma_s));
+    assert!(matches!(found, Use::Misfit(_) | Use::Unsettled), "{found:?}");
+    assert!(found.line(sigma_s).contains("not used") && found.line(sigma_s).contains("of another flight"));
+    // Nothing of it is left in the attitude.
+    forget(&folder);
+    let alone = told(&folder);
+    assert_eq!(with.csv(), alone.csv());
+}
+
+#[test]
+fn a_track_whose_sigmas_are_too_small_is_not_used() {
+    let (folder, motion) = flown(1, TRACK);
+    tracked(folder.path(), &motion, 2.0 * SIGMA_M);
+    let (found, _) = told(&folder).track.expect("is known");
+    assert!(
+        matches!(found, Use::Misfit(fit) if (1.8..2.2).contains(&fit.gap)),
+        "{found:?}"
+    );
+}
+
+/// A trajectory as it was simulated before the flight, its heading off by some degrees, beside a case.
+fn simulated(folder: &Path, motion: &Thrown, late_s: f64, heading_deg: f64) {
+    let mut text = "t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n".to_owned();
+    let about_down = UnitQuaternion::from_scaled_axis(Vector3::z() * heading_deg.to_radians());
+    for step in -20..2040 {
+        let t_s = f64::from(step) * 0.05;
+        let (q_nb, p) = (
+            about_down * motion.at(t_s - late_s).attitude.q_nb,
+            about_down * motion.position_n(t_s - late_s),
+        );
+        let q = q_nb.quaternion();
+        let _ = writeln!(
+            text,
+            "{t_s:.2},{:.8},{:.8},{:.8},{:.8},{:.4},{:.4},{:.4}",
+            q.w, q.i, q.j, q.k, p.x, p.y, p.z
+        );
+    }
+    fs::write(folder.join("trajectory.csv"), text).expect("a trajectory");
+}
+
+const SIMULATED: &str = "[motion_known]\nsimulated = \"trajectory.csv\"\n[motion_known.distrust]\n\
+    rest = { attitude_deg = 1.0, acceleration_m_s2 = 0.1 }\nthrust = { attitude_deg = 1.0, acceleration_m_s2 = 3.0 }\n\
+    coast = { attitude_deg = 2.0 }\n";
+
+#[test]
+fn a_simulated_trajectory_holds_the_motion_no_further_than_it_is_trusted() {
+    let (folder, motion) = flown(1, SIMULATED);
+    simulated(folder.path(), &motion, 0.0, 0.5);
+    let with = told(&folder);
+    let belief = with.belief.expect("is known");
+    println!("{}", belief.line());
+    assert!(
+        matches!(belief, Belief::Used { chance, .. } if chance > 0.01),
+        "{belief:?}"
+    );
+    forget(&folder);
+    let alone = told(&folder);
+    let (own, alone) = (off(&with, &motion), off(&alone, &motion));
+    println!("with {own:?} without {alone:?}");
+    // Rows of a phase know no more than one: the sigma does not collapse to a thousandth of the distrust.
+    assert!(
+        (0.3 * alone.1..alone.1).contains(&own.1) && own.0 < 2.5 * own.1,
+        "{own:?} {alone:?}"
+    );
+}
+
+#[test]
+fn a_simulated_trajectory_of_another_flight_is_refused_plainly() {
+    let (folder, motion) = flown(1, SIMULATED);
+    let other = Thrown::new(20.0);
+    for (motion, late_s, heading_deg, what) in [
+        (&other, 0.0, 0.0, "in thrust its acceleration"),
+        (&motion, 4.0, 0.0, "in coast its attitude"),
+        (&motion, 0.0, 15.0, "its attitude"),
+    ] {
+        simulated(folder.path(), motion, late_s, heading_deg);
+        let with = told(&folder);
+        let line = with.belief.expect("is known").line();
+        println!("{line}");
+        assert!(
+            line.contains("this trajectory is not of this flight") && line.contains(what),
+            "{line}"
+        );
+        assert!(with.csv().is_some());
+    }
+}
+
+#[test]
+fn the_screen_and_the_verdict_say_what_became_of_what_is_known() {
+    let known = SIMULATED.replace("[motion_known]\n", TRACK);
+    let (folder, motion) = flown(2, &known);
+    tracked(folder.path(), &motion, SIGMA_M);
+    simulated(folder.path(), &motion, 0.0, 0.5);
+    let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is judged");
+    let text = |name: &str| &texts.iter().find(|(own, _)| own == name).expect("is there").1;
+    println!("{}", text("all.txt"));
+    assert!(text("all.txt").contains("NOMINAL the simulated trajectory: holds the motion"));
+    assert!(text("all.txt").contains("TRACK   89 fixes") || text("all.txt").contains("TRACK   90 fixes"));
+    let verdict: Value = serde_json::from_str(text("verdict.json")).expect("JSON");
+    assert_eq!(verdict["motion_known"]["track"]["is_used"], true);
+    assert_eq!(verdict["motion_known"]["simulated"]["is_used"], true);
+    let offset = verdict["motion_known"]["track"]["clock_offset_s"]["value"]
+        .as_f64()
+        .expect("a number");
+    assert!((offset - OFFSET_S).abs() < 0.03, "{offset}");
+    let phases = verdict["phases"].as_array().expect("a list");
+    assert_eq!(verdict["phases_from"], "found");
+    let of = |name: &str| {
+        let own = phases.iter().find(|own| own["phase"] == name).expect("is there");
+        ["from_s", "to_s"].map(|key| own[key].as_f64().expect("a number"))
+    };
+    // Half a second of pushing as hard as gravity comes later and goes sooner.
+    let ([lit_s, burnt_s], [coasts_s, _]) = (of("thrust"), of("coast"));
+    assert!((15.0..18.0).contains(&lit_s) && (24.0..28.5).contains(&burnt_s) && (coasts_s - burnt_s).abs() < 1e-9);
+    // A healthy unit is given no name, with or without a track.
+    assert!(verdict["causes"].as_array().expect("a list").is_empty(), "{verdict}");
+    assert!(text("index.html").contains("NOMINAL"));
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_naming_file_and_key() {
+    let refused = |more: &str, track: Option<&str>| {
+        let (folder, motion) = flown(1, more);
+        simulated(folder.path(), &motion, 0.0, 0.0);
+        if let Some(track) = track {
+            fs::write(folder.path().join("track.csv"), track).expect("a track");
+        }
+        let error = Flight::open(folder.path()).err().expect("is refused");
+        error.to_string()
+    };
+    let both = refused("[motion_known]\nnone = true\ntrack = \"track.csv\"\n", None);
+    assert!(
+        both.contains("case.toml: motion_known.none: says that nothing is known"),
+        "{both}"
+    );
+    let bare = refused("[motion_known]\nsimulated = \"trajectory.csv\"\n", None);
+    assert!(
+        bare.contains("motion_known.simulated: needs how far each phase"),
+        "{bare}"
+    );
+    let none = refused(&SIMULATED.replace("= 1.0", "= 0.0"), None);
+    assert!(
+        none.contains("motion_known.distrust: has a size that is not above zero"),
+        "{none}"
+    );
+    let absent = refused(TRACK, None);
+    assert!(absent.contains("track.csv: cannot be read"), "{absent}");
+    let header = "t_s,px_m,py_m,pz_m,sx_m,sy_m,sz_m\n";
+    let short = refused(TRACK, Some(&format!("{header}0,0,0,0,1,1,1\n1,0,0,0,1,1,1\n")));
+    assert!(short.contains("track.csv: rows: are 2; a track needs 8"), "{short}");
+    let sigma = refused(TRACK, Some(&format!("{header}0,0,0,0,1,1,1\n1,0,0,0,1,0,1\n")));
+    assert!(
+        sigma.contains("track.csv: line 3, sx_m, sy_m, sz_m: hold a sigma"),
+        "{sigma}"
+    );
+}
