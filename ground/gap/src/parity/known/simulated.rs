@@ -136,30 +136,28 @@ impl Simulated {
         let stretches = self.held.iter().filter(|held| instants(held, knots).next().is_some());
         for (held, covariance) in stretches.zip(covariances) {
             let offs: Vec<(State, At)> = instants(held, knots).map(|t_s| self.off(trajectory, t_s)).collect();
-            let mut judge = |what: &'static str,
-                             stated: f64,
-                             unit: &'static str,
-                             own: &dyn Fn(&(State, At)) -> (Vector3<f64>, Matrix3<f64>)| {
-                let (mut mean, mut square) = (0.0, 0.0);
-                for at in &offs {
-                    let (off, more) = own(at);
-                    let whole = more + Matrix3::identity() * stated.powi(2);
-                    mean += whole.try_inverse().map_or(0.0, |inverse| off.dot(&(inverse * off)));
-                    square += off.norm_squared() / 3.0;
-                }
-                let count = offs.len() as f64;
-                energies.push(mean / count);
-                if worst.as_ref().is_none_or(|known| known.energy < mean / count) {
-                    worst = Some(Off {
-                        phase: held.stretch.phase,
-                        what,
-                        energy: mean / count,
-                        size: (square / count).sqrt(),
-                        stated,
-                        unit,
-                    });
-                }
-            };
+            let mut judge =
+                |what: &'static str, stated: f64, unit: &'static str, own: &dyn Fn(&(State, At)) -> Apart| {
+                    let (mut mean, mut square) = (0.0, 0.0);
+                    for at in &offs {
+                        let (off, more) = own(at);
+                        let whole = more + Matrix3::identity() * stated.powi(2);
+                        mean += whole.try_inverse().map_or(0.0, |inverse| off.dot(&(inverse * off)));
+                        square += off.norm_squared() / 3.0;
+                    }
+                    let count = offs.len() as f64;
+                    energies.push(mean / count);
+                    if worst.as_ref().is_none_or(|known| known.energy < mean / count) {
+                        worst = Some(Off {
+                            phase: held.stretch.phase,
+                            what,
+                            energy: mean / count,
+                            size: (square / count).sqrt(),
+                            stated,
+                            unit,
+                        });
+                    }
+                };
             judge(
                 "attitude",
                 held.distrust.attitude_deg.to_radians(),
@@ -205,6 +203,9 @@ fn chance(energies: &[f64]) -> f64 {
     let one = ChiSquared::new(3.0).map_or(0.0, |law| law.sf(largest));
     (one * energies.len() as f64).min(1.0)
 }
+
+/// How far something is off, and the covariance of how well the log knows it.
+type Apart = (Vector3<f64>, Matrix3<f64>);
 
 /// How far a motion is from a simulated one, in b.
 struct At {
