@@ -276,7 +276,7 @@ impl Belief {
             ),
             Belief::OfAnother(worst) => format!(
                 "not used: this trajectory is not of this flight, or its clock is not the log's: {}; chance does that less than once \
-                 in a thousand flights",
+                 in a thousand flights. Windows without a rest do not tell the log's own attitude well enough to judge by",
                 worst.told()
             ),
             Belief::Elsewhere => {
