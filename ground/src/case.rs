@@ -1,8 +1,7 @@
-//! A folder as a gap case: the files beside a log that make it one.
+//! The gap case of a real unit's log, and what a case lacks.
 //!
-//! In: what was flown or logged, the unit's description, the place, how well the reference knows, the windows. Out: the text of
-//! `case.toml` after the case format. What decides the windows is [`windows`], what a reference instrument would have written
-//! [`instrument`]. A real unit's log becomes a case by [`made`], and [`checked`] says what it lacks.
+//! A log and a reference become a case by [`made`]; [`checked`] says what a case has and lacks. The text of `case.toml`, the windows and
+//! the reference instrument of a flight are in [`flight::case`], which this takes its windows and its text from.
 
 pub mod checked;
 pub mod clock;
