@@ -17,7 +17,7 @@ use crate::sample::NOT_READ;
 
 /// Chance of so many repeats in a row of a healthy sensor.
 const CHANCE: f32 = 1e-9;
-/// \[counts\] of a uniform law of one count: the root of 1/12, with as much more as rounding a set's numbers makes.
+/// \[counts\] standard deviation of rounding: the root of 1/12, rounded up, because a set's numbers are rounded too.
 const ROUNDING: f32 = 0.2887;
 
 /// How often one sensor has repeated itself.

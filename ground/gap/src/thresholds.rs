@@ -376,7 +376,7 @@ mod tests {
 
     /// Fewer is better: fewer than fifty of the diagnosis with a reference, and whoever adds one takes another out or says why
     /// here. Four more are of logs without a reference, which are judged by other numbers; six of one plate, whose names rest on no evidence of
-    /// the library; two of chips, which are told and not judged; one of what is told of a motion, which no fewer words refuse.
+    /// the library; two of chips, which are told and not judged; one decides whether a told motion is used.
     const MOST: usize = 49 + 4 + 6 + 2 + 1;
 
     #[test]

@@ -1,5 +1,7 @@
 //! What is known of a motion that nobody recorded: a track on a clock of its own, and a trajectory that was simulated.
 
+mod twin_case;
+
 use std::{fmt::Write, fs, path::Path};
 
 use gap::parity::{
@@ -17,7 +19,6 @@ use tempfile::TempDir;
 use twin::{
     environment::Environment,
     kinematics::{Attitude, Motion, Pose, Profile},
-    predict::{Scene, Twin, emems, thesis_slot_s},
 };
 
 /// \[s\] of a log.
@@ -90,38 +91,9 @@ impl Motion for Thrown {
 /// Of a flight whose log is of one push, with these other lines in case.toml.
 fn flown(seed: u64, more: &str) -> (TempDir, Thrown) {
     let motion = Thrown::new(12.0);
-    let environment = Environment::alcantara();
-    let unit = emems(thesis_slot_s);
-    let scene = Scene::new(&motion, &environment, -2.0, SECONDS + 2.0, 0.01);
-    let starts_s: Vec<f64> = (0..(SECONDS / 0.2) as usize).map(|row| 0.2 * row as f64).collect();
-    let twin = Twin::new(unit.clone(), environment, scene, starts_s.clone()).expect("a twin");
-    let readings = twin.predict(&[]);
-    let mut normal = noise(seed);
-    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
-    let mut text = format!("t_s,{}\n", names.join(","));
-    for (row, start_s) in starts_s.iter().enumerate() {
-        let cells = unit
-            .channels
-            .iter()
-            .zip(&readings)
-            .map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
-        let _ = writeln!(text, "{start_s:.1},{}", cells.collect::<Vec<_>>().join(","));
-    }
-    let field = environment.field_n_ut;
-    let case = format!(
-        "format = \"gap-case/1\"\nname = \"thrown\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
-         [environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
-         [windows]\nfit = [[0.0, 90.0]]\nhold = [[90.0, 100.0]]\n{more}",
-        environment.gravity,
-        environment.latitude.to_degrees(),
-        field.x,
-        field.y,
-        field.z
-    );
-    let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("case.toml", case), ("unit.toml", unit.text()), ("measured.csv", text)] {
-        fs::write(folder.path().join(name), text).expect("a file");
-    }
+    let windows = format!("[windows]\nfit = [[0.0, 90.0]]\nhold = [[90.0, 100.0]]\n{more}");
+    let (site, span_s) = (Environment::alcantara(), (0.0, SECONDS));
+    let folder = twin_case::of("thrown", &motion, site, span_s, noise(seed), &windows);
     (folder, motion)
 }
 

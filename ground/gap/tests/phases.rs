@@ -1,16 +1,15 @@
 //! Phases of a flight, found and told: the twin's sounding rocket, and a recording by hand.
 
-use std::{fmt::Write, fs, path::PathBuf};
+mod twin_case;
+
+use std::path::PathBuf;
 
 use gap::parity::{
     flight::Flight,
     phases::{Phase, is_begun_in_flight},
 };
 use tempfile::TempDir;
-use twin::{
-    motion,
-    predict::{Scene, Twin, emems, thesis_slot_s},
-};
+use twin::motion;
 
 /// \[s\] of lift-off.
 const LIFT_OFF_S: f64 = 30.0;
@@ -18,40 +17,15 @@ const LIFT_OFF_S: f64 = 30.0;
 /// The twin's unit on its rocket, from an instant on, with more in `case.toml`.
 fn flown(from_s: f64, more: &str) -> TempDir {
     let world = motion::world_by_name("rocket").expect("a motion");
-    let environment = world.environment;
-    let unit = emems(thesis_slot_s);
-    let to_s = 595.0;
-    let scene = Scene::new(&world.motion, &environment, from_s - 2.0, to_s + 2.0, 0.01);
-    let starts_s: Vec<f64> = (0..((to_s - from_s) / 0.2) as usize)
-        .map(|row| from_s + 0.2 * row as f64)
-        .collect();
-    let twin = Twin::new(unit.clone(), environment, scene, starts_s.clone()).expect("a twin");
-    let readings = twin.predict(&[]);
-    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
-    let mut text = format!("t_s,{}\n", names.join(","));
-    for (row, start_s) in starts_s.iter().enumerate() {
-        let cells = unit
-            .channels
-            .iter()
-            .zip(&readings)
-            .map(|(channel, own)| format!("{:.9}", channel.logged(own[row])));
-        let _ = writeln!(text, "{start_s:.1},{}", cells.collect::<Vec<_>>().join(","));
-    }
-    let field = environment.field_n_ut;
-    let case = format!(
-        "format = \"gap-case/1\"\nname = \"rocket\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
-         [motion_known]\nnone = true\n[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n{more}",
-        environment.gravity,
-        environment.latitude.to_degrees(),
-        field.x,
-        field.y,
-        field.z
-    );
-    let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("case.toml", case), ("unit.toml", unit.text()), ("measured.csv", text)] {
-        fs::write(folder.path().join(name), text).expect("a file");
-    }
-    folder
+    let settings = format!("[motion_known]\nnone = true\n{more}");
+    twin_case::of(
+        "rocket",
+        &world.motion,
+        world.environment,
+        (from_s, 595.0),
+        || 0.0,
+        &settings,
+    )
 }
 
 fn open(folder: &TempDir) -> Flight {
