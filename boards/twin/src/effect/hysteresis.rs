@@ -52,6 +52,11 @@ impl Effect for Hysteresis {
         });
     }
 
+    /// A play follows the sign of the rate of change, as the error of an instant does.
+    fn is_like_a_reference(&self, variant: f64) -> bool {
+        variant < 0.0
+    }
+
     fn told(&self, variant: f64) -> Option<String> {
         Some(match variant {
             onset_s if onset_s >= 0.0 => format!("a step at {onset_s:.0} s"),

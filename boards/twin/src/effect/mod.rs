@@ -232,6 +232,11 @@ pub trait Effect: Sync {
         vec![0.0]
     }
 
+    /// Whether what a recorded reference errs by while the unit moves looks like this variant: beside such a reference it is not sought.
+    fn is_like_a_reference(&self, _variant: f64) -> bool {
+        false
+    }
+
     /// What a variant says, in words, where the page does not: which bit, which axis, since when.
     fn told(&self, _variant: f64) -> Option<String> {
         None

@@ -32,18 +32,43 @@ pub struct Beneath {
     pub worth: f64,
 }
 
-/// [physical unit] least distance between two values in a log, 0 if all are alike. A file of physical units does not say that
-/// a part rounds, but shows it.
+/// [physical unit] between two values that a log can hold, 0 if all are alike. A file of physical units does not say that a part rounds, but
+/// shows it: by the least distance between two values, or, where some were computed and not read, by the commonest from one sample to the
+/// next. That is a step if a sample moves by it oftener than not at all, and if it and none are most moves up to half a step more.
 pub fn logged_step(measured: &[f64]) -> f64 {
     let mut values: Vec<f64> = measured.iter().copied().filter(|value| value.is_finite()).collect();
+    let mut moves: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     values.sort_by(f64::total_cmp);
     let steps = values
         .windows(2)
         .map(|pair| pair[1] - pair[0])
         .filter(|step| *step > 0.0);
     let least = steps.fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
+    if !least.is_finite() {
+        return 0.0;
+    }
+    moves.sort_by(f64::total_cmp);
+    let up_to = |most: f64| moves.partition_point(|moved| *moved < most);
+    let same = up_to(0.5 * least);
+    let mut from = up_to(FINER * least);
+    let (mut common, mut most) = (least, same);
+    for to in from..moves.len() {
+        while moves[to] - moves[from] > 2.0 * least {
+            from += 1;
+        }
+        if to + 1 - from > most {
+            (common, most) = (0.5 * (moves[from] + moves[to]), to + 1 - from);
+        }
+    }
+    if 2 * (same + most) > up_to(1.5 * common) {
+        common
+    } else {
+        least
+    }
 }
+
+/// Steps of a file in one of a part: a file that rounds to more than that hides the part's.
+const FINER: f64 = 10.0;
 
 /// Part of sigma that a log without rounding resolves.
 const RESOLVED: f64 = 1e-4;

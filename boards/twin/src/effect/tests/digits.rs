@@ -126,3 +126,24 @@ fn values_that_a_file_rounds_repeat_by_chance_and_are_not_stale() {
         .collect();
     assert!(gain(&stale, step) > 30.0);
 }
+
+/// A log of a part that rounds, with a stretch that was computed and not read: its step is that of the part.
+#[test]
+fn a_stretch_of_finer_numbers_does_not_hide_the_step_of_the_part() {
+    let noise = Noise::new(3);
+    let (step, sigma) = (0.001, 0.004);
+    let values: Vec<f64> = (0..3000)
+        .map(|k| {
+            let value = sigma * noise.normal(k);
+            let digits = if (1000..1600).contains(&k) { 1e-6 } else { step };
+            // As a file of six decimals has it.
+            ((value / digits).round() * digits * 1e6).round() / 1e6
+        })
+        .collect();
+    assert!((logged_step(&values) - step).abs() < 3e-6, "{}", logged_step(&values));
+    // Without a part that rounds there is nothing but the file's own.
+    let fine: Vec<f64> = (0..3000)
+        .map(|k| (sigma * noise.normal(k) * 1e6).round() / 1e6)
+        .collect();
+    assert!(logged_step(&fine) < 2e-6, "{}", logged_step(&fine));
+}
