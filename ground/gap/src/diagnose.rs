@@ -138,7 +138,15 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         library.reopen(&problem);
         found = attribute(&problem, &mut library, &search);
     }
-    let mut explanation = Explanation::of(&mut problem, &mut library, &quiet, found, withheld, &search);
+    let mut explanation = Explanation::of(
+        &mut problem,
+        &mut library,
+        &quiet,
+        found,
+        withheld,
+        &subject.slow,
+        &search,
+    );
     progress("leftover", 0.0);
     let mut left = match explanation.is_empty() {
         true => gate.clone(),
@@ -166,7 +174,13 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         events: events.as_ref(),
         ..without
     });
-    let withdrawn = if !shrink.supports_the_effect() || explanation.is_patchwork() {
+    // Beside a reference that is not exact each effect answers for itself (`probability/importance.rs`): every real log has small errors of
+    // its own, and a name is none the worse for them.
+    let is_withdrawn = match subject.slow.attitude_sigma_rad > 0.0 {
+        true => shrink.refutes_the_effect(),
+        false => !shrink.supports_the_effect() || explanation.is_patchwork(),
+    };
+    let withdrawn = if is_withdrawn {
         explanation.withdraw(&library)
     } else {
         Vec::new()

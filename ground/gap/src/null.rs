@@ -5,7 +5,7 @@
 //! equations with the calibration marginalised ([`normal`]), their [`evidence`], and the finished [`model`]. A [`misfit`] that
 //! looks like noise is told from noise by how long it stays alike. An effect that comes and goes is on in an [`interval`].
 //! What errs slowly, alike in several channels ([`wander`]), is taken out by one Kalman pass over a residual and every column
-//! ([`whitening`]). What an effect is worth [`beyond`] that, the field's [`gradient`] and the [`point`] whose position is told says whether
+//! ([`whitening`]). Where the reference is not exact the search is made in the [`colour`] of what is left ([`tint`]). What an effect is worth [`beyond`] that, the field's [`gradient`] and the [`point`] whose position is told says whether
 //! reference and field may have done it.
 //!
 //! With thousands of samples any error of 0.1 % is significant. That is why the calibration is marginalised everywhere: none of
@@ -13,6 +13,7 @@
 
 pub mod beyond;
 pub mod calibration;
+pub mod colour;
 pub mod evidence;
 pub mod gradient;
 pub mod interval;
@@ -22,5 +23,6 @@ pub mod model;
 pub mod normal;
 pub mod point;
 pub mod problem;
+pub mod tint;
 pub mod wander;
 pub mod whitening;

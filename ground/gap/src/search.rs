@@ -10,6 +10,7 @@ pub mod baseline;
 pub mod bias_walk;
 pub mod explanation;
 pub mod gauss_newton;
+pub mod in_colour;
 pub mod interval_sums;
 pub mod odds;
 pub mod once;

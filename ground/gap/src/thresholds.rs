@@ -255,6 +255,11 @@ thresholds! {
         larger: "weak true names are lost",
         smaller: "weak wrong names are said",
         Fitted("wrong names of the dealt cases had 8 to 26 nats; an effect of ratio 8 has 32 before its prior odds (docs/gap/trials.md)");
+    /// What an effect that does not matter must be worth beside a reference's errors to be as likely said as not.
+    CERTAIN: f64 = 32.0, in "nats",
+        larger: "plain small effects get no names",
+        smaller: "what every real recording has gets names",
+        Derived("an effect of ratio 8, the least that a name is asked for, is worth 8 x 8 / 2; healthy recordings have up to 23");
     /// Step that multiplies those odds by e.
     DOUBT_STEP: f64 = 3.0, in "nats",
         larger: "a softer threshold",

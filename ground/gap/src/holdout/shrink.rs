@@ -48,6 +48,11 @@ pub struct Shrink {
 }
 
 impl Shrink {
+    /// Whether the held-out samples speak against the effect: with 97.5 % recalibration alone shrinks the gap more.
+    pub fn refutes_the_effect(&self) -> bool {
+        self.beyond_recalibration[1] < 0.0
+    }
+
     /// Whether the held-out samples speak for the effect: the gap shrinks with 97.5 %, and recalibration alone does not
     /// shrink it more; where both shrink it as much, it is the size of that calibration which speaks. An attribution that fails
     /// this is withdrawn, whatever its evidence.

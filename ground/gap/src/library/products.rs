@@ -43,14 +43,12 @@ impl Products {
         known.iter_mut().skip(place).for_each(|row| row[place] = f64::NAN);
     }
 
-    /// After the weights of the problem's samples, channel by channel, were these.
-    pub fn reweigh(&mut self, problem: &Problem, before: &[DVector<f64>]) {
-        let ratio = |(before, frame): (&DVector<f64>, &Frame)| before.component_div(&frame.weights);
-        let factors: Vec<DVector<f64>> = before.iter().zip(&problem.frames).map(ratio).collect();
+    /// After the problem's frames were these.
+    pub fn reframe(&mut self, problem: &Problem, before: &[Frame]) {
         for (place, column) in self.columns.iter_mut().enumerate() {
-            column
-                .iter_mut()
-                .for_each(|(channel, values)| values.component_mul_assign(&factors[*channel]));
+            for (channel, values) in column.iter_mut() {
+                *values = problem.frames[*channel].white(before[*channel].physical(values));
+            }
             self.open[place] = open_part(problem, column);
         }
         self.known.get_mut().iter_mut().for_each(|row| row.fill(f64::NAN));

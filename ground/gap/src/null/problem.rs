@@ -100,6 +100,7 @@ impl<'a> Problem<'a> {
             frames.push(Frame {
                 quiet_energy: 0.0,
                 factor: None,
+                colour: None,
                 series: series.clone(),
                 own: weights.map(|weight| channel.sigma() / weight),
                 weights,
@@ -274,14 +275,9 @@ impl<'a> Problem<'a> {
     pub fn residual_with(&self, channel: usize, model: &[Component], memory: &mut Memory) -> DVector<f64> {
         let predicted = self.predict_with(channel, model, memory);
         let frame = &self.frames[channel];
-        let samples = frame
-            .series
-            .rows
-            .iter()
-            .zip(&frame.series.values)
-            .zip(frame.weights.iter());
-        let errors = samples.map(|((row, value), weight)| (value - predicted[*row as usize]) / weight);
-        DVector::from_iterator(frame.series.rows.len(), errors)
+        let samples = frame.series.rows.iter().zip(&frame.series.values);
+        let errors = samples.map(|(row, value)| value - predicted[*row as usize]);
+        frame.white(DVector::from_iterator(frame.series.rows.len(), errors))
     }
 
     /// Places in a model of the parts of one effect that are one name with `model[of]`, which is among them: at several places with channels in
@@ -320,9 +316,11 @@ impl<'a> Problem<'a> {
     pub fn contribution(&self, model: &[Component], of: &[usize]) -> Vec<(usize, DVector<f64>)> {
         let fitted = |(channel, added): (usize, Vec<f64>)| {
             let frame = &self.frames[channel];
-            let rows = frame.series.rows.iter().zip(frame.weights.iter());
-            let values = rows.map(|(row, weight)| added[*row as usize] / weight);
-            (channel, DVector::from_iterator(frame.series.rows.len(), values))
+            let values = frame.series.rows.iter().map(|row| added[*row as usize]);
+            (
+                channel,
+                frame.white(DVector::from_iterator(frame.series.rows.len(), values)),
+            )
         };
         self.added(model, of).into_iter().map(fitted).collect()
     }
@@ -351,12 +349,15 @@ impl<'a> Problem<'a> {
         let starts_s = self.twin.starts_s();
         let at = |(channel, values): &(usize, Vec<f64>)| {
             let frame = &self.frames[*channel];
-            let of_row = frame.series.rows.iter().zip(frame.weights.iter()).map(|(row, weight)| {
+            let of_row = frame.series.rows.iter().map(|row| {
                 let row = *row as usize;
                 let is_on = span.is_none_or(|span| span.contains(starts_s[row]));
-                if is_on { values[row] / weight } else { 0.0 }
+                if is_on { values[row] } else { 0.0 }
             });
-            (*channel, DVector::from_iterator(frame.series.rows.len(), of_row))
+            (
+                *channel,
+                frame.white(DVector::from_iterator(frame.series.rows.len(), of_row)),
+            )
         };
         column.entries.iter().map(at).collect()
     }

@@ -50,6 +50,22 @@ pub fn processes(errors: &SlowErrors) -> [Process; 6] {
     [attitude, attitude, attitude, field, field, field]
 }
 
+/// [unit/sqrt(s)] by which zeros walk where their description says less: accelerometers, gyros, magnetometers (nine recordings of BROAD).
+const WALKS: [f64; 3] = [3e-4, 1e-6, 2e-3];
+
+/// The walk of a channel's zero.
+pub fn zero_walk(channel: &Channel) -> Process {
+    let least = match channel.sensor {
+        Kind::Accelerometer => WALKS[0],
+        Kind::Gyro => WALKS[1],
+        Kind::Magnetometer => WALKS[2],
+        Kind::Thermometer => 0.0,
+    };
+    Process::Walk {
+        per_root_s: channel.drift_sigma.max(least),
+    }
+}
+
 /// Which states, and how much of each, a channel sees of such processes that begin `at`: an angle's rate is its second state.
 pub fn of_states(seen: &[f64; 9], at: &[usize]) -> Vec<(usize, f64)> {
     let state = |of: usize| match of {

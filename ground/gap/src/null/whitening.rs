@@ -213,6 +213,25 @@ impl Whitening {
         white.transpose()
     }
 
+    /// The column that is this one when it is white; a sample that is passed over is what it is here.
+    pub fn taken_back(&self, white: &DVector<f64>) -> DVector<f64> {
+        let (places, _) = places(&self.processes);
+        let mut column = white.clone();
+        let mut states = DMatrix::<f64>::zeros(self.states, 1);
+        for (at, step) in self.steps.iter().enumerate() {
+            if !step.go.is_empty() {
+                carry(&step.go, &places, &self.processes, &mut states);
+            }
+            if step.weight <= 0.0 {
+                continue;
+            }
+            let innovation = white[at] / step.weight;
+            column[at] = innovation + step.sees.iter().map(|(place, part)| part * states[*place]).sum::<f64>();
+            states.column_mut(0).axpy(innovation, &step.gain, 1.0);
+        }
+        column
+    }
+
     /// `-(sum ln s + u'u + n ln 2 pi) / 2` of a residual.
     pub fn log_likelihood(&self, residual: &DVector<f64>) -> f64 {
         let white = self.whiten(&DMatrix::from_columns(std::slice::from_ref(residual)));

@@ -3,20 +3,22 @@
 //! In: a model and what is left beside reference, field and calibration with it and without one of its effects
 //! ([`crate::unknown::slow::Beside`]). Out: [`Importance`].
 //!
-//! A real unit is off by a little everywhere, and thousands of samples make any of it significant: a gyro's scale that is off by two of its
-//! sigmas is fifty nats and a hundredth of the noise. That is for the calibration, and no name. So a name must explain what would
-//! matter without it, by the bars of the remainder: a slow course above its bar, or in some channel a growth of the gap above the user's.
+//! A real unit is off by a little everywhere, and thousands of samples make any of it significant: the differentiated positions of a camera
+//! leave accelerometers lever arms of a thousand nats, and two effects that take each other back are worth twenty. That is no name. So
+//! without an effect the gap of some channel must grow by more than the user's bar, the others fitted anew, or it must be certain
+//! ([`CERTAIN`]) where what the reference errs by is taken out and only what lasts for a fraction of a second is seen.
 //! And it must do so better than a course that is free (Kennedy and O'Hagan 2001): a supply that sags slowly is no set pulse that is
 //! missing since some instant.
 //! Parts of one effect that share channels go together ([`Problem::parts`]): without one of them the others take its place.
 
+use nalgebra::{DMatrix, DVector};
 use twin::effect::Texture;
 
 use crate::{
     input::case::Subject,
     null::{model::Model, problem::Problem},
     search::explanation::Explanation,
-    thresholds::UNLIKE,
+    thresholds::{CERTAIN, DOUBT_STEP, UNLIKE},
     unknown::{
         remainder::{Setting, courses, judged},
         slow::{Beside, Slow},
@@ -37,8 +39,8 @@ pub struct Course {
 /// What speaks for one effect of the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Weight {
-    /// Probability that what it explains matters.
-    pub matters: f64,
+    /// Whether the gap of some channel grows by more than the user's bar without it.
+    pub grows: bool,
     /// \[nats\] that it is worth.
     pub worth: f64,
     /// \[nats\] by which it is likelier than a free course in its channels would be in its place, its parameters paid for.
@@ -46,11 +48,15 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// How far it may have a name, 0 to 1: it matters, and no free course says what it says, and more. A law that is a little off leaves such
-    /// a course a few parts in a hundred ([`UNLIKE`]).
+    /// How far it may have a name, 0 to 1: the gap grows without it or it is certain, and no free course says what it says, and more. A law that is a little
+    /// off leaves such a course a few parts in a hundred ([`UNLIKE`]).
     pub fn counts(&self) -> f64 {
         let no_course = self.over_course + UNLIKE * self.worth;
-        self.matters / (1.0 + (-no_course).exp())
+        let is_there = match self.grows {
+            true => 1.0,
+            false => 1.0 / (1.0 + ((CERTAIN - self.worth) / DOUBT_STEP).exp()),
+        };
+        is_there / (1.0 + (-no_course).exp())
     }
 }
 
@@ -76,8 +82,6 @@ impl Importance {
             let channels = problem.contribution(&model.components, &problem.parts(&model.components, effect));
             let is_its = |slow: &&Slow| channels.iter().any(|(channel, _)| slow.channels.contains(channel));
             let without = courses(problem, &beside, &setting, Some(effect));
-            let slow = without.iter().filter(is_its);
-            let slow = slow.map(|slow| judged(problem, slow, &setting, without.len())[1]);
             // The best of several, which share even odds with nothing.
             let best = |slow: &[Slow]| {
                 let several = (slow.len().max(1) as f64).ln();
@@ -86,7 +90,7 @@ impl Importance {
             };
             let worth = beside.worth(effect);
             Weight {
-                matters: slow.fold(f64::from(u8::from(grows(problem, model, effect, &setting))), f64::max),
+                grows: grows(problem, model, effect, &setting),
                 worth,
                 over_course: worth - beside.price(effect) + best(&left) - best(&without),
             }
@@ -117,14 +121,33 @@ pub fn setting<'a>(subject: &'a Subject, explanation: &'a Explanation) -> Settin
     }
 }
 
-/// Whether the gap of some channel would grow by more than the user's bar without an effect, once the calibration is fitted.
+/// Whether the gap of some channel would grow by more than the user's bar without an effect, once the calibration and the other effects are
+/// fitted: two that take each other back are nothing.
 fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> bool {
     let bar = (1.0 + setting.bars.gap_sigma).powi(2) - 1.0;
+    let components = &model.components;
+    let parts = problem.parts(components, effect);
+    let open_of = |other: usize| {
+        let parameters = components[other].active.cause.parameters(problem.twin.unit());
+        let slopes = problem.slopes(components, other);
+        slopes.into_iter().zip(parameters).flat_map(|(slope, parameter)| {
+            let of_sigma = move |(channel, column): (usize, DVector<f64>)| (channel, column * parameter.prior_sigma);
+            slope.into_iter().map(of_sigma)
+        })
+    };
+    let others = (0..components.len()).filter(|at| !parts.contains(at));
+    let open: Vec<(usize, DVector<f64>)> = others.flat_map(open_of).collect();
     problem
-        .contribution(&model.components, &problem.parts(&model.components, effect))
+        .contribution(components, &parts)
         .into_iter()
         .any(|(channel, added)| {
-            let left = problem.in_sigmas(channel, &problem.frames[channel].left(&added));
+            let mut frame = problem.frames[channel].clone();
+            let of_channel = open.iter().filter(|(own, _)| *own == channel);
+            let columns: Vec<DVector<f64>> = of_channel.map(|(_, column)| column.clone()).collect();
+            if !columns.is_empty() {
+                frame.widen(&DMatrix::from_columns(&columns));
+            }
+            let left = problem.in_sigmas(channel, &frame.left(&added));
             left.norm_squared() > bar * left.len() as f64
         })
 }
@@ -133,19 +156,27 @@ fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> 
 mod tests {
     use super::*;
 
-    fn weight(matters: f64, worth: f64, over_course: f64) -> Weight {
+    fn weight(grows: bool, worth: f64, over_course: f64) -> Weight {
         Weight {
-            matters,
+            grows,
             worth,
             over_course,
         }
     }
 
+    /// What is certain beside the reference's errors is there, however small; a stand-in for what every recording leaves is worth little there.
+    #[test]
+    fn what_does_not_matter_has_a_name_if_it_is_certain() {
+        assert!(weight(false, 112.6, 122.1).counts() > 0.99);
+        assert!(weight(false, -21.5, -25.6).counts() < 0.01);
+        assert!(weight(false, 22.5, 12.6).counts() < 0.1);
+    }
+
     /// A supply that sags was a missing set pulse at 270 nats, of which a free course said 18 more.
     #[test]
     fn a_free_course_that_says_more_takes_the_name_and_one_that_says_a_few_parts_in_a_hundred_does_not() {
-        assert!(weight(1.0, 270.0, -18.0).counts() < 0.05);
-        assert!(weight(1.0, 143_670.0, -3.5).counts() > 0.99);
-        assert!(weight(1.0, 1.2, -5.0).counts() < 0.01);
+        assert!(weight(true, 270.0, -18.0).counts() < 0.05);
+        assert!(weight(true, 143_670.0, -3.5).counts() > 0.99);
+        assert!(weight(true, 1.2, -5.0).counts() < 0.01);
     }
 }

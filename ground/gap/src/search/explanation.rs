@@ -4,7 +4,8 @@
 //! was asked.
 //!
 //! An effect on the scatter is judged on what the others leave. With the noise as found, everything else is searched anew;
-//! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged. Beside
+//! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged. Where the reference
+//! is not exact the noise has a colour ([`crate::search::in_colour`]). Beside
 //! a gyro's walk everything else is searched with the walk open, until both stay what they are.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,6 +14,7 @@ use nalgebra::DVector;
 use twin::{effect::Texture, part::signal::Noise};
 
 use crate::{
+    input::case::SlowErrors,
     library::hypotheses::Library,
     null::{
         misfit,
@@ -22,6 +24,7 @@ use crate::{
     search::{
         bias_walk::Walk,
         gauss_newton::refine,
+        in_colour::{attribute_in_colour, reframe},
         odds::probability_of_any,
         readings::{Attribution, Chosen, attribute},
         scatter::{Scatter, scatters},
@@ -53,7 +56,7 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Explains a log. `found` is what a first search chose, `quiet` the model without effects. The problem is left with the
+    /// Explains a log whose reference and field err like this. `found` is what a first search chose, `quiet` the model without effects. The problem is left with the
     /// noise of the effect on the scatter if that is louder noise, and as described if it is not.
     pub fn of(
         problem: &mut Problem,
@@ -61,6 +64,7 @@ impl Explanation {
         quiet: &Model,
         mut found: Attribution,
         withheld: &[String],
+        errors: &SlowErrors,
         progress: &dyn Fn(f64),
     ) -> Self {
         let first = Model::around(problem, found.model(library));
@@ -95,10 +99,13 @@ impl Explanation {
         let described = problem.frames.clone();
         let both = factors(&first.fitted.rest, &louder, scatter.as_ref());
         let beneath = scatter.as_ref().map(|scatter| scatter.uncovered(problem));
-        if scatter.is_some() || both.iter().any(|factor| *factor != 1.0) {
+        let is_inexact = errors.attitude_sigma_rad > 0.0;
+        if is_inexact || scatter.is_some() || both.iter().any(|factor| *factor != 1.0) {
             let frames = beneath.unwrap_or_else(|| described.clone());
             reframe(problem, library, weighed(frames, &both));
-            if !wanders {
+            if is_inexact && !wanders {
+                found = attribute_in_colour(problem, library, errors, found, progress);
+            } else if !wanders {
                 found = attribute(problem, library, progress);
             }
         }
@@ -264,13 +271,6 @@ fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
         frame.reweigh(&frame.weights.map(|_| *factor));
     }
     frames
-}
-
-/// Takes other frames for the problem's.
-fn reframe(problem: &mut Problem, library: &mut Library, frames: Vec<Frame>) {
-    let before: Vec<DVector<f64>> = problem.frames.iter().map(|frame| frame.weights.clone()).collect();
-    problem.reframe(frames);
-    library.products.reweigh(problem, &before);
 }
 
 /// Factors of the noise for a search: of a misfit, or of the effect on the scatter. What that says of samples takes the place of

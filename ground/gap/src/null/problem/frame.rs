@@ -4,7 +4,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::{input::log::Series, null::normal::Normal};
+use crate::{
+    input::log::Series,
+    null::{colour::Colour, normal::Normal},
+};
 
 /// One channel of the fit windows.
 #[derive(Clone, Debug)]
@@ -13,6 +16,8 @@ pub struct Frame {
     pub series: Series,
     /// Physical units a unit of noise in the fit, sample by sample.
     pub weights: DVector<f64>,
+    /// What makes its columns white; `None` where they are taken for white.
+    pub colour: Option<Colour>,
     /// The sensor's own noise over that, as described.
     pub own: DVector<f64>,
     /// What the calibration leaves open, in units of noise for one prior sigma.
@@ -54,6 +59,33 @@ impl Frame {
             );
         }
         left
+    }
+
+    /// A column in units of white noise, of one in physical units.
+    pub fn white(&self, column: DVector<f64>) -> DVector<f64> {
+        let column = column.component_div(&self.weights);
+        match &self.colour {
+            Some(colour) => colour.applied(&column),
+            None => column,
+        }
+    }
+
+    /// The column in physical units that this one is in white noise.
+    pub fn physical(&self, white: &DVector<f64>) -> DVector<f64> {
+        match &self.colour {
+            Some(colour) => colour.taken_back(white).component_mul(&self.weights),
+            None => white.component_mul(&self.weights),
+        }
+    }
+
+    /// Takes its noise for one of this colour.
+    pub fn tint(&mut self, colour: Colour) {
+        for mut column in self.nuisance.column_iter_mut() {
+            let white = colour.applied(&column.clone_owned());
+            column.copy_from(&white);
+        }
+        self.colour = Some(colour);
+        self.factorise();
     }
 
     /// Weighs its samples anew: the noise of each is so many times what it was taken for.

@@ -12,13 +12,10 @@ use crate::{
     input::case::SlowErrors,
     null::{
         problem::Problem,
-        wander::{of_states, processes, sees},
+        wander::{of_states, processes, sees, zero_walk},
         whitening::{Process, Sample, Whitening, places},
     },
 };
-
-/// [unit/sqrt(s)] by which zeros walk where their description says less: accelerometers, gyros, magnetometers (nine recordings of BROAD).
-const WALKS: [f64; 3] = [3e-4, 1e-6, 2e-3];
 
 /// States that a set of several channels shares: three axes of the attitude, three of the field.
 const SHARED: usize = 6;
@@ -182,18 +179,7 @@ impl Pass<'_> {
     /// What errs slowly, and how many of these the channels share: a channel alone has nothing but its zero.
     fn processes(&self, set: &[usize]) -> (Vec<Process>, usize) {
         let errors = self.errors;
-        let walk = |channel: &usize| {
-            let own = &self.problem.twin.unit().channels[*channel];
-            let least = match own.sensor {
-                Kind::Accelerometer => WALKS[0],
-                Kind::Gyro => WALKS[1],
-                Kind::Magnetometer => WALKS[2],
-                Kind::Thermometer => 0.0,
-            };
-            Process::Walk {
-                per_root_s: own.drift_sigma.max(least),
-            }
-        };
+        let walk = |channel: &usize| zero_walk(&self.problem.twin.unit().channels[*channel]);
         let shared = if set.len() > 1 { SHARED } else { 0 };
         let processes = processes(errors).into_iter().take(shared).chain(set.iter().map(walk));
         (processes.collect(), shared)
