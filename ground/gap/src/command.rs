@@ -22,6 +22,7 @@ use crate::{
     parity::{self, ParityError},
     report::{page, terminal, verdict::Verdict},
     search::baseline,
+    together,
 };
 
 /// Finds what the twin of a unit lacks
@@ -29,15 +30,16 @@ use crate::{
 /// Compares a unit's log with its nominal twin along a known motion: is there a gap beyond noise and calibration, where,
 /// which physical effect makes it, how far it shrinks on held-out data once that effect is in, and what to measure next.
 /// A case without a motion is judged by the redundancy of its sensors alone, and is told what that cannot see.
+/// Several cases are logs of one unit, and are diagnosed together: what the unit has is in all of them.
 /// The twin with the effect in and, where the unit can correct the cause, the calibration set go into CASE/corrected; what was
 /// said is kept in CASE/analysis until a byte of the case changes.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground gap flights/tumble-1\n  ground gap limits flights/tumble-1\n  ground gap flights/tumble-1 --against flights/rotation-1-1\n  ground gap flights/tumble-1 --out verdicts/flight-7"
+    after_help = "Examples:\n  ground gap flights/tumble-1\n  ground gap limits flights/tumble-1\n  ground gap flights/tumble-1 --against flights/rotation-1-1\n  ground gap flights/tumble-1 --out verdicts/flight-7\n  ground gap bench-3 flights/rocket-1 flights/rocket-2"
 )]
 pub struct Arguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
-    #[arg(value_name = "WHAT", num_args = 1..=2, required = true, help = "[where|why|shrink|next|limits] CASE: a folder with case.toml")]
+    #[arg(value_name = "WHAT", num_args = 1.., required = true, help = "[where|why|shrink|next|limits] CASE...: a folder with case.toml; several are logs of one unit, diagnosed together")]
     pub words: Vec<String>,
     /// Write verdict.json, index.html, unit.toml and, where the unit can correct the cause, calibration.toml in DIR too
     #[arg(long, value_name = "DIR")]
@@ -58,6 +60,8 @@ pub struct Arguments {
 
 /// Where the corrected twin goes, in the folder of its case.
 pub const CORRECTED: &str = "corrected";
+/// Where what several logs say together goes, in the folder of the first.
+pub const TOGETHER: &str = "analysis-together";
 /// The verdict for programs.
 pub const VERDICT: &str = "verdict.json";
 /// The verdict as a page.
@@ -74,7 +78,7 @@ pub enum GapError {
     #[error(transparent)]
     Case(#[from] CaseError),
     /// A word before the case is none of those known.
-    #[error("\"{0}\" is none of: where, why, shrink, next, limits")]
+    #[error("\"{0}\" is none of: where, why, shrink, next, limits, and no case of that name is there")]
     Word(String),
     /// An effect to leave out is not in the library.
     #[error("--withhold {0}: no effect of that name is in the library")]
@@ -82,6 +86,11 @@ pub enum GapError {
     /// A log without a reference cannot be held against another.
     #[error("--against needs a case with a motion: without one nothing is corrected that could be compared")]
     Against,
+    /// Several logs cannot be held against another.
+    #[error(
+        "--against takes one case with a motion; of several logs, what they contradict each other about is said without it"
+    )]
+    AgainstSeveral,
     /// A file cannot be written.
     #[error("{file}: cannot be written: {source}")]
     Write {
@@ -116,14 +125,7 @@ impl From<ParityError> for GapError {
 /// # Errors
 /// When the case cannot be judged or a file not written.
 pub fn run(arguments: &Arguments) -> Result<(), GapError> {
-    let (word, case) = match arguments.words.as_slice() {
-        [case] => ("all", case),
-        [word, case] => (word.as_str(), case),
-        _ => return Err(GapError::Word(arguments.words.join(" "))),
-    };
-    if !["all", "where", "why", "shrink", "next", "limits"].contains(&word) {
-        return Err(GapError::Word(word.to_owned()));
-    }
+    let (word, cases) = parted(&arguments.words)?;
     if let Some(stranger) = arguments
         .withhold
         .iter()
@@ -131,7 +133,10 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
     {
         return Err(GapError::Effect(stranger.clone()));
     }
-    let case = Path::new(case);
+    let case = match cases.as_slice() {
+        [case] => case.as_path(),
+        _ => return run_together(arguments, word, &cases),
+    };
     let is_blind = arguments.blind_motion || Opened::open(case)?.is_without_motion();
     if is_blind && arguments.against.is_some() {
         return Err(GapError::Against);
@@ -166,6 +171,61 @@ pub fn run(arguments: &Arguments) -> Result<(), GapError> {
         if !is_blind {
             write_twin(folder, &analysis)?;
         }
+        println!("{}", folder.join(PAGE).display());
+    }
+    Ok(())
+}
+
+/// What to say: the words before the cases, and in full.
+const WORDS: [&str; 6] = ["all", "where", "why", "shrink", "next", "limits"];
+
+/// What to say, and of which cases.
+fn parted(words: &[String]) -> Result<(&str, Vec<PathBuf>), GapError> {
+    let (word, cases) = match words {
+        [word, cases @ ..] if !cases.is_empty() && WORDS.contains(&word.as_str()) => (word.as_str(), cases),
+        // Of two words the first was always what to say: a case that is not there is rather a word that is none.
+        [word, _, ..] if !Path::new(word).exists() => return Err(GapError::Word(word.clone())),
+        cases => ("all", cases),
+    };
+    Ok((word, cases.iter().map(PathBuf::from).collect()))
+}
+
+/// Several logs of one unit: says what they say together, and leaves verdict and page beside the first.
+fn run_together(arguments: &Arguments, word: &str, cases: &[PathBuf]) -> Result<(), GapError> {
+    if arguments.against.is_some() {
+        return Err(GapError::AgainstSeveral);
+    }
+    let bar = bar();
+    let analysis = together::analysed(cases, arguments.blind_motion, &arguments.withhold, &|what, share| {
+        bar.set_message(what);
+        bar.set_position((100.0 * share) as u64);
+    });
+    bar.finish_and_clear();
+    let analysis = analysis?;
+    let name = if arguments.json {
+        VERDICT.to_owned()
+    } else {
+        format!("{word}.txt")
+    };
+    print!("{}", kept::text(&analysis, &name).unwrap_or_default());
+    let beside = |first: &PathBuf| {
+        let folder = if first.is_file() {
+            first.parent().unwrap_or(first)
+        } else {
+            first
+        };
+        folder.join(TOGETHER)
+    };
+    let folder = arguments
+        .out
+        .clone()
+        .or_else(|| cases.first().map(beside))
+        .unwrap_or_default();
+    make(&folder)?;
+    for name in [VERDICT, PAGE] {
+        put(&folder, name, kept::text(&analysis, name).unwrap_or_default())?;
+    }
+    if word == "all" && !arguments.json {
         println!("{}", folder.join(PAGE).display());
     }
     Ok(())

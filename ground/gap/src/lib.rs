@@ -18,6 +18,8 @@
 //!
 //! A log that no reference saw goes another way through the rooms 1 to 4: [`parity`], what the unit's own redundancy says.
 //!
+//! Several logs of one unit go through [`together`]: what they say of it is summed before anything is named.
+//!
 //! Beside the rooms, and only for [`command`] and other programs: [`kept`] keeps what was said beside the case, [`against`] holds a
 //! corrected twin against another case.
 //!
@@ -48,6 +50,7 @@ pub mod probability;
 pub mod report;
 pub mod search;
 pub mod thresholds;
+pub mod together;
 pub mod unknown;
 
 pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};

@@ -8,9 +8,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The thresholds, the ten rooms in the order of the steps, around the last the conductor, the way without a reference, what is
+/// The thresholds, the ten rooms in the order of the steps, around the last the conductor, the way without a reference, several logs, what is
 /// kept and held against another case, and the shell.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "thresholds",
     "input",
     "null",
@@ -24,6 +24,7 @@ const ORDER: [&str; 16] = [
     "diagnose",
     "report",
     "parity",
+    "together",
     "kept",
     "against",
     "command",

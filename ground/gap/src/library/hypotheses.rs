@@ -83,7 +83,7 @@ impl Hypothesis {
 }
 
 /// All of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Library {
     /// In the order of the effect library.
     pub hypotheses: Vec<Hypothesis>,

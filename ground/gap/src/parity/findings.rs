@@ -263,7 +263,7 @@ fn is_shown(promise: Promise) -> bool {
 
 /// How far a cause is believed that is as strong as this on the held-out windows and by parity. What parity names, the held-out
 /// windows may refute. What smoothing alone names, they must show as well, and parity may refute it too.
-fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 {
+pub fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 {
     let of = |promise: Option<Promise>| promise.map(|promise| promise.confidence());
     match by {
         By::Codes => 1.0,
@@ -300,7 +300,7 @@ fn projected(space: &Space, model: &[Component]) -> Projected {
 /// Whether something is there that nothing named explains: a gap too large, or a calibration that is off by more of its own sigmas
 /// than chance gives one log in twenty over all its parameters. A magnet beside one of forty channels is lost in the gap of
 /// the whole, and found in the calibration.
-fn is_unexplained(Left { gap, calibration }: &Left) -> bool {
+pub fn is_unexplained(Left { gap, calibration }: &Left) -> bool {
     let most = calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
     // Of a standard normal: what is fitted is off by no more than what it is fitted to.
     *gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE

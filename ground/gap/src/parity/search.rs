@@ -116,6 +116,11 @@ impl Offered {
     pub fn columns(&self) -> Vec<&Entries> {
         self.columns.iter().collect()
     }
+
+    /// Of each hypothesis, the places of its columns.
+    pub fn sets(&self) -> &[Vec<usize>] {
+        &self.sets
+    }
 }
 
 /// Every hypothesis, alone. `progress` is told how far it is.
@@ -137,6 +142,23 @@ pub fn look(
 }
 
 impl Seen {
+    /// Of a hypothesis whose normal equations are known.
+    pub fn summed(library: &Library, hypothesis: usize, information: DMatrix<f64>, score: DVector<f64>) -> Self {
+        let small = library.hypotheses[hypothesis].small();
+        let sigma = |index: usize| small.get(index).map_or(1.0, |place| library.prior_sigmas[*place]);
+        let energy: f64 = (0..score.len())
+            .map(|index| sigma(index).powi(2) * information[(index, index)])
+            .sum();
+        let snr = energy.max(0.0).sqrt();
+        Self {
+            hypothesis,
+            information,
+            score,
+            with_reference: snr,
+            snr,
+        }
+    }
+
     /// Of a hypothesis with these columns, and of what motion and calibration leave of the residual.
     fn of(library: &Library, at: usize, columns: &[&Entries], information: DMatrix<f64>, rest: &Entries) -> Self {
         let hypothesis = &library.hypotheses[at];
@@ -280,14 +302,27 @@ pub fn choose(
     chosen
 }
 
-struct Fit {
-    gain: f64,
-    theta: DVector<f64>,
-    covariance: DMatrix<f64>,
+/// A hypothesis fitted.
+pub struct Fit {
+    /// \[nats\] over the model without it.
+    pub gain: f64,
+    /// Its parameters.
+    pub theta: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
     energy: f64,
 }
 
-fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
+/// The likeliest of hypotheses alone, if it is likelier than nothing by the margin of a name.
+pub fn foremost(library: &Library, seen: &[Seen]) -> Option<Chosen> {
+    let fits = seen
+        .iter()
+        .filter_map(|one| Some((one.hypothesis, fit_alone(library, one)?)));
+    likeliest(library, seen, &fits.collect::<Vec<_>>())
+}
+
+/// A hypothesis alone.
+pub fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
     let hypothesis = &library.hypotheses[seen.hypothesis];
     if hypothesis.small().is_empty() {
         let width = hypothesis.parameters.len();

@@ -51,6 +51,7 @@ pub struct Second {
 }
 
 /// What a model leaves.
+#[derive(Clone, Debug)]
 pub struct Left {
     /// \[sigma\] over degrees of freedom.
     pub gap: f64,
@@ -128,25 +129,64 @@ impl Second {
 /// covariance is `C`, the factor is `1 + <d, r> / <d, d>` and its variance `(<d, d> + <s, d>' C <s, d>) / <d, d>^2`, as in
 /// [`crate::holdout::strength`], the motion marginalised.
 pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Option<Promise>> {
+    let all = measured(space, prior, causes).into_iter().zip(causes);
+    all.map(|(strength, (_, covariance))| strength.promise(covariance))
+        .collect()
+}
+
+/// The sums that a factor is made of: those of several logs add up.
+#[derive(Clone, Debug)]
+pub struct Strength {
+    /// `<d, d>`.
+    pub energy: f64,
+    /// `<d, r>`.
+    pub along: f64,
+    /// `<s, d>`; none of a cause without parameters.
+    pub by_parameter: DVector<f64>,
+}
+
+impl Strength {
+    /// The factor, of parameters with this covariance; none where the cause makes nothing.
+    pub fn promise(&self, covariance: &DMatrix<f64>) -> Option<Promise> {
+        let fitted = match self.by_parameter.len() {
+            0 => 0.0,
+            _ => self.by_parameter.dot(&(covariance * &self.by_parameter)).max(0.0),
+        };
+        (self.energy > 0.0).then(|| Promise {
+            factor: 1.0 + self.along / self.energy,
+            sigma: (self.energy + fitted).sqrt() / self.energy,
+        })
+    }
+
+    /// That of two logs.
+    pub fn with(mut self, other: &Self) -> Self {
+        self.energy += other.energy;
+        self.along += other.along;
+        self.by_parameter += &other.by_parameter;
+        self
+    }
+}
+
+/// The sums of [`strengths`].
+fn measured(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Strength> {
     let model: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
     let rest = space.rest(&space.project_residual(residual_of(space.problem, &model), prior));
-    let strength = |(at, (component, covariance)): (usize, &Fitted)| {
+    let strength = |(at, (component, _)): (usize, &Fitted)| {
         let added = space.problem.contribution(&model, &[at]);
         let own_rest = space.rest(&space.project(added.clone()));
         let energy = dot(&added, &own_rest);
         let is_sized = component.active.cause.effect.page().nature != Nature::Discrete;
-        let fitted = if is_sized {
-            let slopes = space.problem.slopes(&model, at);
-            let along = slopes.iter().map(|slope| dot(slope, &own_rest));
-            let along = DVector::from_iterator(slopes.len(), along);
-            along.dot(&(covariance * &along)).max(0.0)
+        let slopes = if is_sized {
+            space.problem.slopes(&model, at)
         } else {
-            0.0
+            Vec::new()
         };
-        (energy > 0.0).then(|| Promise {
-            factor: 1.0 + dot(&added, &rest) / energy,
-            sigma: (energy + fitted).sqrt() / energy,
-        })
+        let by_parameter = slopes.iter().map(|slope| dot(slope, &own_rest));
+        Strength {
+            energy,
+            along: dot(&added, &rest),
+            by_parameter: DVector::from_iterator(slopes.len(), by_parameter),
+        }
     };
     causes.iter().enumerate().map(strength).collect()
 }
@@ -156,19 +196,30 @@ pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<
 /// # Errors
 /// When the unit's description names an effect there is not.
 pub fn promises(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> Result<Vec<Option<Promise>>, CaseError> {
+    let all = held_out(held, causes, progress)?.into_iter().zip(causes);
+    Ok(all
+        .map(|(strength, (_, covariance))| strength.promise(covariance))
+        .collect())
+}
+
+/// The sums of [`promises`].
+///
+/// # Errors
+/// When the unit's description names an effect there is not.
+pub fn held_out(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> Result<Vec<Strength>, CaseError> {
     let smoothed = held.smoothed(progress)?;
     if !smoothed.is_settled() {
         let (twin, fit, reference) = (held.twin_of_course()?, held.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = Motion::of(&problem, &held.course);
         let space = Space::new(&problem, &motion, exact_nulls(&problem));
-        return Ok(strengths(&space, &DVector::zeros(0), causes));
+        return Ok(measured(&space, &DVector::zeros(0), causes));
     }
     let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
     let problem = Problem::new(&twin, &fit, &reference);
     let motion = held.motion(smoothed, &problem);
     let space = Space::new(&problem, motion, exact_nulls(&problem));
-    Ok(strengths(&space, &motion.prior(), causes))
+    Ok(measured(&space, &motion.prior(), causes))
 }
 
 /// Columns of the exact nulls of a problem.

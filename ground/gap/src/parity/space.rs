@@ -94,6 +94,24 @@ impl<'a> Space<'a> {
         space
     }
 
+    /// One in which only the motion is marginalised yet; of calibration and nulls `I + C'(I - Q Q')C`, and `C'(I - Q Q')u` of columns.
+    pub fn motion_only(
+        problem: &'a Problem<'a>,
+        motion: &'a dyn Elimination,
+        nulls: Vec<Entries>,
+        columns: &[&Entries],
+    ) -> (Self, DMatrix<f64>, DMatrix<f64>) {
+        let mut space = Self::known(problem, motion, DMatrix::zeros(0, 0));
+        space.nulls = nulls;
+        let (inner, open) = space.opened(columns);
+        (space, inner, open)
+    }
+
+    /// Marginalises calibration and nulls, whose inner products these are.
+    pub fn close(&mut self, inner: DMatrix<f64>) {
+        self.set(inner);
+    }
+
     fn set(&mut self, inner: DMatrix<f64>) {
         let calibration = inner.nrows() - self.nulls.len();
         self.calibrated = inner.view((0, 0), (calibration, calibration)).into_owned();
@@ -142,7 +160,7 @@ impl<'a> Space<'a> {
     }
 
     /// `C'u`.
-    fn plain(&self, column: &Entries) -> DVector<f64> {
+    pub fn plain(&self, column: &Entries) -> DVector<f64> {
         let mut plain = Vec::new();
         for (channel, frame) in self.problem.frames.iter().enumerate() {
             match column.iter().find(|(own, _)| *own == channel) {

@@ -83,7 +83,8 @@ pub fn may_be_named(hypothesis: &Hypothesis, snr: f64) -> bool {
     snr >= PARITY_SNR && nulls::of(hypothesis).is_none()
 }
 
-fn kind(locality: &Locality) -> &'static str {
+/// The kind of a place.
+pub fn kind(locality: &Locality) -> &'static str {
     match locality {
         Locality::Unit => "unit",
         Locality::Common => "common",

@@ -24,6 +24,13 @@ const HELD: usize = 128;
 /// `c_u` of columns, a column each.
 pub struct Opened(pub(super) DMatrix<f64>);
 
+impl Opened {
+    /// Of so many columns of which calibration and nulls are to take nothing.
+    pub fn nothing(columns: usize) -> Self {
+        Self(DMatrix::zeros(0, columns))
+    }
+}
+
 impl Space<'_> {
     /// `<u, v>` of the columns of each set, which names them by their places; sets that share columns stand side by side.
     pub fn within(

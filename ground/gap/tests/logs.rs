@@ -1,0 +1,247 @@
+//! Several logs of one unit in one call: simulated along motions of the twin, with the calibration off by what the description allows,
+//! once for the unit and not once a log.
+
+use std::{fs, path::PathBuf};
+
+use gap::together::analysed;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use serde_json::Value;
+use tempfile::TempDir;
+use twin::{
+    effect::{Active, Cause, Locality, by_name},
+    motion::{self, Motion},
+    predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
+};
+
+/// \[s\] of a log, and of its fit window.
+const SECONDS: f64 = 90.0;
+const FIT_S: f64 = 60.0;
+
+/// A unit.
+struct Unit {
+    described: UnitDescription,
+    real: UnitDescription,
+}
+
+impl Unit {
+    /// One whose calibration is off by what its description allows.
+    fn of(seed: u64) -> Self {
+        let described = emems(thesis_slot_s);
+        let mut real = described.clone();
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        for channel in &mut real.channels {
+            channel.bias += channel.bias_sigma * normal();
+            let scale = 1.0 + channel.scale_sigma * normal();
+            let across = channel.across().map(|axis| axis * (channel.axis_sigma_rad * normal()));
+            if channel.axis_b.norm() > 0.0 {
+                channel.axis_b = (channel.axis_b + across[0] + across[1]) * scale;
+            }
+        }
+        Self { described, real }
+    }
+
+    /// A log of it along a motion from `from_s` on; with what moved it where a reference saw that.
+    fn log(&self, name: &str, from_s: f64, noise: u64, active: &[Active], has_reference: bool) -> TempDir {
+        let world = motion::world_by_name(name).expect("a motion");
+        let environment = world.environment;
+        let scene = Scene::new(&world.motion, &environment, from_s - 2.0, from_s + SECONDS + 2.0, 0.01);
+        let starts_s: Vec<f64> = (0..(SECONDS / 0.2) as usize)
+            .map(|row| from_s + 0.2 * row as f64)
+            .collect();
+        let twin = Twin::new(self.real.clone(), environment, scene, starts_s.clone()).expect("a twin");
+        let readings = twin.predict(active);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(noise);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let channels = &self.described.channels;
+        let names: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+        let mut measured = format!("t_s,{}\n", names.join(","));
+        for (row, start_s) in starts_s.iter().enumerate() {
+            let cells = channels.iter().zip(&readings);
+            let cells =
+                cells.map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
+            measured += &format!("{:.1},{}\n", start_s - from_s, cells.collect::<Vec<_>>().join(","));
+        }
+        let mut told = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n");
+        for row in 0..=((SECONDS + 1.0) / 0.01) as u32 {
+            let t_s = 0.01 * f64::from(row);
+            let (q, p) = (
+                world.motion.at(from_s + t_s).attitude.q_nb,
+                world.motion.position_n(from_s + t_s),
+            );
+            told += &format!(
+                "{t_s:.2},{:.9},{:.9},{:.9},{:.9},{:.7},{:.7},{:.7}\n",
+                q.w, q.i, q.j, q.k, p.x, p.y, p.z
+            );
+        }
+        let motion = if has_reference {
+            "motion = \"motion.csv\"\n"
+        } else {
+            "[motion_known]\nnone = true\n"
+        };
+        let field = environment.field_n_ut;
+        let case = format!(
+            "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
+             {motion}[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
+             [windows]\nfit = [[0.0, {FIT_S}]]\nhold = [[{FIT_S}, {SECONDS}]]\n",
+            environment.gravity,
+            environment.latitude.to_degrees(),
+            field.x,
+            field.y,
+            field.z
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in [
+            ("case.toml", case),
+            ("unit.toml", self.described.text()),
+            ("measured.csv", measured),
+            ("motion.csv", told),
+        ] {
+            fs::write(folder.path().join(name), text).expect("a file");
+        }
+        folder
+    }
+}
+
+fn active(effect: &str, locality: Locality, theta: &[f64]) -> Active {
+    Active {
+        cause: Cause {
+            effect: by_name(effect).expect("an effect"),
+            locality,
+            variant: 0.0,
+        },
+        theta: theta.to_vec(),
+    }
+}
+
+fn iron(theta: [f64; 3]) -> Active {
+    active("hard-iron", Locality::Group("plate 2".to_owned()), &theta)
+}
+
+fn together(logs: &[&TempDir]) -> Value {
+    let cases: Vec<PathBuf> = logs.iter().map(|log| log.path().to_owned()).collect();
+    let texts = analysed(&cases, false, &[], &|_, _| ()).expect("judged");
+    let (_, verdict) = texts
+        .iter()
+        .find(|(name, _)| name == "verdict.json")
+        .expect("a verdict");
+    serde_json::from_str(verdict).expect("json")
+}
+
+fn causes(verdict: &Value) -> Vec<&str> {
+    let all = verdict["causes"].as_array().expect("causes");
+    all.iter().filter_map(|cause| cause["effect"].as_str()).collect()
+}
+
+#[test]
+fn a_log_of_another_unit_is_refused_with_file_and_field() {
+    let mut other = Unit::of(3);
+    let log = other.log("tumble", 0.0, 1, &[], false);
+    other.described.channels[30].scale_sigma = 0.25;
+    let name = other.described.channels[30].name.clone();
+    let another = other.log("tumble", 20.0, 2, &[], false);
+    let cases = [log.path().to_owned(), another.path().to_owned()];
+    let error = analysed(&cases, false, &[], &|_, _| ())
+        .expect_err("another unit")
+        .to_string();
+    let file = another.path().join("unit.toml").display().to_string();
+    assert!(
+        error.contains(&file) && error.contains(&name) && error.contains("scale"),
+        "{error}"
+    );
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn what_no_log_names_by_itself_is_named_together_and_its_size_is_right() {
+        let unit = Unit::of(5);
+        let place = Locality::Group("plate 2".to_owned());
+        let mut crossed = active("mag-cross-field", place, &[]);
+        // Ratio 3 in each log; a name takes some five.
+        let parameters = crossed.cause.parameters(&unit.described);
+        crossed.theta = parameters.iter().map(|own| 0.45 * own.prior_sigma).collect();
+        let logs: Vec<TempDir> = (0..5)
+            .map(|log| {
+                unit.log(
+                    "tumble",
+                    30.0 * f64::from(log),
+                    7 + log as u64,
+                    &[crossed.clone()],
+                    false,
+                )
+            })
+            .collect();
+        for log in &logs {
+            assert!(
+                causes(&together(&[log])).is_empty(),
+                "one log is enough: make the effect smaller"
+            );
+        }
+        let verdict = together(&logs.iter().collect::<Vec<_>>());
+        assert_eq!(causes(&verdict), ["mag-cross-field"], "{}", verdict["alternatives"]);
+        let cause = &verdict["causes"][0];
+        assert_eq!(cause["channels"], serde_json::json!(["m2x", "m2y", "m2z"]));
+        for (parameter, size) in parameters.iter().zip(&crossed.theta) {
+            let own = &cause["parameters"][&parameter.name];
+            let (value, sigma) = (
+                own["value"].as_f64().expect("a value"),
+                own["sigma"].as_f64().expect("a sigma"),
+            );
+            assert!(
+                (value - size).abs() < 3.0 * sigma,
+                "{} {value} +- {sigma}",
+                parameter.name
+            );
+        }
+        let chance = cause["agreement"]["chance"].as_f64();
+        assert!(chance.is_some_and(|chance| chance > 0.01), "{cause}");
+        assert_eq!(verdict["contradicted"], serde_json::json!([]));
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_unit_with_an_honest_calibration_gets_no_name_from_many_logs() {
+        let unit = Unit::of(11);
+        let logs =
+            [0.0, 30.0, 60.0, 90.0, 120.0, 150.0].map(|from_s| unit.log("tumble", from_s, from_s as u64, &[], false));
+        let verdict = together(&logs.each_ref());
+        assert!(
+            causes(&verdict).is_empty() && verdict["outcome"] == "clean",
+            "{}",
+            verdict["causes"]
+        );
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn what_a_bench_log_alone_shows_is_named_beside_a_flight_that_cannot_see_it() {
+        let unit = Unit::of(17);
+        let off = [active("lever-arm", Locality::Common, &[0.006, -0.004, 0.002])];
+        let bench = unit.log("tumble", 0.0, 1, &off, true);
+        let flight = unit.log("tumble", 60.0, 2, &off, false);
+        assert!(causes(&together(&[&flight])).is_empty());
+        let verdict = together(&[&bench, &flight]);
+        assert_eq!(causes(&verdict), ["lever-arm"]);
+        let each = verdict["causes"][0]["by_log"].as_array().expect("each log");
+        let ratio = |at: usize| each[at]["ratio"].as_f64().expect("a ratio");
+        assert!(ratio(0) > 8.0 && ratio(1) < 3.0, "{each:?}");
+        assert_eq!(verdict["causes"][0]["agreement"], Value::Null);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn logs_that_contradict_each_other_are_named_and_the_effect_is_not() {
+        let unit = Unit::of(23);
+        let one = unit.log("tumble", 0.0, 1, &[iron([3.0, 0.0, 0.0])], false);
+        let other = unit.log("tumble", 60.0, 2, &[iron([-1.0, 0.0, 2.0])], false);
+        let verdict = together(&[&one, &other]);
+        assert!(causes(&verdict).is_empty(), "{}", verdict["causes"]);
+        assert_eq!(verdict["contradicted"][0]["effect"], "hard-iron");
+        assert_eq!(verdict["outcome"], "unknown");
+    }
+}
