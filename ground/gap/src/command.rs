@@ -354,11 +354,19 @@ fn make(folder: &Path) -> Result<(), GapError> {
     })
 }
 
-/// Judges a case as [`run`] does and leaves verdict.json in its folder, silently: the analyst's part in a challenge.
+/// Judges a case as [`run`] does and leaves verdict.json in its folder, silently: the analyst's part in a challenge. Of one without a motion,
+/// attitude.csv too, where it settled.
 ///
 /// # Errors
 /// When the case cannot be judged or the file not written.
 pub fn write_verdict(case: &Path) -> Result<(), GapError> {
+    if Opened::open(case)?.is_without_motion() {
+        let analysis = parity::analysed(case, &[], &|_, _| ())?;
+        if let Some(attitude) = kept::text(&analysis, parity::ATTITUDE) {
+            put(case, parity::ATTITUDE, attitude)?;
+        }
+        return put(case, VERDICT, kept::text(&analysis, VERDICT).unwrap_or_default());
+    }
     let subject = Subject::open(case)?;
     let diagnosis = diagnose(&subject, &[], &|_, _| ());
     let advice = diagnosis.advice(&subject);

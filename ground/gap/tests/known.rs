@@ -333,3 +333,101 @@ fn what_does_not_go_together_is_refused_naming_file_and_key() {
         "{sigma}"
     );
 }
+
+/// `attitude_at` of a motion at these instants, turned by some degrees about the vertical, as angles and as a quaternion by turns.
+fn pointed(motion: &Thrown, instants: &[(f64, f64)], sigma_deg: f64) -> String {
+    let mut text = String::new();
+    for (at, (t_s, heading_deg)) in instants.iter().enumerate() {
+        let about_down = UnitQuaternion::from_scaled_axis(Vector3::z() * heading_deg.to_radians());
+        let q_nb = about_down * motion.at(*t_s).attitude.q_nb;
+        let _ = writeln!(text, "[[motion_known.attitude_at]]\nt_s = {t_s}");
+        let _ = if at % 2 == 0 {
+            let (roll, pitch, yaw) = q_nb.euler_angles();
+            let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_degrees);
+            writeln!(
+                text,
+                "azimuth_deg = {yaw}\nazimuth_sigma_deg = {sigma_deg}\nelevation_deg = {pitch}\nelevation_sigma_deg = {sigma_deg}\n\
+                 roll_deg = {roll}\nroll_sigma_deg = {sigma_deg}"
+            )
+        } else {
+            let q = q_nb.quaternion();
+            writeln!(
+                text,
+                "q_nb = [{}, {}, {}, {}]\nsigmas_deg = [{sigma_deg}, {sigma_deg}, {sigma_deg}]",
+                q.w, q.i, q.j, q.k
+            )
+        };
+    }
+    text
+}
+
+#[test]
+fn attitudes_at_some_instants_hold_the_motion_and_one_that_is_wrong_is_left_out_and_named() {
+    let motion = Thrown::new(12.0);
+    let (folder, motion) = flown(1, &pointed(&motion, &[(5.0, 0.0), (45.0, 0.0), (70.0, 25.0)], 0.1));
+    let with = told(&folder);
+    let kept = with.kept.clone().expect("is known");
+    let flight = Flight::open(folder.path()).expect("opens");
+    println!("{}", with.known_lines(&flight.known));
+    assert_eq!(
+        kept.iter().map(|own| own.is_used).collect::<Vec<_>>(),
+        [true, true, false]
+    );
+    let lines = with.known_lines(&flight.known);
+    assert!(lines.contains("the attitude at 70.0 s is not used"), "{lines}");
+    assert_eq!(with.known_json(&flight.known)["attitude_at"][2]["is_used"], false);
+    let alone = told(&flown(1, "").0);
+    let (own, alone) = (off(&with, &motion), off(&alone, &motion));
+    println!("with {own:?} without {alone:?}");
+    assert!(own.1 < 0.8 * alone.1 && own.0 < 2.5 * own.1, "{own:?} {alone:?}");
+    // At the instant itself it is known to a tenth of a degree about each axis.
+    let at = with
+        .attitudes
+        .iter()
+        .find(|own| (own.t_s - 45.0).abs() < 0.1)
+        .expect("a row");
+    assert!(at.sigmas_b_deg.amax() < 0.11, "{at:?}");
+}
+
+#[test]
+fn an_attitude_that_cannot_be_is_refused_with_its_key() {
+    let good =
+        "t_s = 5.0\nazimuth_deg = 70.0\nazimuth_sigma_deg = 0.5\nelevation_deg = 85.0\nelevation_sigma_deg = 0.5\n";
+    let (folder, _) = flown(1, &format!("[[motion_known.attitude_at]]\n{good}"));
+    Flight::open(folder.path()).expect("opens");
+    let case = folder.path().join("case.toml");
+    let text = fs::read_to_string(&case).expect("a case");
+    for (before, after, key) in [
+        ("elevation_deg = 85.0", "elevation_deg = 95.0", "elevation_deg"),
+        (
+            "azimuth_sigma_deg = 0.5",
+            "azimuth_sigma_deg = 0.0",
+            "azimuth_sigma_deg",
+        ),
+        ("azimuth_sigma_deg = 0.5\n", "", "azimuth_sigma_deg"),
+        ("azimuth_deg = 70.0\nazimuth_sigma_deg = 0.5\n", "", "azimuth_deg"),
+        ("t_s = 5.0", "t_s = 5.0\nq_nb = [1.0, 0.0, 0.0, 0.0]", "q_nb"),
+        (
+            good,
+            "t_s = 5.0\nq_nb = [1.0, 1.0, 0.0, 0.0]\nsigmas_deg = [1.0, 1.0, 1.0]\n",
+            "q_nb",
+        ),
+        (good, "t_s = 5.0\nq_nb = [1.0, 0.0, 0.0, 0.0]\n", "sigmas_deg"),
+        (
+            good,
+            "t_s = 5.0\nq_nb = [1.0, 0.0, 0.0, 0.0]\nsigmas_deg = [1.0, -1.0, 1.0]\n",
+            "sigmas_deg",
+        ),
+        ("t_s = 5.0", "t_s = nan", "t_s"),
+        ("t_s = 5.0", "t_s = 5.0\nazimut_deg = 3.0", "azimut_deg"),
+    ] {
+        assert!(text.contains(before), "{before}");
+        fs::write(&case, text.replace(before, after)).expect("writes");
+        let error = Flight::open(folder.path()).err().expect("is refused").to_string();
+        assert!(error.contains("case.toml") && error.contains(key), "{key}: {error}");
+    }
+    let none = text.replace("[[motion_known", "[motion_known]\nnone = true\n[[motion_known");
+    fs::write(&case, none).expect("writes");
+    let error = Flight::open(folder.path()).err().expect("is refused").to_string();
+    assert!(error.contains("motion_known.none"), "{error}");
+}

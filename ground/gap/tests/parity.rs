@@ -278,6 +278,7 @@ fn an_attitude_that_does_not_settle_is_said_and_not_written() {
         turns: vec![0.4, 0.3],
         track: None,
         belief: None,
+        kept: None,
     };
     assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
     assert!(

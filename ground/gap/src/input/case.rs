@@ -9,6 +9,7 @@
 //! clipped samples are not errors: they are left out and counted in [`crate::input::log::Masked`].
 
 mod allowance;
+mod attitude_at;
 mod environment;
 mod known;
 mod measured;
@@ -30,6 +31,7 @@ use crate::input::{
 };
 
 pub use allowance::{Bars, SlowErrors};
+pub use attitude_at::{AttitudeAt, Turned};
 pub use environment::environment as environment_of;
 pub use known::{Distrust, Distrusts, MotionKnown};
 pub use measured::read_measured;

@@ -7,8 +7,10 @@
 //! | file | is | is refused when |
 //! |---|---|---|
 //! | [`track`] (by [`ties`]) | positions that a receiver or a radar saw, on a clock of their own | it has too few fixes of this log, or its fixes are off by more than their sigmas |
+//! | [`instants`] | attitudes at some instants, in `case.toml` itself | each that is further off than its sigmas and the log's allow |
 //! | [`simulated`] | the trajectory that was simulated before the flight, on the log's clock | it is further off than it is distrusted |
 
+pub mod instants;
 pub mod simulated;
 pub mod ties;
 pub mod track;
@@ -16,7 +18,7 @@ pub mod track;
 use crate::{
     input::case::{CaseError, Opened},
     parity::{
-        known::{simulated::Simulated, track::Fixes},
+        known::{instants::Instants, simulated::Simulated, track::Fixes},
         phases::Stretch,
     },
 };
@@ -26,6 +28,8 @@ use crate::{
 pub struct Known {
     /// Of the track.
     pub track: Option<Fixes>,
+    /// Of attitudes at some instants.
+    pub attitudes: Instants,
     /// Of the trajectory that was simulated.
     pub simulated: Option<Simulated>,
 }
@@ -41,6 +45,7 @@ impl Known {
         let simulated =
             (known.simulated.as_ref()).map(|name| Simulated::open(&opened.path(name), &known.distrust, phases));
         Ok(Self {
+            attitudes: Instants::of(&known.attitudes(&opened.file)?),
             track: track.transpose()?,
             simulated: simulated.transpose()?,
         })
@@ -48,6 +53,6 @@ impl Known {
 
     /// Whether anything is.
     pub fn is_something(&self) -> bool {
-        self.track.is_some() || self.simulated.is_some()
+        self.track.is_some() || self.simulated.is_some() || !self.attitudes.all.is_empty()
     }
 }

@@ -45,6 +45,7 @@ use crate::{
     parity::{
         course::{Course, Start},
         known::{
+            instants::Kept,
             simulated::Belief,
             ties::{Ties, Use},
         },
@@ -133,6 +134,8 @@ pub struct Smoothed {
     pub track: Option<Use>,
     /// What became of the simulated trajectory.
     pub belief: Option<Belief>,
+    /// What became of attitudes at instants; none where none are told.
+    pub attitudes: Option<Vec<Kept>>,
     /// By how much the last step made the energy of residuals and prior smaller.
     gain: f64,
     /// Standard deviation that this energy has by chance.
@@ -166,6 +169,7 @@ impl Smoothed {
             ties: Ties::default(),
             track: None,
             belief: None,
+            attitudes: None,
             gain: f64::INFINITY,
             chance: 0.0,
         };

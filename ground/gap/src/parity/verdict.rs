@@ -34,6 +34,7 @@ pub struct Verdict {
     chips: Vec<serde_json::Value>,
     #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
     motion_known: serde_json::Map<String, serde_json::Value>,
+    attitude: Attitude,
     causes: Vec<Cause>,
     alternatives: Vec<Alternative>,
     none_of_these: f64,
@@ -42,6 +43,15 @@ pub struct Verdict {
     not_visible: Vec<NotVisible>,
     never_named: Vec<&'static str>,
     next_experiment: String,
+}
+
+/// Of the smoothed motion.
+#[derive(Debug, Serialize)]
+struct Attitude {
+    is_settled: bool,
+    /// Root mean square over the fit windows, all axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sigma_deg: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -138,6 +148,10 @@ impl Verdict {
             phases_from: phases::told_by(flight.are_phases_told),
             chips: chips::text::json(&findings.chips),
             motion_known: told.known_json(&flight.known),
+            attitude: Attitude {
+                is_settled: !told.attitudes.is_empty(),
+                sigma_deg: told.sigma_deg().map(rounded),
+            },
             causes: findings.names.iter().map(cause).collect(),
             alternatives: findings.alternatives.iter().map(alternative).collect(),
             none_of_these: rounded(findings.none_of_these),

@@ -1,13 +1,16 @@
 //! `[motion_known]`: what is known of a motion that nobody recorded.
 //!
-//! In: the table of `case.toml`. Out: [`MotionKnown`]. Refuses, naming the key, that nothing is known beside something that is, and a
+//! In: the table of `case.toml`. Out: [`MotionKnown`]; attitudes at instants by [`super::attitude_at`]. Refuses, naming the key, that nothing is known beside something that is, and a
 //! simulated trajectory without a distrust, or a distrust that is not above zero.
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::CaseError;
+use super::{
+    CaseError,
+    attitude_at::{AttitudeAt, Written},
+};
 
 /// `[motion_known]`.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -21,6 +24,8 @@ pub struct MotionKnown {
     pub simulated: Option<PathBuf>,
     /// How far that may be off, phase by phase.
     pub distrust: Distrusts,
+    /// Attitudes that are known at some instants, as they are written.
+    pub attitude_at: Vec<Written>,
 }
 
 /// `[motion_known.distrust]`: phases as `[phases]` has them.
@@ -55,7 +60,16 @@ pub struct Distrust {
 impl MotionKnown {
     /// Whether anything is known.
     pub fn is_something(&self) -> bool {
-        self.track.is_some() || self.simulated.is_some()
+        self.track.is_some() || self.simulated.is_some() || !self.attitude_at.is_empty()
+    }
+
+    /// Attitudes that are known at some instants.
+    ///
+    /// # Errors
+    /// When one is refused.
+    pub fn attitudes(&self, file: &Path) -> Result<Vec<AttitudeAt>, CaseError> {
+        let all = self.attitude_at.iter().enumerate();
+        all.map(|(at, written)| written.read(file, at)).collect()
     }
 
     /// Checks what does not go together; `has_motion` where the case names a motion.
@@ -70,9 +84,10 @@ impl MotionKnown {
         if self.none && self.is_something() {
             return refuse(
                 "none",
-                "says that nothing is known, and track or simulated names a file; keep one of the two",
+                "says that nothing is known, and track, simulated or attitude_at does; keep one of the two",
             );
         }
+        self.attitudes(file)?;
         let told = self.distrust.all();
         match (&self.simulated, told.is_empty()) {
             (Some(_), true) => {

@@ -322,7 +322,7 @@ fn of(distrusts: &Distrusts, phase: Phase) -> Option<Distrust> {
 }
 
 /// `J_r^-1` of a turn of less than half a revolution.
-fn right_jacobian_inverse(turn: &Vector3<f64>) -> Matrix3<f64> {
+pub fn right_jacobian_inverse(turn: &Vector3<f64>) -> Matrix3<f64> {
     let (angle, cross) = (turn.norm(), turn.cross_matrix());
     // Below a hundredth the next term of the series is 1e-7.
     let second = if angle < 1e-2 {

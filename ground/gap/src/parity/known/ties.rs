@@ -10,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::{
     parity::{
         known::{
+            instants::Instants,
             simulated::Simulated,
             track::{Aligned, Fix, LEAST_FIXES},
         },
@@ -28,14 +29,17 @@ pub struct Ties {
     pub offset_s: f64,
     /// A simulated trajectory.
     pub simulated: Option<Simulated>,
+    /// Attitudes at instants.
+    pub attitudes: Instants,
 }
 
 impl Ties {
-    /// Rows of the simulated trajectory about a motion; none where there is none.
+    /// Rows of attitudes at instants and of the simulated trajectory about a motion; none where there are none.
     pub fn rows(&self, trajectory: &Trajectory, knots: &Knots) -> Vec<Prior> {
-        self.simulated
-            .as_ref()
-            .map_or_else(Vec::new, |simulated| simulated.rows(trajectory, knots))
+        let simulated = self.simulated.as_ref();
+        let mut rows = simulated.map_or_else(Vec::new, |simulated| simulated.rows(trajectory, knots));
+        rows.extend(self.attitudes.rows(trajectory, knots));
+        rows
     }
 
     /// The track along a trajectory; none where there is none.

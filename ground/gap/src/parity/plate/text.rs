@@ -55,7 +55,7 @@ pub fn screen(flight: &Flight, findings: &Findings) -> String {
     out += &why(flight, findings);
     let _ = writeln!(out, "{}", attitude_line(findings));
     if flight.known.is_something() {
-        out += "KNOWN   not used: a track or a simulated trajectory holds the motion of a unit with parity only\n";
+        out += "KNOWN   not used: a track, a simulated trajectory or an attitude at an instant holds the motion of a unit with parity only\n";
     }
     let _ = writeln!(out, "NEXT    {}", next(flight, findings));
     wrapped(&out)

@@ -79,6 +79,7 @@ pub fn attitude(findings: &Findings) -> Told {
         turns: Vec::new(),
         track: None,
         belief: None,
+        kept: None,
     }
 }
 

@@ -1,8 +1,9 @@
 //! A motion that has settled is held to what else is known of it, and settles again; what does not fit is left out, and said.
 //!
-//! In: [`Known`]. A simulated trajectory is held against the log alone before anything else is in, a track against a motion that was
+//! In: [`Known`]. Attitudes at instants are held against the motion without them, each by itself. A simulated trajectory is held against the log alone before anything else is in, a track against a motion that was
 //! smoothed with it: its fixes say nothing of an attitude one by one.
 
+use nalgebra::Matrix3;
 use twin::predict::{Channel, Kind};
 
 use crate::{
@@ -11,6 +12,7 @@ use crate::{
     parity::{
         known::{
             Known,
+            instants::{Instants, Kept},
             simulated::{Belief, Simulated},
             ties::{Ties, Use},
             track::{self, Fixes},
@@ -29,6 +31,9 @@ impl Smoothed {
         if let Some(simulated) = &known.simulated {
             self.believe(simulated, about, progress)?;
         }
+        if !known.attitudes.all.is_empty() {
+            self.point(&known.attitudes.within(&self.knots), about, progress)?;
+        }
         if let Some(track) = &known.track {
             self.follow(track, about, progress)?;
         }
@@ -36,13 +41,7 @@ impl Smoothed {
     }
 
     fn believe(&mut self, simulated: &Simulated, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
-        let fit = fit(about.log);
-        let reference = Reference::default();
-        let twin = self.twin(about.log, about.unit, about.environment)?;
-        let problem = Problem::new(&twin, &fit, &reference);
-        let motion = self.smoothing(&problem, about.course, about.start);
-        let space = Space::new(&problem, &motion, Vec::new());
-        let known = covariances(&space, &motion, &simulated.middles_s(&self.knots));
+        let known = self.known_at(about, &simulated.middles_s(&self.knots))?;
         let own = about
             .unit
             .channels
@@ -59,6 +58,34 @@ impl Smoothed {
         }
         self.belief = Some(belief);
         Ok(())
+    }
+
+    fn point(&mut self, told: &Instants, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
+        let instants_s: Vec<f64> = told.all.iter().map(|own| own.t_s).collect();
+        let known = self.known_at(about, &instants_s)?;
+        let mut kept = told.judged(&self.trajectory, &known);
+        let used = told.all.iter().zip(&kept).filter(|(_, kept)| kept.is_used);
+        let used: Vec<_> = used.map(|(own, _)| *own).collect();
+        if !used.is_empty() {
+            let alone = self.clone();
+            self.ties.attitudes = Instants { all: used };
+            if !self.settles_again(about, progress)? {
+                *self = alone;
+                kept.iter_mut().for_each(|own: &mut Kept| own.is_used = false);
+            }
+        }
+        self.attitudes = Some(kept);
+        Ok(())
+    }
+
+    /// Covariances of a turn in b at instants \[s\], as the motion is known so far.
+    fn known_at(&self, about: &About, instants_s: &[f64]) -> Result<Vec<Matrix3<f64>>, CaseError> {
+        let (fit, reference) = (fit(about.log), Reference::default());
+        let twin = self.twin(about.log, about.unit, about.environment)?;
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = self.smoothing(&problem, about.course, about.start);
+        let space = Space::new(&problem, &motion, Vec::new());
+        Ok(covariances(&space, &motion, instants_s))
     }
 
     fn follow(&mut self, track: &Fixes, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {

@@ -17,7 +17,12 @@ use crate::{
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
-        known::{Known, simulated::Belief, ties::Use},
+        known::{
+            Known,
+            instants::{self, Kept},
+            simulated::Belief,
+            ties::Use,
+        },
     },
 };
 
@@ -47,6 +52,8 @@ pub struct Told {
     pub track: Option<(Use, Option<f64>)>,
     /// What became of the simulated trajectory; none where there is none.
     pub belief: Option<Belief>,
+    /// What became of attitudes at instants; none where none are told.
+    pub kept: Option<Vec<Kept>>,
 }
 
 impl Told {
@@ -71,6 +78,7 @@ impl Told {
             turns: smoothed.turns.clone(),
             track: smoothed.track.map(|own| (own, None)),
             belief: smoothed.belief,
+            kept: smoothed.attitudes.clone(),
         };
         if !smoothed.is_settled() {
             return Ok(told);
@@ -96,6 +104,12 @@ impl Told {
         Ok(told)
     }
 
+    /// \[deg\] one sigma, all axes, root mean square over the log; none where it did not settle.
+    pub fn sigma_deg(&self) -> Option<f64> {
+        let squares: f64 = self.attitudes.iter().map(|own| own.sigmas_b_deg.norm_squared()).sum();
+        (!self.attitudes.is_empty()).then(|| (squares / self.attitudes.len() as f64).sqrt())
+    }
+
     /// `attitude.csv`, if there is one.
     pub fn csv(&self) -> Option<String> {
         let mut out = "t_s,qw,qx,qy,qz,sigma_x_deg,sigma_y_deg,sigma_z_deg\n".to_owned();
@@ -119,6 +133,11 @@ impl Told {
             (None, Some(_)) => out += &format!("NOMINAL the simulated trajectory: not used: {NOT_SETTLED}\n"),
             (None, None) => {}
         }
+        match (&self.kept, known.attitudes.all.is_empty()) {
+            (Some(kept), _) => out += &instants::lines(kept),
+            (None, false) => out += &format!("KNOWN   attitude_at: not used: {NOT_SETTLED}\n"),
+            (None, true) => {}
+        }
         match (&self.track, &known.track) {
             (Some((found, sigma_s)), _) => out += &found.line(*sigma_s),
             (None, Some(_)) => out += &format!("TRACK   not used: {NOT_SETTLED}\n"),
@@ -132,12 +151,18 @@ impl Told {
         let not_settled = || json!({ "is_used": false, "why": NOT_SETTLED });
         let simulated = self.belief.as_ref().map(Belief::json);
         let track = self.track.as_ref().map(|(found, sigma_s)| found.json(*sigma_s));
+        let kept = match (&self.kept, known.attitudes.all.is_empty()) {
+            (Some(kept), _) => Some(instants::json(kept)),
+            (None, false) => Some(not_settled()),
+            (None, true) => None,
+        };
         let all = [
             (
                 "simulated",
                 simulated.or_else(|| known.simulated.as_ref().map(|_| not_settled())),
             ),
             ("track", track.or_else(|| known.track.as_ref().map(|_| not_settled()))),
+            ("attitude_at", kept),
         ];
         all.into_iter()
             .filter_map(|(key, value)| Some((key.to_owned(), value?)))
