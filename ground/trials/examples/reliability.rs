@@ -55,6 +55,7 @@ fn answer(file: &Path) -> Result<Answer, Box<dyn Error>> {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let cause = |effect: &Value| Cause {
+        snr_withheld: None,
         effect: text(&effect["effect"]),
         in_library: effect["in_library"].as_bool().unwrap_or(true),
         channels: list(&effect["channels"]).iter().map(text).collect(),
@@ -66,6 +67,7 @@ fn answer(file: &Path) -> Result<Answer, Box<dyn Error>> {
     };
     Ok(Answer {
         case: text(&answer["case"]),
+        attitudes: Vec::new(),
         ring: text(&answer["ring"]),
         seed: answer["seed"].as_u64().unwrap_or_default(),
         effects: list(&answer["effects"]).iter().map(cause).collect(),

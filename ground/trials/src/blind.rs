@@ -8,6 +8,7 @@
 mod files;
 pub mod lines;
 pub mod part;
+mod turned;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -227,7 +228,13 @@ pub fn judged(folder: &Path) -> Result<Vec<Judged>, BlindError> {
         let path = folder.join(&name).join(VERDICT);
         let verdict = match answered.get(&name) {
             None => None,
-            Some(published) if *published == hash(&read(&path)?) => Some(parse::<Verdict>(&path)?),
+            Some(published) if *published == hash(&read(&path)?) => {
+                let mut verdict = parse::<Verdict>(&path)?;
+                if let Some(attitude) = &mut verdict.attitude {
+                    attitude.error_deg = turned::error_deg(&folder.join(&name), &kept.answer.attitudes);
+                }
+                Some(verdict)
+            }
             Some(_) => {
                 return Err(BlindError::Changed {
                     path,

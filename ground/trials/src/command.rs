@@ -62,6 +62,9 @@ enum Step {
         /// one is healthy
         #[arg(long, default_value_t = 0)]
         r7: usize,
+        /// Cases whose motion is withheld: three of ten have nothing wrong, the others one effect; a fifth of all are rockets
+        #[arg(long, default_value_t = 0)]
+        r8: usize,
         /// Folder with the recordings for --r7: it has data/broad and practice. Otherwise that of EMEMS_DATA, or the minutes
         /// that come with the source
         #[arg(long)]
@@ -142,6 +145,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
             r4,
             r6,
             r7,
+            r8,
             recordings,
             purpose,
             each,
@@ -154,6 +158,7 @@ pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) ->
                 r4: *r4,
                 r6: *r6,
                 r7: *r7,
+                r8: *r8,
                 each: *each,
             };
             let found = match r7 {

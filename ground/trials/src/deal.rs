@@ -5,42 +5,45 @@
 //! is; the strength is then set so that the marginal signal to noise ratio is what the draw asked for, unless no part is
 //! so bad.
 
+mod written;
+
 use std::{
-    fmt::Write as _,
-    fs,
-    io::{self, Write},
+    io,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
-use emems::{packet, sample::Reading};
-use flate2::{Compression, write::GzEncoder};
+use emems::sample::Reading;
 use nalgebra::Vector3;
 use packets::channel::CHANNELS;
 use twin::{
     environment::Environment,
+    motion::SoundingRocket,
     plant::{Plant, Quality},
 };
 
+use self::written::{About, attitudes, write};
 use crate::{
     answer::{Answer, Cause, Size},
     deck::Card,
     disturbance::{self, Disturbance, novel},
     draw::Draw,
-    flight::{self, CYCLE_S, Instants},
+    flight,
+    followed::{Followed, Follower},
     injected::recording::RecordingError,
     loose::Loose,
     motion::{Style, Wander},
     scene::Scene,
-    sensitivity::{self, Told},
-    strength, unit,
+    sensitivity::{
+        self, Told,
+        withheld::{self, Ratios},
+    },
+    strength,
 };
 
 /// \[s\] of a case, and where its fit window ends and its hold window begins.
 pub(crate) const DURATION_S: f64 = 600.0;
 const FIT_S: f64 = 300.0;
-
-/// \[s\] between rows of the record: motions of the trials have no tone above 0.5 Hz.
-const RECORD_S: f64 = 0.02;
 
 /// Marginal signal to noise ratios dealt, least and most.
 pub(crate) const SNR: (f64, f64) = (8.0, 100.0);
@@ -53,6 +56,13 @@ const LARGEST: f64 = 5.0;
 
 /// The same of what has none: beyond it is a motion that hardly brings it out, and what was counted is rounding.
 const LARGEST_NOVEL: f64 = 20.0;
+
+/// Of the cases whose motion is withheld, those with nothing wrong, and those of a rocket.
+const HEALTHY: f64 = 0.3;
+const ROCKETS: f64 = 0.2;
+
+/// \[s\] a rocket waits on the pad.
+const PAD_S: f64 = 30.0;
 
 /// What is wrong with a case, by how much is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -71,6 +81,8 @@ pub enum Ring {
     R7,
     /// Nothing but a description that is a little wrong.
     R0m,
+    /// Nothing wrong or one effect that has a name, and nobody knows the motion.
+    R8,
 }
 
 /// A case was not dealt.
@@ -102,15 +114,26 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
     let chosen = given.map_or_else(|| choose(ring, &mut draw), |disturbance| vec![disturbance]);
     let style = [Style::Positions, Style::Table, Style::Hand][draw.below(3)];
     let warm = chosen.iter().any(|disturbance| disturbance.warm) || draw.chance(0.3);
-    let site = Environment {
-        field_n_ut: Vector3::new(17.0, -6.9, -14.2) + 2.0 * draw.vector(),
-        ..Environment::laboratory()
+    let is_withheld = ring == Ring::R8;
+    let is_rocket = is_withheld && draw.chance(ROCKETS);
+    let site = match is_rocket {
+        true => Environment::alcantara(),
+        false => Environment {
+            field_n_ut: Vector3::new(17.0, -6.9, -14.2) + 2.0 * draw.vector(),
+            ..Environment::laboratory()
+        },
     };
     let instants = flight::instants(seed).ok_or(DealError::NoInstants(seed))?;
-    let wander = Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1));
+    let moved: Arc<dyn Followed> = match is_rocket {
+        true => Arc::new(Follower::new(
+            Arc::new(SoundingRocket::new(PAD_S, site.gravity)),
+            DURATION_S + 2.0,
+        )),
+        false => Arc::new(Wander::draw(style, warm, DURATION_S + 2.0, &mut draw.stream(1))),
+    };
     let loose = (ring == Ring::R0m).then(|| Loose::draw(&mut draw.stream(20)));
     let fly = |struck: &[(usize, f64)], flight: u64| {
-        let mut scene = Scene::new(wander.clone(), site, &mut draw.stream(2));
+        let mut scene = Scene::moved(moved.clone(), site, &mut draw.stream(2));
         let struck = struck.iter().map(|(index, strength)| {
             let touched = (chosen[*index].apply)(&mut scene, &mut draw.stream(3 + *index as u64), *strength);
             (touched, std::mem::take(&mut scene.sizes))
@@ -135,6 +158,14 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         }
     };
     let quiet = [0, 1].map(|flight| fly(&[], flight));
+    let withheld = |struck: &[(usize, f64)]| {
+        let flown = [0, 1].map(|flight| fly(struck, flight));
+        let told = flown.each_ref().map(Flown::told);
+        let quiet = quiet.each_ref().map(Flown::told);
+        let flights = [[&told[0], &quiet[0]], [&told[1], &quiet[1]]];
+        let Ratios { parity, course } = withheld::ratios(flights, &instants, FIT_S, !is_rocket);
+        (parity, course)
+    };
     let snr = |struck: &[(usize, f64)], random: bool| {
         let flown = [0, 1].map(|flight| fly(struck, flight));
         let told = flown.each_ref().map(Flown::told);
@@ -160,7 +191,16 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         strengths.push((index, strength));
     }
     let flown = fly(&strengths, 0);
-    write(&folder.join(name), name, style, &flown, &instants, loose.as_ref())?;
+    let about = match (is_withheld, is_rocket) {
+        (true, true) => About::Rocket,
+        (true, false) => About::Withheld(style),
+        _ => About::Seen(style),
+    };
+    write(&folder.join(name), name, about, &flown, &instants, loose.as_ref())?;
+    let attitudes = match is_withheld {
+        true => attitudes(&flown.scene, &instants),
+        false => Vec::new(),
+    };
     let effects = (chosen.iter().zip(&flown.touched).zip(strengths.iter().zip(&ratios)))
         .map(|((disturbance, (touched, sizes)), ((_, strength), ratio))| Cause {
             effect: disturbance.name.into(),
@@ -169,6 +209,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
             strength: *strength,
             snr_marginal: Some(*ratio),
             sizes: sizes.clone(),
+            snr_withheld: is_withheld.then(|| withheld(&strengths)),
             attitude_deg: None,
             gap_growth: None,
         })
@@ -179,6 +220,7 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         seed,
         effects,
         snr_marginal: ratios.iter().copied().fold(0.0, f64::hypot),
+        attitudes,
         source: None,
     })
 }
@@ -205,6 +247,15 @@ fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
     let one = |all: &[Disturbance], draw: &mut Draw| all[draw.below(all.len())];
     let count = match ring {
         Ring::R0 | Ring::R0m | Ring::R7 => return Vec::new(),
+        Ring::R8 if draw.chance(HEALTHY) => return Vec::new(),
+        Ring::R8 => {
+            // What a reference does is nothing where there is none, and what scatters has no shape.
+            let shaped: Vec<Disturbance> = named
+                .into_iter()
+                .filter(|own| !own.random && !own.name.starts_with("reference"))
+                .collect();
+            return vec![one(&shaped, draw)];
+        }
         Ring::R1 => return vec![one(&named, draw)],
         Ring::R3 => return vec![one(novel::ALL, draw)],
         Ring::R4 => 2,
@@ -218,85 +269,6 @@ fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {
             chosen
         })
         .collect()
-}
-
-fn write(
-    folder: &Path,
-    name: &str,
-    style: Style,
-    flown: &Flown,
-    instants: &Instants,
-    loose: Option<&Loose>,
-) -> Result<(), DealError> {
-    let put = |file: &str, bytes: &[u8]| {
-        let path = folder.join(file);
-        let written = match file.ends_with(".gz") {
-            false => fs::write(&path, bytes),
-            true => fs::File::create(&path).and_then(|file| {
-                let mut packed = GzEncoder::new(file, Compression::fast());
-                packed.write_all(bytes)?;
-                packed.finish().map(drop)
-            }),
-        };
-        written.map_err(|source| DealError::Write { path, source })
-    };
-    fs::create_dir_all(folder).map_err(|source| DealError::Write {
-        path: folder.into(),
-        source,
-    })?;
-    let last = (DURATION_S / CYCLE_S) as u16;
-    let frames = flown.readings.iter().filter(|reading| reading.counter < last);
-    let mut stream = Vec::new();
-    for reading in frames {
-        stream.extend(packet::encode(reading));
-        stream.push(b'\n');
-    }
-    put("measured.txt.gz", &stream)?;
-    put("motion.csv.gz", motion_csv(&flown.scene, instants).as_bytes())?;
-    let declared = loose.map_or([1.0; 2], |loose| [loose.noise, loose.calibration]);
-    put("unit.toml", unit::toml(instants, declared).as_bytes())?;
-    put(
-        "case.toml",
-        case_toml(name, style, &flown.scene.claimed, loose).as_bytes(),
-    )
-}
-
-fn motion_csv(scene: &Scene, instants: &Instants) -> String {
-    let mut text = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m,temperature_c\n");
-    for row in 0..=((DURATION_S + 1.0) / RECORD_S) as u32 {
-        let case_s = RECORD_S * f64::from(row);
-        let t_s = instants.zero_s + case_s;
-        let (q, place) = (scene.record)(t_s);
-        let temperature_c = scene.source.at(t_s).temperature_c;
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{case_s:.2},{:.9},{:.9},{:.9},{:.9},{:.7},{:.7},{:.7},{temperature_c:.4}",
-            q.w, q.i, q.j, q.k, place.x, place.y, place.z
-        );
-    }
-    text
-}
-
-fn case_toml(name: &str, style: Style, claimed: &Environment, loose: Option<&Loose>) -> String {
-    let about = match style {
-        Style::Positions => "Turned slowly from attitude to attitude.",
-        Style::Table => "On a three-axis table.",
-        Style::Hand => "Carried about by hand.",
-    };
-    let field = claimed.field_n_ut;
-    let (field_sigma, reference) = loose.map(Loose::case_toml).unwrap_or_default();
-    format!(
-        "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"packets\"\nabout = \"{about}\"\nunit = \"unit.toml\"\n\
-         measured = \"measured.txt.gz\"\nmotion = \"motion.csv.gz\"\n\n[environment]\ngravity_m_s2 = {}\n\
-         latitude_deg = {:.6}\nfield_n_ut = [{:.6}, {:.6}, {:.6}]\ntemperature_c = 25.0\n{field_sigma}{reference}\n[windows]\n\
-         fit = [[0.0, {FIT_S:.1}]]\nhold = [[{FIT_S:.1}, {DURATION_S:.1}]]\n",
-        claimed.gravity,
-        claimed.latitude.to_degrees(),
-        field.x,
-        field.y,
-        field.z
-    )
 }
 
 #[cfg(test)]
@@ -356,6 +328,8 @@ mod tests {
 
     /// What takes more than six seconds of a core.
     mod long {
+        use std::fs;
+
         use super::*;
 
         #[test]

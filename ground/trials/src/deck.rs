@@ -25,6 +25,8 @@ pub struct Hand {
     pub r6: usize,
     /// One effect in a recording of a real unit.
     pub r7: usize,
+    /// Nothing wrong or one effect, its motion withheld; a fifth of them rockets.
+    pub r8: usize,
     /// Besides, one case of one effect for every one that has a name.
     pub each: bool,
 }
@@ -48,6 +50,7 @@ impl Hand {
             (Ring::R4, self.r4),
             (Ring::R6, self.r6),
             (Ring::R7, self.r7),
+            (Ring::R8, self.r8),
             (Ring::R0m, self.r0m),
         ];
         let drawn = |(ring, count)| vec![Card { ring, given: None }; count];

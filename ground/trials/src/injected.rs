@@ -119,6 +119,7 @@ impl Injected {
         write(folder, name, recording, &scene)?;
         Ok(Answer {
             case: name.to_owned(),
+            attitudes: Vec::new(),
             ring: "R7".to_owned(),
             seed,
             snr_marginal: plain.ratio,
@@ -154,6 +155,7 @@ fn strike(
     let sizes = std::mem::take(&mut scene.sizes);
     (plain.ratio >= LEAST).then(|| {
         let cause = Cause {
+            snr_withheld: None,
             effect: injection.name.to_owned(),
             in_library: injection.in_library,
             channels,

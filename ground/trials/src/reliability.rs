@@ -97,9 +97,11 @@ mod tests {
         Judged {
             answer: Answer {
                 case: "T".to_owned(),
+                attitudes: Vec::new(),
                 ring: "R1".to_owned(),
                 seed: 0,
                 effects: vec![Cause {
+                    snr_withheld: None,
                     effect: truth.to_owned(),
                     in_library: true,
                     channels: Vec::new(),

@@ -81,9 +81,13 @@ impl Scene {
 
     /// The undisturbed unit of a draw: scales and axes off by their sigmas.
     pub fn new(motion: Wander, site: Environment, draw: &mut Draw) -> Self {
-        let motion = Arc::new(motion);
+        Self::moved(Arc::new(motion), site, draw)
+    }
+
+    /// The same along any motion.
+    pub fn moved(motion: Arc<dyn Followed>, site: Environment, draw: &mut Draw) -> Self {
         let source: Arc<dyn TruthSource> = Arc::new(World {
-            motion: (*motion).clone(),
+            motion: motion.clone() as Arc<dyn Motion>,
             environment: site,
         });
         let mut views = Views::of(&source);

@@ -10,6 +10,7 @@ pub mod page;
 mod sizes;
 pub(crate) mod statements;
 mod verdict;
+mod withheld;
 
 pub(crate) use sizes::efficiency;
 use verdict::LARGEST_SET;
@@ -199,6 +200,7 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
     lines.extend(several_effects("R4", [">= 0.95", ">= 0.90"], ring("R4").collect()));
     lines.extend(several_effects("R6", [">= 0.90", ">= 0.80"], ring("R6").collect()));
     lines.extend(statements::lines(judged));
+    lines.extend(withheld::lines(judged));
     lines
 }
 

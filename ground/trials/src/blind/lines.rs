@@ -49,7 +49,13 @@ pub fn write(folder: &Path, judged: &[Judged]) -> Result<PathBuf, BlindError> {
             verdict: match case.verdict {
                 Some(_) => {
                     let written = fs::read_to_string(&verdict).map_err(failed(&verdict))?;
-                    Some(serde_json::from_str(&written).map_err(json(&verdict))?)
+                    let mut written: Value = serde_json::from_str(&written).map_err(json(&verdict))?;
+                    let error_deg = case.verdict.as_ref().and_then(|own| own.attitude.as_ref()?.error_deg);
+                    if let (Some(attitude), Some(error_deg)) = (written.get_mut("attitude"), error_deg) {
+                        // What the case's folder tells and its verdict cannot know.
+                        attitude["error_deg"] = error_deg.into();
+                    }
+                    Some(written)
                 }
                 None => None,
             },
@@ -119,6 +125,7 @@ mod tests {
                 Judged {
                     answer: Answer {
                         case,
+                        attitudes: Vec::new(),
                         ring: (*ring).to_owned(),
                         seed: 7,
                         effects: Vec::new(),

@@ -12,7 +12,7 @@ use std::{
 use super::{Judged, Line, Verdict, markdown, statements};
 
 /// Columns of the table.
-const COLUMNS: [&str; 26] = [
+const COLUMNS: [&str; 30] = [
     "case",
     "ring",
     "seed",
@@ -39,6 +39,10 @@ const COLUMNS: [&str; 26] = [
     "is_first_right",
     "does_matter",
     "is_interval_held",
+    "ratio_by_parity",
+    "ratio_of_course",
+    "attitude_error_deg",
+    "attitude_sigma_deg",
 ];
 
 /// Writes both files into `folder`; tells where.
@@ -139,6 +143,10 @@ fn row(judged: &Judged) -> [String; COLUMNS.len()] {
         is(first_right),
         is(verdict.and_then(|verdict| statements::matters(answer, verdict))),
         is(statements::is_held(judged)),
+        most(|truth| truth.snr_withheld.map(|own| own.0)),
+        most(|truth| truth.snr_withheld.and_then(|own| own.1)),
+        of(&|verdict| verdict.attitude.as_ref()?.error_deg),
+        of(&|verdict| verdict.attitude.as_ref()?.sigma_deg),
     ]
 }
 
@@ -153,6 +161,7 @@ mod tests {
         let case = Judged {
             answer: Answer {
                 case: "T001".into(),
+                attitudes: Vec::new(),
                 ring: "R0".into(),
                 seed: 1,
                 effects: Vec::new(),

@@ -3,6 +3,7 @@ use crate::answer::Cause;
 
 fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
     let cause = |name: &&str| Cause {
+        snr_withheld: None,
         effect: name.to_string(),
         in_library: true,
         channels: vec!["g1".into()],
@@ -15,6 +16,7 @@ fn judged(ring: &str, truth: &[&str], verdict: Option<&str>) -> Judged {
     Judged {
         answer: Answer {
             case: "T".into(),
+            attitudes: Vec::new(),
             ring: ring.into(),
             seed: 0,
             effects: truth.iter().map(cause).collect(),
@@ -232,4 +234,64 @@ fn nothing_wrong_is_a_statement_with_a_probability() {
         .expect("stated");
     assert!((clean.probability - 0.4).abs() < 1e-12 && clean.is_so);
     assert_eq!(all.len(), 3);
+}
+
+/// A case without its motion, with this ratio left, and what was said.
+fn withheld(truth: &[&str], left: f64, verdict: &str) -> Judged {
+    let mut case = judged("R8", truth, Some(verdict));
+    for cause in &mut case.answer.effects {
+        cause.snr_withheld = Some((0.5 * left, Some(left)));
+    }
+    case
+}
+
+#[test]
+fn without_the_motion_what_is_visible_is_asked_for_and_what_is_not_must_stay_unnamed() {
+    let lines = table(&[
+        withheld(&["gyro-bias"], 9.0, RIGHT),
+        withheld(&["gyro-bias"], 9.0, WRONG),
+        withheld(&["gyro-bias"], 6.0, NOTHING),
+        withheld(&["latency"], 0.5, RIGHT),
+        withheld(&["latency"], 0.5, NOTHING),
+        withheld(&[], 0.0, NOTHING),
+    ]);
+    assert_eq!(value(&lines, "R8: visible at 8 and more, top-1"), 0.5);
+    assert_eq!(value(&lines, "R8: visible at 8 and more, top-1 or declared set"), 1.0);
+    assert_eq!(value(&lines, "R8: visible at 5 to 8, top-1"), 0.0);
+    assert_eq!(value(&lines, "R8: not visible (below 3), something named"), 0.5);
+    assert_eq!(value(&lines, "R8: nothing wrong, false name"), 0.0);
+}
+
+#[test]
+fn a_motion_that_says_it_settled_must_be_where_it_says() {
+    let said = |text: &str, error_deg: Option<f64>| {
+        let mut case = withheld(&[], 0.0, text);
+        let attitude = case.verdict.as_mut().and_then(|verdict| verdict.attitude.as_mut());
+        attitude.expect("said").error_deg = error_deg;
+        case
+    };
+    let settled = r#"{"causes":[],"attitude":{"is_settled":true,"sigma_deg":0.5}}"#;
+    let not = r#"{"causes":[],"attitude":{"is_settled":false}}"#;
+    let share = |case: Judged| value(&table(&[case]), "R8: motion converged, or said that it did not");
+    assert_eq!(share(said(settled, Some(1.4))), 1.0);
+    assert_eq!(share(said(settled, Some(1.6))), 0.0);
+    assert_eq!(share(said(settled, None)), 0.0);
+    assert_eq!(share(said(not, None)), 1.0);
+}
+
+#[test]
+fn the_share_that_is_left_is_held_against_the_dealers_at_its_kind_of_place() {
+    let said = |share: f64| {
+        format!(
+            r#"{{"causes":[],"visible":[{{"effect":"gyro-bias","place":"one","with_reference":10.0,"by_parity":{}}},
+            {{"effect":"gyro-bias","place":"each","with_reference":10.0,"by_parity":5.0}}]}}"#,
+            10.0 * share
+        )
+    };
+    // Dealt 10 of 20, at one gyro.
+    let of = |share: f64| {
+        let case = withheld(&["gyro-bias"], 20.0, &said(share));
+        value(&table(&[case]), "R8: share left by parity within 15 % of the dealer's")
+    };
+    assert_eq!((of(0.56), of(0.7)), (1.0, 0.0));
 }

@@ -27,6 +27,36 @@ pub struct Verdict {
     pub outcome: Option<String>,
     /// What is left beneath what is named.
     pub remainder: Option<Remainder>,
+    /// What it says it can see, of a case whose motion is withheld.
+    pub visible: Vec<Visible>,
+    /// What became of the motion there.
+    pub attitude: Option<Attitude>,
+}
+
+/// What a log shows of an effect of usual size.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Visible {
+    /// The effect.
+    pub effect: String,
+    /// `one` of its kind, `each`, what is `common` to all, the `unit`.
+    pub place: String,
+    /// Ratio with the motion known.
+    pub with_reference: f64,
+    /// Ratio in each packet by itself.
+    pub by_parity: f64,
+}
+
+/// A motion that was sought.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Attitude {
+    /// Whether it says that it was found.
+    pub is_settled: bool,
+    /// \[deg\] one sigma, all axes.
+    pub sigma_deg: Option<f64>,
+    /// \[deg\] how far off it is, root mean square; none where nothing was held against it. What a verdict says of it counts for nothing.
+    pub error_deg: Option<f64>,
 }
 
 /// What is left beneath what is named.
