@@ -431,3 +431,36 @@ fn an_attitude_that_cannot_be_is_refused_with_its_key() {
     let error = Flight::open(folder.path()).err().expect("is refused").to_string();
     assert!(error.contains("motion_known.none"), "{error}");
 }
+
+#[test]
+fn windows_in_free_fall_alone_say_that_a_turn_about_the_field_is_hardly_known() {
+    // From 32 s on it falls freely: the field tells two axes, and gyros tie the instants.
+    let motion = Thrown::new(12.0);
+    let of = |fit: &str, more: &str| {
+        let windows = format!("[windows]\nfit = {fit}\nhold = [[90.0, 100.0]]\n{more}");
+        let span_s = (0.0, SECONDS);
+        told(&twin_case::of(
+            "thrown",
+            &motion,
+            Environment::alcantara(),
+            span_s,
+            noise(1),
+            &windows,
+        ))
+    };
+    let falling = of("[[32.0, 90.0]]", "");
+    let (error, stated) = off(&falling, &motion);
+    println!("in free fall alone: off {error}, stated {stated}");
+    assert!(
+        !falling.attitudes.is_empty() && error < 3.0 * stated,
+        "{error} {stated}"
+    );
+    let whole = off(&of("[[0.0, 90.0]]", ""), &motion);
+    println!("from the pad on: {whole:?}");
+    assert!(whole.0 < 3.0 * whole.1 && whole.1 < 1.0, "{whole:?}");
+    // So an attitude that is known at one instant is believed.
+    let pointed = of("[[32.0, 90.0]]", &pointed(&motion, &[(60.0, 0.0)], 0.2));
+    let own = off(&pointed, &motion);
+    println!("with one attitude: {own:?} {:?}", pointed.kept);
+    assert!(own.0 < 3.0 * own.1 && own.1 < 1.0, "{own:?}");
+}

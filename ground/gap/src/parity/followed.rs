@@ -111,6 +111,11 @@ impl Followed {
             .get_or_init(|| smoothed.smoothing(problem, &self.course, &self.start))
     }
 
+    /// The same for covariances in free fall; none where the log has none.
+    pub fn in_free_fall(&self, smoothed: &Smoothed, problem: &Problem) -> Option<Smoothing> {
+        smoothed.in_free_fall(problem, &self.course, &self.start)
+    }
+
     /// Keeps [`Space::calibrated`] of a space about its smoothed motion.
     pub fn remember(&self, calibrated: &DMatrix<f64>) {
         self.calibrated.get_or_init(|| calibrated.clone());

@@ -52,8 +52,8 @@ use crate::{
         smooth::{
             basis::Knots,
             rows::{UNKNOWNS, past_s},
-            smoothing::Smoothing,
-            trajectory::Trajectory,
+            smoothing::{Slopes, Smoothing},
+            trajectory::{State, Trajectory},
         },
         space::Space,
     },
@@ -77,6 +77,9 @@ const LEAST_PART: f64 = 0.05;
 
 /// [m/s2] how still a unit stands that rests.
 const STILL: f64 = 0.003;
+
+/// Part of gravity below which a unit falls: from there on a turn is known to no more than the root of two times what steps take it for.
+const LIGHT: f64 = 0.5;
 
 /// Knots a packet: two instants of field and force, and gyros between.
 const KNOTS_A_ROW: f64 = 2.0;
@@ -273,14 +276,27 @@ impl Smoothed {
 
     /// The motion about it, to be eliminated.
     pub fn smoothing(&self, problem: &Problem, course: &Course, start: &Start) -> Smoothing {
+        self.with(problem, (course, start), Slopes::OfSteps)
+    }
+
+    /// The same where its covariance is another: in free fall. None elsewhere.
+    pub fn in_free_fall(&self, problem: &Problem, course: &Course, start: &Start) -> Option<Smoothing> {
+        let gravity = self.trajectory.gravity();
+        let is_light = |state: &State| state.force_b.norm() < LIGHT * gravity;
+        let is_any = self.trajectory.states.iter().any(is_light);
+        is_any.then(|| self.with(problem, (course, start), Slopes::Known))
+    }
+
+    fn with(&self, problem: &Problem, course: (&Course, &Start), slopes: Slopes) -> Smoothing {
         let beside = self.ties.rows(&self.trajectory, &self.knots);
         let motion = Smoothing::of(
             problem,
             &self.trajectory,
-            (course, start),
+            course,
             self.knots,
             &self.still(),
             beside,
+            slopes,
         );
         match self.ties.aligned(&self.trajectory) {
             Some(aligned) => motion.tied(&self.ties.fixes, &aligned, &self.trajectory),

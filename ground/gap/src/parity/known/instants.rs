@@ -190,7 +190,7 @@ pub fn lines(kept: &[Kept]) -> String {
             false => writeln!(
                 out,
                 "KNOWN   the attitude at {:.1} s is not used: off by {:.2} deg where one sigma is {:.2}, which chance does less than once in a \
-                 thousand. Another instant, axes that are swapped, or sigmas that are too small; or this log tells no attitude (free fall alone)",
+                 thousand. Another instant, axes that are swapped, or sigmas that are too small",
                 own.t_s, own.off_deg, own.sigma_deg
             ),
         };

@@ -83,7 +83,8 @@ impl Smoothed {
         let (fit, reference) = (fit(about.log), Reference::default());
         let twin = self.twin(about.log, about.unit, about.environment)?;
         let problem = Problem::new(&twin, &fit, &reference);
-        let motion = self.smoothing(&problem, about.course, about.start);
+        let falling = self.in_free_fall(&problem, about.course, about.start);
+        let motion = falling.unwrap_or_else(|| self.smoothing(&problem, about.course, about.start));
         let space = Space::new(&problem, &motion, Vec::new());
         Ok(covariances(&space, &motion, instants_s))
     }

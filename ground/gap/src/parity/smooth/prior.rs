@@ -15,6 +15,10 @@
 //! A turn of the whole flight in n changes no rate and no force, and costs nothing but in the last row: that alone ties the attitude to
 //! gravity. The acceleration is none, within what the size of the specific force leaves room for, and where the unit rests within much
 //! less.
+//!
+//! That row takes `|C_bn g|^2 = g^2` for the curvature of its energy `|f + C_bn g|^2` by a turn, which is `|f| g`: the same at rest, and nothing in free
+//! fall, where no turn changes what accelerometers feel. Steps that have the smaller one no longer settle on a rocket, so they keep `g^2`; what
+//! the attitude is known to once it has settled has the slopes by a turn times `sqrt(min(1, |f| / g))` ([`Prior::known`]).
 
 use nalgebra::Vector3;
 
@@ -35,6 +39,17 @@ pub struct Prior {
     pub slopes: Vec<f64>,
     /// In its sigmas.
     pub off: f64,
+    /// Part of the slopes by a turn that the curvature of its energy leaves.
+    turning: f64,
+}
+
+impl Prior {
+    /// Slopes that have the curvature of its energy.
+    pub fn known(&self) -> Vec<f64> {
+        let part = |at: usize| if at % UNKNOWNS < 3 { self.turning } else { 1.0 };
+        let slopes = self.slopes.iter().enumerate();
+        slopes.map(|(at, slope)| slope * part(at)).collect()
+    }
 }
 
 /// What each prior row is off by along a trajectory, in its sigmas.
@@ -64,6 +79,7 @@ pub fn row(knots: &Knots, t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigm
         first: UNKNOWNS * first,
         slopes,
         off: -is / sigma,
+        turning: 1.0,
     }
 }
 
@@ -91,6 +107,8 @@ pub fn priors<'a>(
         let state = trajectory.state(t_s);
         let (w, w_dot, f) = (state.rate_b, state.rate_dot_b, state.force_b);
         let acceleration = trajectory.acceleration_b(&state);
+        let gravity = (acceleration - f).norm().max(f64::MIN_POSITIVE);
+        let turning = (f.norm() / gravity).min(1.0).sqrt();
         (0..3).flat_map(move |axis| {
             let e = Vector3::ith(axis, 1.0);
             let turn = [
@@ -110,7 +128,10 @@ pub fn priors<'a>(
             let moved = one(t_s, &moved, course.jerk_sigmas[row], jerk[axis]);
             let acc_sigma = rest.map_or(start.acc_sigmas[row], |(_, sigma)| *sigma);
             let still = [(0, 3, e), (0, 0, e.cross(&(acceleration - f)))];
-            let still = one(t_s, &still, acc_sigma, acceleration[axis]);
+            let still = Prior {
+                turning,
+                ..one(t_s, &still, acc_sigma, acceleration[axis])
+            };
             [turn, moved, still]
         })
     })

@@ -32,6 +32,15 @@ use crate::{
     },
 };
 
+/// Which slopes of the prior rows are in the normal matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slopes {
+    /// Their own: with these steps settle.
+    OfSteps,
+    /// Those that have the curvature of their energies: what is known in the end.
+    Known,
+}
+
 /// A motion that is eliminated.
 pub struct Smoothing {
     /// Where its knots are.
@@ -48,7 +57,7 @@ pub struct Smoothing {
 
 impl Smoothing {
     /// About a trajectory; `rests` are the spans \[s\] in which the unit does not move from its place, with the standard deviation of its
-    /// acceleration there; `beside` are further rows.
+    /// acceleration there; `beside` are further rows. A motion of [`Slopes::Known`] is asked for covariances alone.
     pub fn of(
         problem: &Problem,
         trajectory: &Trajectory,
@@ -56,6 +65,7 @@ impl Smoothing {
         knots: Knots,
         rests: &[((f64, f64), f64)],
         beside: Vec<Prior>,
+        slopes: Slopes,
     ) -> Self {
         let scene = trajectory.scene();
         let feel = |t_s: f64| -> Feel { scene.feel(t_s) };
@@ -74,7 +84,12 @@ impl Smoothing {
         }
         let priors = priors(problem.twin.starts_s(), trajectory, course, &knots, rests);
         let priors: Vec<Prior> = priors.chain(beside).collect();
-        priors.iter().for_each(|prior| normal.add(prior.first, &prior.slopes));
+        for prior in &priors {
+            match slopes {
+                Slopes::OfSteps => normal.add(prior.first, &prior.slopes),
+                Slopes::Known => normal.add(prior.first, &prior.known()),
+            }
+        }
         Self {
             knots,
             rows,

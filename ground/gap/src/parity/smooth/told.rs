@@ -12,7 +12,6 @@ use serde_json::{Map, Value, json};
 use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::Problem,
-    parity::smooth::covariances,
     parity::{
         codes::{self, Finding},
         flight::Flight,
@@ -24,6 +23,7 @@ use crate::{
             ties::Use,
         },
     },
+    parity::{smooth::covariances, space::Space},
 };
 
 /// Why nothing else that is known of a motion was looked at.
@@ -91,7 +91,13 @@ impl Told {
             *sigma_s = motion.offset_sigma_s();
         }
         let log = &followed.log;
-        let covariances = covariances(&space, motion, &log.start_s);
+        let covariances = match followed.in_free_fall(smoothed, &problem) {
+            Some(falling) => {
+                let space = Space::new(&problem, &falling, Vec::new());
+                covariances(&space, &falling, &log.start_s)
+            }
+            None => covariances(&space, motion, &log.start_s),
+        };
         told.attitudes = (log.start_s.iter().zip(&covariances))
             .map(|(t_s, covariance)| Attitude {
                 t_s: *t_s,

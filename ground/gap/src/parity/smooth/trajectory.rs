@@ -133,6 +133,11 @@ impl Trajectory {
         state.q_nb * UnitQuaternion::from_scaled_axis(since_s * (rate_b + 0.5 * since_s * state.rate_dot_b))
     }
 
+    /// [m/s2] of gravity.
+    pub fn gravity(&self) -> f64 {
+        self.environment.gravity
+    }
+
     /// [m/s2] acceleration of a state in its own frame: `f + C_bn g`.
     pub fn acceleration_b(&self, state: &State) -> Vector3<f64> {
         state.force_b + state.q_nb.inverse() * self.environment.gravity_n()

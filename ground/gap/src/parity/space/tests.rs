@@ -15,7 +15,12 @@ use crate::{
         course::{Course, Start},
         nulls,
         packet::{Motion, slopes_of},
-        smooth::{banded::LANES, basis::Knots, smoothing::Smoothing, trajectory::Trajectory},
+        smooth::{
+            banded::LANES,
+            basis::Knots,
+            smoothing::{Slopes, Smoothing},
+            trajectory::Trajectory,
+        },
     },
 };
 
@@ -162,7 +167,15 @@ fn eliminated(check: impl Fn(&str, &Problem, &dyn Elimination, &[&Entries])) {
         let span_s = (14.5, 21.5);
         let (knots, start) = (Knots::over(span_s, 0.1), Start::at_will(span_s, 0.2, 30));
         let trajectory = Trajectory::of(&start, &knots, &course.scene, problem.twin.environment());
-        let smoothing = Smoothing::of(problem, &trajectory, (course, &start), knots, &[], Vec::new());
+        let smoothing = Smoothing::of(
+            problem,
+            &trajectory,
+            (course, &start),
+            knots,
+            &[],
+            Vec::new(),
+            Slopes::OfSteps,
+        );
         check("smoothed", problem, &smoothing, &columns);
     });
 }
