@@ -155,16 +155,33 @@ pub struct Sample {
 impl Sample {
     /// \[us\] slot times of the sensors of a kind, plate 1 to 4.
     pub fn slots_of(&self, kind: Kind) -> &[u32] {
-        // The kinds come one after another in the reading order.
-        let first = match kind {
-            Kind::Accelerometer => 0,
-            Kind::Magnetometer => 4,
-            Kind::Gyro => 8,
-            Kind::Thermometer => 12,
-        };
+        let first = first_of(kind);
         &self.slots_us[first..first + 4]
     }
 }
+
+/// Slot of a kind's first sensor: the kinds come one after another in the reading order.
+const fn first_of(kind: Kind) -> usize {
+    match kind {
+        Kind::Accelerometer => 0,
+        Kind::Magnetometer => 4,
+        Kind::Gyro => 8,
+        Kind::Thermometer => 12,
+    }
+}
+
+// Another reading order does not compile until `first_of` follows it.
+const _: () = {
+    let mut slot = 0;
+    while slot < SENSOR_COUNT {
+        let Sensor { kind, plate } = SENSORS[slot];
+        assert!(
+            first_of(kind) + plate == slot,
+            "slots_of does not follow the reading order"
+        );
+        slot += 1;
+    }
+};
 
 #[cfg(test)]
 mod tests {
