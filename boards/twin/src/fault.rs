@@ -27,17 +27,11 @@ use std::{
     str::FromStr,
 };
 
-use emems::sample::SENSOR_COUNT;
 use thiserror::Error;
 
-pub use self::words::{Target, WORDS, Word};
+pub use self::words::{SENSOR_NAMES, Target, WORDS, Word};
 use crate::part::{Nanos, signal::Noise};
 pub use crate::run::{End, Fault, Level, Scheduled};
-
-/// Short names of the sensors, in the reading order.
-pub const SENSOR_NAMES: [&str; SENSOR_COUNT] = [
-    "a1", "a2", "a3", "a4", "m1", "m2", "m3", "m4", "g1", "g2", "g3", "g4", "t1", "t2", "t3", "t4",
-];
 
 /// How often each fault did something, by its name.
 pub type Struck = BTreeMap<&'static str, u64>;

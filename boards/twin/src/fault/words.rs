@@ -3,10 +3,14 @@
 //! A row says what its target and its size are, which boards can make the fault, whether a log can be rewritten with it, and
 //! the strokes that begin and end it.
 
-use emems::sample::{Kind, SENSORS};
+use emems::sample::{Kind, SENSOR_COUNT, SENSORS};
 
-use super::SENSOR_NAMES;
 use crate::run::{End, Fault, Level};
+
+/// Short names of the sensors, in the reading order.
+pub const SENSOR_NAMES: [&str; SENSOR_COUNT] = [
+    "a1", "a2", "a3", "a4", "m1", "m2", "m3", "m4", "g1", "g2", "g3", "g4", "t1", "t2", "t3", "t4",
+];
 
 /// What a fault befalls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
