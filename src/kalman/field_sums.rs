@@ -2,7 +2,10 @@
 
 use nalgebra::{ComplexField, Matrix3, Vector3};
 
-use super::{Params, at_least, square, window::START_SPREAD};
+use super::{Params, at_least, square};
+
+/// Part of the spread of specific force that its mean over the first window may still hold.
+pub(super) const START_SPREAD: f32 = 0.2;
 
 /// Sums of the field's samples.
 #[derive(Clone, Copy, Debug)]

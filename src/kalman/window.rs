@@ -7,7 +7,7 @@ use nalgebra::{ComplexField, Matrix3, Vector2, Vector3};
 
 use super::{
     Params, at_least,
-    field_sums::FieldSums,
+    field_sums::{FieldSums, START_SPREAD},
     innovation::Noise,
     square,
     state::DRIVERS,
@@ -167,9 +167,6 @@ const SAMPLE_NEAR_ONE_G: f32 = 0.1;
 
 /// \[rad\] error of the first vertical found: half a degree of accelerometer bias and as much of everything else.
 const START_TILT_SD: f32 = 0.0175;
-
-/// Part of the spread of specific force that its mean over the first window may still hold.
-pub(super) const START_SPREAD: f32 = 0.2;
 
 impl Window {
     /// Nothing gathered yet. A constant: a value that is made first is then copied here, word by word.
