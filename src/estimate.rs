@@ -22,7 +22,7 @@
 mod boost;
 mod force;
 mod sampled;
-mod site;
+pub(crate) mod site;
 #[cfg(test)]
 mod tests;
 mod turn;
@@ -43,8 +43,8 @@ use crate::{
     kalman::{self, Filter, Nose, Outage, Outcome, Step, seconds},
     redundancy::Known,
     sample::{Kind, Sample},
+    settings::Settings,
     spin, triad,
-    unit::Settings,
 };
 
 /// What a cycle says of the attitude.

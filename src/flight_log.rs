@@ -38,19 +38,17 @@ pub mod superblock;
 #[cfg(test)]
 mod tests;
 
-pub use self::{error::LogError, mount::Resumed, status::Status};
+pub use self::{error::LogError, status::Status, superblock::LOG_START};
 use self::{
     page::Kind,
     record::{BootHeader, Entry, Key, RecordBytes},
     superblock::Superblock,
 };
+pub use crate::mode::Resumed;
 use crate::{
     mode::Change,
     nand::{Nand, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes},
 };
-
-/// Blocks kept for the superblock: two in use, two for when those wear out.
-pub const LOG_START: u16 = 4;
 
 /// Blocks tried for one page before the chip is given up: the data sheet allows 80 of 4096 to fail in a life.
 const ATTEMPTS: usize = 4;

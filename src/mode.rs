@@ -15,7 +15,7 @@
 //! After power-on the mode is WAIT until the log was heard. What it says of the time before is taken once, and not after
 //! a command or lift-off, which know better; so a log that is mounted again later changes nothing.
 
-use crate::{command::Command, flight_log::Resumed, rail::Rail, resume::Resume};
+use crate::{command::Command, rail::Rail, resume::Resume};
 
 /// \[us\] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -167,6 +167,20 @@ pub struct State {
     pub awaits_log: bool,
     pending: Option<Pending>,
     lift_off: bool,
+}
+
+/// What the unit was doing, as the flight log tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Resumed {
+    /// It was in FLIGHT.
+    pub flight: bool,
+    /// It was recording.
+    pub recording: bool,
+    /// Derived frames were on.
+    pub derived: bool,
+    /// The launch rail it lay on.
+    pub rail: Rail,
 }
 
 /// What waits for confirmation.

@@ -16,7 +16,7 @@
 
 use crc::Digest;
 
-use crate::{board::Retained, flight_log::record::CRC};
+use crate::{board::Retained, checksum::CRC};
 
 /// Bytes of the retained memory.
 pub const RETAINED_BYTES: usize = 8192;

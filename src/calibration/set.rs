@@ -7,7 +7,7 @@ use crate::{
     geometry::{PLATES, TRIAD_AXES, accelerometer_place_b, gyro_axis_b, triad_axes_b},
     sample::Kind,
     sensor::{adis16265::Range, hmc5883l::Gain, lis331hh::FullScale},
-    unit::Settings,
+    settings::Settings,
 };
 
 /// [m/s2] of one g in the datasheet's mg; Eq 3.30 is reproduced with it to its last digit.

@@ -20,9 +20,12 @@
 use super::{
     FlightLog, LogError,
     page::{self, Kind},
-    record::{CRC, RECORD_BYTES, RecordBytes},
+    record::{RECORD_BYTES, RecordBytes},
 };
-use crate::nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress};
+use crate::{
+    checksum::CRC,
+    nand::{Nand, NandError, PAGES_PER_BLOCK, PageAddress},
+};
 
 /// Blocks at the end of the chip that the log leaves alone.
 pub(super) const SET_BLOCKS: u16 = 4;

@@ -14,6 +14,7 @@ use super::{
     superblock::{self, Superblock, SuperblockError},
 };
 use crate::{
+    mode::Resumed,
     nand::{Nand, PAGES_PER_BLOCK, PageAddress},
     rail::Rail,
 };
@@ -30,20 +31,6 @@ const STRIDE: u16 = 16;
 
 /// Boots that a lost superblock may have counted without leaving a record.
 pub(super) const UNSEEN_BOOTS: u32 = 16;
-
-/// What the unit was doing, as the chip tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Resumed {
-    /// It was in FLIGHT.
-    pub flight: bool,
-    /// It was recording.
-    pub recording: bool,
-    /// Derived frames were on.
-    pub derived: bool,
-    /// The launch rail it lay on.
-    pub rail: Rail,
-}
 
 /// What the superblock's blocks hold.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -33,10 +33,9 @@
 
 use core::fmt;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
-
 use crate::{
     board::ResetCause,
+    checksum::CRC,
     crash::{CrashCause, CrashRecord},
     derived::Health,
     faults::SensorHealth,
@@ -66,7 +65,6 @@ const HEADER: u8 = 2;
 const CHANGE: u8 = 3;
 const MAGIC: [u8; 2] = [0xE7, 0x4D];
 const CHECKED: usize = RECORD_BYTES - 4;
-pub(crate) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 const SLOT_US: u32 = 4;
 const NO_SLOT_CODE: u16 = u16::MAX;

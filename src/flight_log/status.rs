@@ -1,6 +1,6 @@
 //! How the log stands: fill, bad blocks, corrected bits, the newest record.
 
-use super::Key;
+use super::record::Key;
 
 /// How the log stands. Pages are counted from its first block; each holds one new record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

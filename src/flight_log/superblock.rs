@@ -8,11 +8,14 @@
 
 use heapless::Vec;
 
-use super::{
-    LOG_START,
-    record::{CRC, RECORD_BYTES, RecordBytes},
+use super::record::{RECORD_BYTES, RecordBytes};
+use crate::{
+    checksum::CRC,
+    rail::{RAIL_BYTES, Rail},
 };
-use crate::rail::{RAIL_BYTES, Rail};
+
+/// Blocks kept for the superblock: two in use, two for when those wear out.
+pub const LOG_START: u16 = 4;
 
 /// The version this code writes and the newest it reads.
 pub const VERSION: u8 = 1;

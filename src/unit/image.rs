@@ -7,7 +7,7 @@
 use embassy_time::Duration;
 
 use super::{clock::next_on_grid, shared::Shared};
-use crate::{board::ReadImage, flight_log::record::CRC};
+use crate::{board::ReadImage, checksum::CRC};
 
 /// Bytes at a time, and how often in a period: 4 KiB hold the processor for some 0.2 ms.
 const PIECE: usize = 128;
