@@ -50,9 +50,9 @@ pub fn logged_step(measured: &[f64]) -> f64 {
     moves.sort_by(f64::total_cmp);
     let up_to = |most: f64| moves.partition_point(|moved| *moved < most);
     let same = up_to(0.5 * least);
-    let mut from = up_to(FINER * least);
-    let (mut common, mut most) = (least, same);
-    for to in from..moves.len() {
+    let coarser = up_to(FINER * least);
+    let (mut common, mut most, mut from) = (least, same, coarser);
+    for to in coarser..moves.len() {
         while moves[to] - moves[from] > 2.0 * least {
             from += 1;
         }
