@@ -2,7 +2,7 @@
 //!
 //! In: the problem and its library; nothing held out. Out: [`explanation::Explanation`]. [`readings`] searches the library
 //! forwards, fits the best candidates exactly ([`gauss_newton`]), gives each the time in which it is on ([`once`],
-//! [`periodic`], by [`interval_sums`]) and says how likely each is by evidence ([`odds`]). [`scatter`] judges what changes the
+//! [`periodic`], by [`interval_sums`]) and says how likely each is by evidence ([`odds`]); beside a reference that errs, [`in_colour`] of what is left. [`scatter`] judges what changes the
 //! noise; a gyro's walk ([`bias_walk`]) opens a state of its own; a channel that scatters otherwise is [`recalibrated`]. What
 //! simpler methods would name is in [`baseline`].
 
