@@ -6,7 +6,7 @@
 //!
 //! | step | file | gives |
 //! |---|---|---|
-//! | 1 | [`unit`] | that the logs are of one unit as it is described |
+//! | 1 | [`mod@unit`] | that the logs are of one unit as it is described |
 //! | 2 | [`log`] | each log, its motion followed once |
 //! | 3 | [`heard`] | what one log says of every effect, its own unknowns marginalised |
 //! | 4 | [`joint`] | what some of them say together, and whether they agree |
