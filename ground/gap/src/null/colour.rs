@@ -24,11 +24,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::null::whitening::{Process, Sample, Whitening};
 
-/// Numbers of the autoregression: four made the spectra of nine recordings of BROAD white but for a remainder, twelve did.
+/// Numbers of the autoregression. A trial on nine recordings of BROAD needed four, and more for what these left; twelve were kept.
 const ORDER: usize = 12;
 
 /// \[Hz\] below which only the slow errors are, and up to which the level is taken that noise has there. The attitude of an optical system and
-/// a field stay alike for 4 to 40 s; above half a hertz BROAD's magnetometers are flat.
+/// a field stay alike for 4 to 40 s; above 0.8 Hz BROAD's magnetometers are flat.
 const SLOW_HZ: f64 = 0.5;
 const SPLIT_HZ: f64 = 3.0 * SLOW_HZ;
 

@@ -48,8 +48,8 @@ pub struct Weight {
 }
 
 impl Weight {
-    /// How far it may have a name, 0 to 1: the gap grows without it or it is certain, and no free course says what it says, and more. A law that is a little
-    /// off leaves such a course a few parts in a hundred ([`UNLIKE`]).
+    /// How far it may have a name, 0 to 1: the gap grows without it or it is certain, and no free course says what it says, and more. A law
+    /// that is a little off leaves such a course a few parts in a hundred ([`UNLIKE`]).
     pub fn counts(&self) -> f64 {
         let no_course = self.over_course + UNLIKE * self.worth;
         let is_there = match self.grows {

@@ -78,7 +78,7 @@ impl Frame {
         }
     }
 
-    /// Takes its noise for one of this colour.
+    /// Takes its noise for one of this colour, from white: colours do not add up.
     pub fn tint(&mut self, colour: Colour) {
         for mut column in self.nuisance.column_iter_mut() {
             let white = colour.applied(&column.clone_owned());
