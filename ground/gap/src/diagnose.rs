@@ -156,10 +156,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let before = problem.predictions(&[]);
     let as_described = vec![1.0; problem.frames.len()];
     let floor = floor(&problem, &explanation.model);
+    // They stay what they are when frames are weighed anew.
+    let (sigmas, steady) = (problem.sigmas.clone(), problem.steady.clone());
     let without = Finished {
         start_s: subject.twin.starts_s(),
-        sigmas: &problem.sigmas,
-        steady: &problem.steady,
+        sigmas: &sigmas,
+        steady: &steady,
         before: &before,
         recalibrated: &quiet.predicted,
         after: &quiet.predicted,
@@ -174,24 +176,25 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         events: events.as_ref(),
         ..without
     });
-    // Beside a reference that is not exact each effect answers for itself (`probability/importance.rs`): every real log has small errors of
-    // its own, and a name is none the worse for them.
-    let is_withdrawn = match subject.slow.attitude_sigma_rad > 0.0 {
-        true => shrink.refutes_the_effect(),
-        false => !shrink.supports_the_effect() || explanation.is_patchwork(),
-    };
-    let withdrawn = if is_withdrawn {
-        explanation.withdraw(&library)
-    } else {
-        Vec::new()
-    };
-    let seen = recognise(subject, &problem, &library, &mut explanation, &quiet);
-    let events = if seen {
+    // Beside a reference that is not exact each effect on readings answers for itself (`probability/importance.rs`): every real log has
+    // small errors of its own, and a name is none the worse for them. What makes readings scatter is whatever is not understood, so it has to
+    // be one of few.
+    let is_inexact = subject.slow.attitude_sigma_rad > 0.0;
+    let is_doubtful = !shrink.supports_the_effect() || explanation.is_patchwork();
+    let mut withdrawn = Vec::new();
+    if shrink.refutes_the_effect() || is_doubtful && !is_inexact {
+        withdrawn = explanation.withdraw(&library);
+    } else if is_doubtful && let Some(name) = explanation.withdraw_scatter(&mut problem, &mut library) {
+        withdrawn.push(name);
+    }
+    let is_changed = recognise(subject, &problem, &library, &mut explanation, &quiet)
+        || !withdrawn.is_empty() && !explanation.is_empty();
+    let events = if is_changed {
         Events::of(&problem, &explanation.model)
     } else {
         events
     };
-    if seen {
+    if is_changed {
         left = left_by(&problem, &explanation);
         shrink = subject.held.judge(Finished {
             after: &explanation.model.predicted,

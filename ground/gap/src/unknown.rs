@@ -8,7 +8,7 @@
 pub mod adequacy;
 mod binned;
 pub mod discrepancy;
-mod fast;
+pub mod fast;
 pub mod octaves;
 pub mod place;
 pub mod recognised;

@@ -34,8 +34,8 @@ use crate::{
 /// What is left over, and how much that says against names.
 pub struct Belief<'a> {
     left: &'a Leftover,
-    /// Slow courses that are left beside what a reference that is not exact errs by; `None` where it is exact.
-    courses: Option<&'a [Course]>,
+    /// What is left beside what a reference that is not exact errs by; `None` where it is exact.
+    importance: Option<&'a Importance>,
     /// Per channel, energy that stands out in some octave, in squares of noise.
     loud: &'a [f64],
     promises: &'a [Promised],
@@ -44,10 +44,15 @@ pub struct Belief<'a> {
 impl<'a> Belief<'a> {
     /// From what is left over, where it is loud, and promises: what an effect explained and does not explain on the held-out windows is
     /// left over too.
-    pub fn of(left: &'a Leftover, courses: Option<&'a [Course]>, loud: &'a [f64], promises: &'a [Promised]) -> Self {
+    pub fn of(
+        left: &'a Leftover,
+        importance: Option<&'a Importance>,
+        loud: &'a [f64],
+        promises: &'a [Promised],
+    ) -> Self {
         Self {
             left,
-            courses,
+            importance,
             loud,
             promises,
         }
@@ -82,20 +87,25 @@ impl<'a> Belief<'a> {
     }
 
     /// The same of an effect on readings where the reference is not exact. Everything is significant there, for no real recording is
-    /// without small errors of its own. So what speaks is a slow course that matters, by the evidence that says what the effect is worth.
-    fn trust_beside_reference(&self, courses: &[Course], channels: &[usize], explained: f64) -> f64 {
+    /// without small errors of its own. So what speaks is a slow course that matters, by the evidence that says what the effect is worth; and
+    /// what is left that is fast, of which no reference that errs slowly is the cause. That says nothing of the effect's law: the name has the
+    /// part that it explains of both.
+    fn trust_beside_reference(&self, importance: &Importance, channels: &[usize], explained: f64) -> f64 {
         let (kept, broken) = self.kept(channels);
         let is_there = |course: &&Course| course.channels.iter().any(|channel| channels.contains(channel));
+        let fast: f64 = channels.iter().map(|channel| importance.fast[*channel]).sum();
+        let of_both = 1.0 - fast / (explained + fast).max(f64::MIN_POSITIVE);
         let doubt = |matters: f64, nats: f64| {
             let unknown = 1.0 - (1.0 - matters) * kept;
             let energy = 2.0 * nats.max(0.0) + broken;
             unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
         };
-        let doubts = courses
+        let doubts = importance
+            .courses
             .iter()
             .filter(is_there)
             .map(|course| doubt(course.matters, course.nats));
-        1.0 - doubts.fold(doubt(0.0, 0.0), f64::max)
+        of_both * (1.0 - doubts.fold(doubt(0.0, 0.0), f64::max))
     }
 
     /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
@@ -104,8 +114,8 @@ impl<'a> Belief<'a> {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         let everywhere: Vec<usize> = (0..self.loud.len()).collect();
         for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
-            let trust = match self.courses.filter(|_| index < on_readings) {
-                Some(courses) => self.trust_beside_reference(courses, &cause.channels, *explained),
+            let trust = match self.importance.filter(|_| index < on_readings) {
+                Some(importance) => self.trust_beside_reference(importance, &cause.channels, *explained),
                 // What shakes some sensors shakes the unit, and answers for all of it.
                 None if is_line(cause) => self.trust(Some(cause.effect), &everywhere, *explained),
                 None => self.trust(Some(cause.effect), &cause.channels, *explained),
@@ -314,16 +324,22 @@ mod tests {
     #[test]
     fn beside_a_reference_that_errs_slow_courses_speak_against_a_name_and_what_is_merely_significant_does_not() {
         let surely = left(1e-9);
-        let trust = |channel: usize, matters: f64| {
-            let courses = [Course {
-                channels: vec![channel],
-                nats: 40.0,
-                matters,
-            }];
-            Belief::of(&surely, Some(&courses), &[0.0; 2], &[]).trust_beside_reference(&courses, &[0], 100.0)
+        let trust = |channel: usize, matters: f64, fast: f64| {
+            let importance = Importance {
+                courses: vec![Course {
+                    channels: vec![channel],
+                    nats: 40.0,
+                    matters,
+                }],
+                fast: vec![fast, 0.0],
+                effects: Vec::new(),
+            };
+            Belief::of(&surely, Some(&importance), &[0.0; 2], &[]).trust_beside_reference(&importance, &[0], 100.0)
         };
-        assert!(trust(0, 0.01) > 0.99 && trust(1, 0.99) > 0.99);
-        assert!(trust(0, 0.99) < 0.1, "{}", trust(0, 0.99));
+        assert!(trust(0, 0.01, 0.0) > 0.99 && trust(1, 0.99, 0.0) > 0.99);
+        assert!(trust(0, 0.99, 0.0) < 0.1, "{}", trust(0, 0.99, 0.0));
+        // What is fast is of something else, however well a small effect is seen beside it.
+        assert!(trust(1, 0.99, 900.0) < 0.11);
         let hardly = Belief::of(&surely, None, &[0.0; 2], &[]).trust(Some("gyro-scale"), &[0], 100.0);
         assert!(hardly < 0.15, "{hardly}");
     }

@@ -20,6 +20,7 @@ use crate::{
     search::explanation::Explanation,
     thresholds::{CERTAIN, DOUBT_STEP, UNLIKE},
     unknown::{
+        fast::within_stretches,
         remainder::{Setting, courses, judged},
         slow::{Beside, Slow},
     },
@@ -64,13 +65,16 @@ impl Weight {
 pub struct Importance {
     /// By the whole model.
     pub courses: Vec<Course>,
+    /// Per channel, energy above its bar that is no course, in squares of noise ([`within_stretches`]).
+    pub fast: Vec<f64>,
     /// Of each effect of the model.
     pub effects: Vec<Weight>,
 }
 
 impl Importance {
-    /// Of an explanation; `None` where the reference is exact, for what is significant there is what is there.
-    pub fn of(subject: &Subject, problem: &Problem, explanation: &Explanation) -> Option<Self> {
+    /// Of an explanation, of which a perfect one would leave `floor`; `None` where the reference is exact, for what is significant there is
+    /// what is there.
+    pub fn of(subject: &Subject, problem: &Problem, explanation: &Explanation, floor: &[Vec<f64>]) -> Option<Self> {
         let model = &explanation.model;
         if subject.slow.attitude_sigma_rad <= 0.0 || model.components.is_empty() {
             return None;
@@ -102,6 +106,7 @@ impl Importance {
         };
         Some(Self {
             courses: left.iter().map(course).collect(),
+            fast: within_stretches(problem, model, floor, &setting),
             effects: (0..model.components.len()).map(weight).collect(),
         })
     }

@@ -53,7 +53,7 @@ impl Believed {
         contribution::settle(problem, library, &explanation.found, &mut causes);
         let mut imitated = contribution::imitated(problem, &explanation.model);
         imitated.truncate(causes.len());
-        let importance = (!causes.is_empty()).then(|| Importance::of(subject, problem, explanation));
+        let importance = (!causes.is_empty()).then(|| Importance::of(subject, problem, explanation, floor));
         let importance = importance.flatten();
         let beyond = beyond_reference(problem, &subject.slow, explanation, importance.as_ref(), &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
@@ -63,8 +63,7 @@ impl Believed {
             (causes.iter_mut().zip(&importance.effects))
                 .for_each(|(cause, weight)| cause.probability *= weight.counts());
         }
-        let courses = importance.as_ref().map(|importance| importance.courses.as_slice());
-        let belief = Belief::of(left, courses, &loud, &promises);
+        let belief = Belief::of(left, importance.as_ref(), &loud, &promises);
         let on_readings = causes.len();
         let scatter = explanation.scatter.as_ref();
         causes.extend(scatter.map(|scatter| {

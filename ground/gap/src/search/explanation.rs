@@ -223,6 +223,18 @@ impl Explanation {
         names
     }
 
+    /// Takes the effect on the scatter back and fits the others anew, with the noise as described; returns its name.
+    pub fn withdraw_scatter(&mut self, problem: &mut Problem, library: &mut Library) -> Option<&'static str> {
+        let name = self.scatter.take()?.effect.page().name;
+        let quieter: Vec<f64> = self.louder.iter().map(|louder| louder.recip()).collect();
+        let described = weighed(problem.frames.clone(), &quieter);
+        reframe(problem, library, described);
+        self.louder.fill(1.0);
+        self.model = Model::around(problem, self.found.model(library));
+        self.beneath.clone_from(&self.model.predicted);
+        Some(name)
+    }
+
     fn energy_without(&self, quiet: &Model, scattered: &[usize]) -> f64 {
         let energy = |model: &Model| -> f64 {
             let channels = model.energies().into_iter().zip(&model.fitted.nuisance).enumerate();

@@ -60,6 +60,15 @@ impl Binned {
         means
     }
 
+    /// Energy that a series at the samples has in its mean over each stretch, every sample counting alike.
+    pub fn energy(&self, series: &[f64]) -> f64 {
+        let mut sums = vec![(0.0, 0.0); self.bins.len()];
+        for ((at, _), value) in self.places.iter().zip(series) {
+            sums[*at] = (sums[*at].0 + value, sums[*at].1 + 1.0);
+        }
+        sums.iter().map(|(sum, count)| sum * sum / count).sum()
+    }
+
     /// By how much more than described the means of a residual vary from one stretch to the next.
     pub fn factor(&self, residual: &[f64]) -> f64 {
         let pairs = residual.windows(2).zip(self.variances.windows(2));

@@ -5,10 +5,15 @@
 //! reference errs more than the sensor scatters, in a colour that nobody knows, only all together are looked at. White, nearly Gaussian
 //! energy is noise that is louder than described and no unknown effect; it is left out.
 
-use super::octaves::{self, Excess};
+use super::{
+    binned::Binned,
+    octaves::{self, Excess},
+    remainder::Setting,
+};
 use crate::{
+    input::case::Bars,
     null::{misfit::correlation_time, model::Model, problem::Problem},
-    thresholds::{MISFIT_CALM, NOISE_TAILS},
+    thresholds::{MISFIT_CALM, NOISE_TAILS, REFERENCE_KNOWN},
 };
 
 /// What one channel holds above its floor.
@@ -35,6 +40,33 @@ pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], louder: &[
     (0..problem.frames.len())
         .filter_map(|channel| excess(problem, model, channel, &floor[channel], louder[channel]))
         .collect()
+}
+
+/// Per channel, energy that no slow course can be: what is left within the stretches of [`Binned`], above the bar of the case and what the
+/// reference may be off by, in squares of noise. None in channels whose scatter the model explains.
+pub fn within_stretches(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Vec<f64> {
+    let starts_s = problem.twin.starts_s();
+    let span_s = [starts_s.first(), starts_s.last()].map(|end| end.copied().unwrap_or(0.0));
+    let of_channel = |channel: usize| {
+        let Some(fast) = excess(problem, model, channel, &floor[channel], setting.louder[channel])
+            .filter(|_| !setting.scattered.contains(&channel))
+        else {
+            return 0.0;
+        };
+        let rest = problem.in_sigmas(channel, &model.fitted.rest[channel]) / setting.louder[channel];
+        let binned = Binned::of(problem, channel, span_s, 1.0);
+        let slow: f64 = binned.energy(rest.as_slice());
+        let free = rest.len().saturating_sub(binned.bins.len()) as f64;
+        (rest.norm_squared() - slow - free * (fast.floor + fast.bar(setting.bars))).max(0.0)
+    };
+    (0..problem.frames.len()).map(of_channel).collect()
+}
+
+impl Fast {
+    /// [sigma^2] from which the excess matters: the user's bar, and what the reference may be off by.
+    pub fn bar(&self, bars: &Bars) -> f64 {
+        (self.floor.sqrt() + bars.gap_sigma).powi(2) - self.floor + REFERENCE_KNOWN * self.reference
+    }
 }
 
 fn excess(problem: &Problem, model: &Model, channel: usize, floor: &[f64], louder: f64) -> Option<Fast> {

@@ -19,7 +19,7 @@ use super::{
 use crate::{
     input::case::{Bars, SlowErrors},
     null::{model::Model, problem::Problem},
-    thresholds::{FILTER_S, REFERENCE_KNOWN, REFERENCE_SIGMAS},
+    thresholds::{FILTER_S, REFERENCE_SIGMAS},
 };
 
 /// Quantiles of an interval: 5 %, the middle, 95 %.
@@ -130,7 +130,7 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
         }
     });
     let of_fast = fast.iter().map(|fast| {
-        let bar = (fast.floor.sqrt() + setting.bars.gap_sigma).powi(2) - fast.floor + REFERENCE_KNOWN * fast.reference;
+        let bar = fast.bar(setting.bars);
         let sigma = GAUSSIAN.map(|many| (fast.excess + many * fast.error).max(0.0).sqrt());
         let present = present(fast.log_bayes_factor, several);
         Remainder {
