@@ -66,6 +66,11 @@ impl Joint {
 
     /// Fits one residual a channel.
     pub fn fit(&self, residuals: &[DVector<f64>]) -> Fitted {
+        self.fit_beside(residuals, &vec![None; self.width()])
+    }
+
+    /// The same with those parameters held that have a value.
+    pub fn fit_beside(&self, residuals: &[DVector<f64>], held: &[Option<f64>]) -> Fitted {
         let mut score = DVector::zeros(self.width());
         let mut alone = Vec::new();
         for (channel, residual) in self.channels.iter().zip(residuals) {
@@ -78,12 +83,8 @@ impl Joint {
                     .map_or_else(|| pull.map(|_| 0.0), |factor| factor.solve(&pull)),
             );
         }
-        let parameters = self
-            .precision
-            .as_ref()
-            .map_or_else(|| score.map(|_| 0.0), |factor| factor.solve(&score));
         let mut fitted = Fitted {
-            parameters,
+            parameters: self.parameters(&score, held),
             nuisance: Vec::new(),
             rest: Vec::new(),
         };
@@ -96,6 +97,27 @@ impl Joint {
             fitted.rest.push(rest);
         }
         fitted
+    }
+
+    /// Parameters of this score, zero where they are not finite: of `P p = s`, with `P_ff p_f = s_f - P_fh p_h` beside those that are held.
+    fn parameters(&self, score: &DVector<f64>, held: &[Option<f64>]) -> DVector<f64> {
+        let mut parameters = DVector::from_iterator(held.len(), held.iter().map(|value| value.unwrap_or(0.0)));
+        let Some(factor) = &self.precision else {
+            return parameters;
+        };
+        let free: Vec<usize> = (0..held.len()).filter(|at| held[*at].is_none()).collect();
+        if free.len() == held.len() {
+            return factor.solve(score);
+        }
+        let precision = factor.l() * factor.l().transpose();
+        let left = (score - &precision * &parameters).select_rows(&free);
+        let of_free = Cholesky::new(precision.select_rows(&free).select_columns(&free));
+        if let Some(found) = of_free.map(|factor| factor.solve(&left)) {
+            free.iter()
+                .zip(found.iter())
+                .for_each(|(at, value)| parameters[*at] = *value);
+        }
+        parameters
     }
 
     /// Covariance of the effects' parameters; zero where numbers that are not finite let nothing be fitted.

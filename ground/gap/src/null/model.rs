@@ -28,17 +28,23 @@ impl Model {
     /// calibration can take the place of a part of an effect a little more noise in one channel moves both far, and what is
     /// predicted must have both from one fit.
     pub fn around(problem: &Problem, components: Vec<Component>) -> Self {
-        let near = Model::linear(problem, components);
+        let near = Model::linear(problem, components, false);
         let off = near.off(problem);
         if off < AT_BEST {
             return near;
         }
-        let moved = Model::linear(problem, near.at_best(problem));
+        let moved = Model::linear(problem, near.at_best(problem), false);
         if moved.off(problem) < off { moved } else { near }
     }
 
-    /// Everything fitted with the effects' slopes about their parameters; predicted with these.
-    fn linear(problem: &Problem, components: Vec<Component>) -> Self {
+    /// Refits calibration and reference around effects whose parameters stay what they are: found in the colour of what is left
+    /// ([`crate::null::tint`]), beside whose slow errors the problem's white noise would move them far.
+    pub fn beside(problem: &Problem, components: Vec<Component>) -> Self {
+        Model::linear(problem, components, true)
+    }
+
+    /// Everything fitted with the effects' slopes about their parameters, which are held or not; predicted with these.
+    fn linear(problem: &Problem, components: Vec<Component>, are_held: bool) -> Self {
         let mut slopes = problem.reference_columns();
         let mut sigmas: Vec<f64> = problem.reference.iter().map(|column| column.sigma).collect();
         let mut values = vec![0.0; slopes.len()];
@@ -52,6 +58,8 @@ impl Model {
             values.extend(&component.active.theta);
         }
         let columns = problem.columns(&slopes);
+        let of_effect = |(at, value): (usize, &f64)| (are_held && at >= problem.reference.len()).then_some(*value);
+        let held: Vec<Option<f64>> = values.iter().enumerate().map(of_effect).collect();
         let values = DVector::from_vec(values);
         let about_zero: Vec<DVector<f64>> = columns
             .iter()
@@ -59,7 +67,7 @@ impl Model {
             .map(|(columns, residual)| residual + &columns.effects * &values)
             .collect();
         let joint = Joint::new(columns, &sigmas);
-        let fitted = joint.fit(&about_zero);
+        let fitted = joint.fit_beside(&about_zero, &held);
         let predicted = problem.predictions(&components).into_iter().enumerate();
         let predicted = predicted.map(|(channel, readings)| finished(problem, readings, &fitted, channel));
         let predicted = predicted.collect();

@@ -117,7 +117,11 @@ impl Explanation {
         found.chosen = kept;
         let loud = weighed(described.clone(), &louder);
         reframe(problem, library, described);
-        let first = Model::around(problem, found.model(library));
+        let fitted = match is_inexact {
+            true => Model::beside,
+            false => Model::around,
+        };
+        let first = fitted(problem, found.model(library));
         if scatter.is_some() && !wanders {
             // What a large effect's law leaves looks like scatter, and would be held to what that claims.
             scatter = best_scatter(problem, &first, withheld)
@@ -126,7 +130,7 @@ impl Explanation {
         let own = scatter.as_ref().map(|scatter| scatter.recalibrated(problem, &first));
         // What is left is judged with the noise as described, or a misfit would excuse itself.
         reframe(problem, library, loud);
-        let mut model = Model::around(problem, found.model(library));
+        let mut model = fitted(problem, found.model(library));
         let mut beneath = model.predicted.clone();
         for (channel, predicted) in own.into_iter().flatten() {
             beneath[channel] = predicted;
@@ -193,14 +197,16 @@ impl Explanation {
         (quiet.left() - self.model.left()).max(0.0).sqrt()
     }
 
-    /// Takes one more effect on readings in, and fits all of them anew.
+    /// Takes one more effect on readings in, where the reference is not exact, fitted beside the others, which stay what they are.
     pub fn add(&mut self, problem: &Problem, library: &Library, chosen: Chosen) {
         self.found.chosen.push(chosen);
         let set: Vec<usize> = self.found.chosen.iter().map(|chosen| chosen.hypothesis).collect();
         let start: Vec<DVector<f64>> = self.found.chosen.iter().map(|chosen| chosen.theta.clone()).collect();
         let refined = refine(problem, library, &set, &start);
-        (self.found.chosen.iter_mut().zip(refined.thetas)).for_each(|(chosen, theta)| chosen.theta = theta);
-        self.model = Model::around(problem, self.found.model(library));
+        if let (Some(added), Some(theta)) = (self.found.chosen.last_mut(), refined.thetas.into_iter().next_back()) {
+            added.theta = theta;
+        }
+        self.model = Model::beside(problem, self.found.model(library));
         self.beneath.clone_from(&self.model.predicted);
         match &self.scatter {
             Some(scatter) => {
@@ -223,14 +229,14 @@ impl Explanation {
         names
     }
 
-    /// Takes the effect on the scatter back and fits the others anew, with the noise as described; returns its name.
+    /// Takes the effect on the scatter back where the reference is not exact, with the noise as described; returns its name.
     pub fn withdraw_scatter(&mut self, problem: &mut Problem, library: &mut Library) -> Option<&'static str> {
         let name = self.scatter.take()?.effect.page().name;
         let quieter: Vec<f64> = self.louder.iter().map(|louder| louder.recip()).collect();
         let described = weighed(problem.frames.clone(), &quieter);
         reframe(problem, library, described);
         self.louder.fill(1.0);
-        self.model = Model::around(problem, self.found.model(library));
+        self.model = Model::beside(problem, self.found.model(library));
         self.beneath.clone_from(&self.model.predicted);
         Some(name)
     }
