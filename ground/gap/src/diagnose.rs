@@ -30,7 +30,7 @@ use crate::{
         problem::{Component, Frame, Problem},
     },
     probability::{
-        cause::{Cause, share_out},
+        cause::{Cause, STALE, cause_of_repeats, share_out},
         doubt::Promised,
         importance::setting,
         outcome::{Outcome, is_unexplained},
@@ -119,6 +119,13 @@ impl Diagnosis {
 
 /// Diagnoses a case. `progress` is told what goes on and how far it is, 0 to 1.
 pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Diagnosis {
+    let mut withheld = withheld.to_vec();
+    let repeats: Vec<Cause> = (subject.repeats.iter().flatten())
+        .filter(|_| withheld.iter().all(|name| name != STALE))
+        .filter_map(|repeats| cause_of_repeats(subject, repeats))
+        .collect();
+    withheld.extend(subject.repeats.as_ref().map(|_| STALE.to_owned()));
+    let withheld = &withheld[..];
     let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let gap = root_mean_square(&problem);
     let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
@@ -222,7 +229,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
 
     progress("confusion", 0.0);
     let (found, model) = (&explanation.found, &explanation.model);
-    let believed = Believed::of(
+    let mut believed = Believed::of(
         subject,
         &problem,
         &library,
@@ -232,6 +239,10 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &left,
         &floor,
     );
+    // What rows say of themselves says nothing of the others.
+    believed
+        .causes
+        .extend(repeats.into_iter().filter(|cause| cause.probability >= SAID));
     let mut alternatives = believed.alternatives(&library, &explanation);
     let is_named = !believed.causes.is_empty();
     if !is_named && !believed.unnamed.is_empty() {

@@ -12,4 +12,5 @@ pub mod hold;
 pub mod level;
 pub mod log;
 pub mod reference;
+pub mod repeats;
 pub mod windows;

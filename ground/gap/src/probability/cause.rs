@@ -6,7 +6,7 @@
 use twin::effect::Parameter;
 
 use crate::{
-    input::case::Subject,
+    input::{case::Subject, repeats::Repeats},
     library::hypotheses::Library,
     null::problem::Problem,
     probability::regime,
@@ -17,6 +17,9 @@ use crate::{
     },
     thresholds::{COUNTED_PART, STANDS_OUT, SUSPICIOUS, TEMPERATURE},
 };
+
+/// The effect that rows alone show.
+pub const STALE: &str = "stale-sample";
 
 /// One parameter of a cause.
 #[derive(Clone, Debug)]
@@ -156,6 +159,37 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
         physics: page.physics,
         is_suspicious: excess > SUSPICIOUS,
     }
+}
+
+/// Parts that send samples twice as causes, by their rows alone; a share is still an energy.
+pub fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
+    let page = twin::effect::by_name(STALE)?.page();
+    let symbol = page.parameters.first()?;
+    let excess = repeats.share / symbol.prior_sigma / page.largest;
+    Some(Cause {
+        effect: page.name,
+        locality: subject.names(repeats.channels.iter().copied()).join(" "),
+        channels: repeats.channels.clone(),
+        probability: named(repeats.nats / TEMPERATURE, excess),
+        of_any: 1.0,
+        gain: repeats.nats,
+        parameters: vec![Sized {
+            parameter: Parameter {
+                name: symbol.name.to_owned(),
+                unit: symbol.unit,
+                prior_sigma: symbol.prior_sigma,
+                signed: symbol.signed,
+            },
+            value: repeats.share,
+            sigma: repeats.sigma,
+        }],
+        share: 2.0 * repeats.nats,
+        when: "throughout".to_owned(),
+        which: Some("all its axes repeat the row before together, oftener than by chance".to_owned()),
+        confirm_by: page.confirm_by,
+        physics: page.physics,
+        is_suspicious: excess > SUSPICIOUS,
+    })
 }
 
 /// Probability of an effect on the scatter with this evidence [nats, tempered] and so many times its largest size: beyond that it

@@ -19,6 +19,7 @@ use crate::input::{
     hold::Held,
     log::{Column, Log, Masked, Stream},
     reference::{Reference, SPREAD_S},
+    repeats::{Repeats, repeats},
     windows::{Fit, Span},
 };
 
@@ -59,6 +60,8 @@ pub struct Subject {
     pub unseen: usize,
     /// One row in so many was kept.
     pub thinned: usize,
+    /// Parts that sent samples twice by their rows alone; `None` where the search for effects on the scatter sees them.
+    pub repeats: Option<Vec<Repeats>>,
     /// What was grossly wrong and is put right; in tables only.
     pub gross: Gross,
 }
@@ -101,6 +104,8 @@ impl Subject {
         let record = Recorded::open(&file)?;
         let (from_s, to_s) = record.span_s();
         log = within_windows(log, &opened);
+        let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
+        let repeats = repeats(&log, &unit).filter(|_| !is_exact);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
         let overlap_s = seen_share(&log, (from_s, to_s));
@@ -114,7 +119,6 @@ impl Subject {
         let mut lost_s = vec![(f64::NEG_INFINITY, from_s)];
         lost_s.extend(record.lost_s());
         lost_s.push((to_s, f64::INFINITY));
-        let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
         if !is_exact {
             lost_s
                 .iter_mut()
@@ -164,6 +168,7 @@ impl Subject {
             stream,
             unseen,
             thinned,
+            repeats,
             gross: Gross::default(),
         })
     }
@@ -212,6 +217,7 @@ impl Subject {
             stream: log.stream,
             unseen: 0,
             thinned: 1,
+            repeats: None,
             gross,
         })
     }

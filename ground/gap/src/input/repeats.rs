@@ -1,0 +1,178 @@
+//! Samples that a part sent twice, by the rows of a log alone.
+//!
+//! In: a log of physical units before it is thinned, and its unit. Out: [`Repeats`], the parts whose axes repeat the row before together
+//! oftener than they do by chance.
+//!
+//! A sample that is a few steps wide repeats by chance, on one axis in ten or fifty. All axes of a part do so with the product of these
+//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. That leaves
+//! out what rest in shorter times brings, and rows that the logger wrote twice say how often it does so; so what is expected is taken
+//! [`SPREAD`] times, with them. With `c` repeats where `e` are expected chance has `c ln(c/e) - c + e` nats against it (Chernoff's bound of
+//! Poisson's tail). Whether the motion was followed does not matter, and of rows that were thinned it cannot be seen.
+//!
+//! Refuses nothing. Not looked at: units that send codes (the search for effects on the scatter knows their steps), parts with fewer than
+//! three axes, of which one repeats too often, and magnetometers, which are often read oftener than they measure.
+
+use twin::predict::{Kind, UnitDescription};
+
+use crate::{
+    input::log::{Log, Series},
+    thresholds::REPEATS_CHANCE,
+};
+
+/// Axes of a part that are taken together.
+const AXES: usize = 3;
+
+/// Rows over which axes repeat alike: of 32 to 300 all say the same of six recordings.
+const STRETCH: usize = 64;
+
+/// How many times what chance brings is expected. Gyros of six healthy recordings repeat 0.7 to 1.2 times as often.
+const SPREAD: f64 = 2.0;
+
+/// A part that sends samples twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repeats {
+    /// Its channels.
+    pub channels: Vec<usize>,
+    /// Part of the samples that are old.
+    pub share: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// \[nats\] against chance.
+    pub nats: f64,
+}
+
+/// Parts that repeat oftener than by chance; `None` of a unit that sends codes.
+pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
+    if unit.channels.iter().any(|channel| channel.bits.is_some()) {
+        return None;
+    }
+    let parts = parts(unit);
+    let repeated: Vec<Vec<bool>> = (log.channels.iter())
+        .map(|series| repeated(series, log.start_s.len()))
+        .collect();
+    let rows: Vec<usize> = (0..log.start_s.len()).collect();
+    let all_of = |row: usize, channels: &[usize]| channels.iter().all(|channel| repeated[*channel][row]);
+    // Rows in which every part repeats are the logger's, unless there is but one part.
+    let whole = |row: usize| parts.len() > 1 && parts.iter().all(|part| all_of(row, part));
+    let by_logger = rows.iter().filter(|row| whole(**row)).count() as f64;
+    let of_part = |channels: &Vec<usize>| {
+        let count = rows
+            .iter()
+            .filter(|row| all_of(**row, channels) && !whole(**row))
+            .count() as f64;
+        let by_chance = |rows: &[usize]| {
+            let share = |channel: &usize| {
+                let own = rows.iter().filter(|row| repeated[*channel][**row]).count();
+                own as f64 / rows.len() as f64
+            };
+            rows.len() as f64 * channels.iter().map(share).product::<f64>()
+        };
+        let chance: f64 = rows.chunks(STRETCH).map(by_chance).sum();
+        let expected = SPREAD * (chance + by_logger + 1.0);
+        let nats = if count > expected {
+            count * (count / expected).ln() - count + expected
+        } else {
+            0.0
+        };
+        let samples = log.channels[channels[0]].rows.len().max(1) as f64;
+        Repeats {
+            channels: channels.clone(),
+            share: (count - chance).max(0.0) / samples,
+            sigma: count.sqrt() / samples,
+            nats,
+        }
+    };
+    let least = (parts.len().max(1) as f64 / REPEATS_CHANCE).ln();
+    let all = parts.iter().map(of_part);
+    Some(all.filter(|repeats| repeats.nats > least).collect())
+}
+
+/// Per row, whether a channel has a sample and it is that of the row before.
+fn repeated(series: &Series, rows: usize) -> Vec<bool> {
+    let mut repeated = vec![false; rows];
+    let pairs = series.rows.windows(2).zip(series.values.windows(2));
+    for (at, _) in pairs.filter(|(rows, values)| rows[0] + 1 == rows[1] && values[0] == values[1]) {
+        repeated[at[1] as usize] = true;
+    }
+    repeated
+}
+
+/// Channels of each part: those of one kind in one group.
+fn parts(unit: &UnitDescription) -> Vec<Vec<usize>> {
+    let of = |kind: Kind| {
+        unit.groups().into_iter().map(move |group| {
+            let channels = unit.channels.iter().enumerate();
+            let own = channels.filter(|(_, channel)| channel.sensor == kind && channel.group == group);
+            own.map(|(index, _)| index).collect::<Vec<usize>>()
+        })
+    };
+    [Kind::Accelerometer, Kind::Gyro]
+        .into_iter()
+        .flat_map(of)
+        .filter(|part| part.len() >= AXES)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+    const ROWS: u32 = 6000;
+
+    /// An accelerometer and a gyro, a noise of two steps, at rest in every second stretch; `is_old` says of part and row whether the row
+    /// before is sent again, with some number between none and one.
+    fn found(is_old: impl Fn(usize, u32, f64) -> bool) -> Vec<Repeats> {
+        let mut text = "name = \"x\"\ncycle_s = 0.01\n".to_owned();
+        for (index, sensor) in ["accelerometer", "gyro"].iter().flat_map(|one| [one; 3]).enumerate() {
+            text += &format!(
+                "[[channel]]\nname = \"c{index}\"\nsensor = \"{sensor}\"\ngroup = \"unit\"\naxis_b = [1.0, 0.0, 0.0]\nlsb = 1.0\n\
+                 noise_sigma = 0.2\n"
+            );
+        }
+        let unit = UnitDescription::read(&text, "unit.toml").expect("a unit");
+        let mut log = Log::empty(6);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut before = [0.0; 6];
+        for row in 0..ROWS {
+            log.start_s.push(0.01 * f64::from(row));
+            let moved = if row / 500 % 2 == 0 { 0.0 } else { 3.0 };
+            for part in 0..2 {
+                let chance: f64 = StandardNormal.sample(&mut random);
+                let old = row > 0 && is_old(part, row, statrs::function::erf::erf(chance.abs() / 2f64.sqrt()));
+                for index in 3 * part..3 * part + 3 {
+                    let noise: f64 = StandardNormal.sample(&mut random);
+                    let fresh =
+                        0.1 * (2.0 * noise + moved * (f64::from(row) * (0.11 + 0.02 * index as f64)).sin()).round();
+                    before[index] = if old { before[index] } else { fresh };
+                    log.channels[index].rows.push(row);
+                    log.channels[index].values.push(before[index]);
+                }
+            }
+        }
+        repeats(&log, &unit).expect("no codes")
+    }
+
+    #[test]
+    fn a_part_that_repeats_by_chance_says_nothing() {
+        assert_eq!(found(|_, _, _| false), []);
+    }
+
+    #[test]
+    fn a_part_that_sends_samples_twice_is_found_with_its_share() {
+        let found = found(|part, _, chance| part == 1 && chance < 0.05);
+        let [only] = found.as_slice() else {
+            panic!("{found:?}");
+        };
+        assert_eq!(only.channels, [3, 4, 5]);
+        assert!((only.share - 0.05).abs() < 3.0 * only.sigma, "{only:?}");
+    }
+
+    #[test]
+    fn rows_that_the_logger_wrote_twice_are_of_no_part() {
+        assert_eq!(found(|_, row, _| row % 20 == 0), []);
+        // Nor are some of them, in which another part was changed since.
+        assert_eq!(found(|part, row, _| row % 20 == 0 && (part == 0 || row % 80 != 0)), []);
+    }
+}
