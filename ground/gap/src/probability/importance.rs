@@ -5,7 +5,7 @@
 //!
 //! A real unit is off by a little everywhere, and thousands of samples make any of it significant: the differentiated positions of a camera
 //! leave accelerometers lever arms of a thousand nats, and two effects that take each other back are worth twenty. That is no name. So
-//! without an effect the gap of some channel must grow by more than the user's bar, the others fitted anew, or it must be certain
+//! without an effect the gap of some channel or the attitude must grow by more than the user's bar, the others fitted anew, or it must be certain
 //! ([`CERTAIN`]) where what the reference errs by is taken out and only what lasts for a fraction of a second is seen.
 //! And it must do so better than a course that is free (Kennedy and O'Hagan 2001): a supply that sags slowly is no set pulse that is
 //! missing since some instant.
@@ -20,8 +20,9 @@ use crate::{
     search::explanation::Explanation,
     thresholds::{CERTAIN, DOUBT_STEP, UNLIKE},
     unknown::{
+        binned::Binned,
         fast::within_stretches,
-        remainder::{Setting, courses, judged},
+        remainder::{Setting, attitude_deg, courses, judged},
         slow::{Beside, Slow},
     },
 };
@@ -40,24 +41,26 @@ pub struct Course {
 /// What speaks for one effect of the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Weight {
-    /// Whether the gap of some channel grows by more than the user's bar without it.
+    /// Whether the gap of some channel or the attitude grows by more than the user's bar without it.
     pub grows: bool,
     /// \[nats\] that it is worth.
     pub worth: f64,
+    /// Part of its energy that the other effects do not take back.
+    pub kept: f64,
     /// \[nats\] by which it is likelier than a free course in its channels would be in its place, its parameters paid for.
     pub over_course: f64,
 }
 
 impl Weight {
     /// How far it may have a name, 0 to 1: the gap grows without it or it is certain, and no free course says what it says, and more. A law
-    /// that is a little off leaves such a course a few parts in a hundred ([`UNLIKE`]).
+    /// that is a little off leaves such a course a few parts in a hundred ([`UNLIKE`]). What other effects take back it does not explain.
     pub fn counts(&self) -> f64 {
         let no_course = self.over_course + UNLIKE * self.worth;
         let is_there = match self.grows {
             true => 1.0,
             false => 1.0 / (1.0 + ((CERTAIN - self.worth) / DOUBT_STEP).exp()),
         };
-        is_there / (1.0 + (-no_course).exp())
+        is_there * self.kept / (1.0 + (-no_course).exp())
     }
 }
 
@@ -95,6 +98,7 @@ impl Importance {
             let worth = beside.worth(effect);
             Weight {
                 grows: grows(problem, model, effect, &setting),
+                kept: kept(problem, model, effect),
                 worth,
                 over_course: worth - beside.price(effect) + best(&left) - best(&without),
             }
@@ -126,8 +130,23 @@ pub fn setting<'a>(subject: &'a Subject, explanation: &'a Explanation) -> Settin
     }
 }
 
-/// Whether the gap of some channel would grow by more than the user's bar without an effect, once the calibration and the other effects are
-/// fitted: two that take each other back are nothing.
+/// Part of an effect's energy, the calibration fitted, that is there with all of the model's: of a zero that is off by what a sensitivity to
+/// gravity takes back nearly nothing is.
+fn kept(problem: &Problem, model: &Model, effect: usize) -> f64 {
+    let components = &model.components;
+    let own = problem.contribution(components, &problem.parts(components, effect));
+    let every: Vec<usize> = (0..components.len()).collect();
+    let mut of_all = problem.contribution(components, &every);
+    of_all.retain(|(channel, _)| own.iter().any(|(at, _)| at == channel));
+    let energy = |of: &[(usize, DVector<f64>)]| -> f64 {
+        let left = of.iter().map(|(channel, values)| problem.frames[*channel].left(values));
+        left.map(|left| left.norm_squared()).sum()
+    };
+    (energy(&of_all) / energy(&own).max(f64::MIN_POSITIVE)).min(1.0)
+}
+
+/// Whether the gap of some channel would grow by more than the user's bar without an effect, or the attitude be off by more than that, once the
+/// calibration and the other effects are fitted: two that take each other back are nothing.
 fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> bool {
     let bar = (1.0 + setting.bars.gap_sigma).powi(2) - 1.0;
     let components = &model.components;
@@ -142,19 +161,22 @@ fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> 
     };
     let others = (0..components.len()).filter(|at| !parts.contains(at));
     let open: Vec<(usize, DVector<f64>)> = others.flat_map(open_of).collect();
-    problem
-        .contribution(components, &parts)
-        .into_iter()
-        .any(|(channel, added)| {
-            let mut frame = problem.frames[channel].clone();
-            let of_channel = open.iter().filter(|(own, _)| *own == channel);
-            let columns: Vec<DVector<f64>> = of_channel.map(|(_, column)| column.clone()).collect();
-            if !columns.is_empty() {
-                frame.widen(&DMatrix::from_columns(&columns));
-            }
-            let left = problem.in_sigmas(channel, &frame.left(&added));
-            left.norm_squared() > bar * left.len() as f64
-        })
+    let mut slow: Vec<(usize, f64)> = Vec::new();
+    let mut is_seen = false;
+    for (channel, added) in problem.contribution(components, &parts) {
+        let mut frame = problem.frames[channel].clone();
+        let of_channel = open.iter().filter(|(own, _)| *own == channel);
+        let columns: Vec<DVector<f64>> = of_channel.map(|(_, column)| column.clone()).collect();
+        if !columns.is_empty() {
+            frame.widen(&DMatrix::from_columns(&columns));
+        }
+        let left = frame.left(&added);
+        let physical = left.component_mul(&frame.weights);
+        let energy = Binned::along(problem, channel, 1.0).energy(physical.as_slice());
+        slow.push((channel, (energy / left.len() as f64).sqrt()));
+        is_seen |= problem.in_sigmas(channel, &left).norm_squared() > bar * left.len() as f64;
+    }
+    is_seen || attitude_deg(problem, &slow) > setting.bars.attitude_deg
 }
 
 #[cfg(test)]
@@ -164,9 +186,20 @@ mod tests {
     fn weight(grows: bool, worth: f64, over_course: f64) -> Weight {
         Weight {
             grows,
+            kept: 1.0,
             worth,
             over_course,
         }
+    }
+
+    /// A zero of 0.57 deg/s beside a sensitivity to gravity that took it back, on a healthy recording.
+    #[test]
+    fn what_another_effect_takes_back_has_no_name() {
+        let weight = Weight {
+            kept: 0.05,
+            ..weight(true, 33.8, 23.6)
+        };
+        assert!(weight.counts() < 0.1);
     }
 
     /// What is certain beside the reference's errors is there, however small; a stand-in for what every recording leaves is worth little there.

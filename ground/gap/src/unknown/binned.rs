@@ -24,6 +24,13 @@ pub struct Binned {
 }
 
 impl Binned {
+    /// Of a channel along the whole log.
+    pub fn along(problem: &Problem, channel: usize, louder: f64) -> Self {
+        let starts_s = problem.twin.starts_s();
+        let span_s = [starts_s.first(), starts_s.last()].map(|end| end.copied().unwrap_or(0.0));
+        Binned::of(problem, channel, span_s, louder)
+    }
+
     /// Of a channel; a sample of the log from `span_s` falls into its stretch, `louder` times its noise.
     pub fn of(problem: &Problem, channel: usize, span_s: [f64; 2], louder: f64) -> Self {
         let rows = &problem.frames[channel].series.rows;

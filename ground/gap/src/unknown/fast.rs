@@ -45,8 +45,6 @@ pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], louder: &[
 /// Per channel, energy that no slow course can be: what is left within the stretches of [`Binned`], above the bar of the case and what the
 /// reference may be off by, in squares of noise. None in channels whose scatter the model explains.
 pub fn within_stretches(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Vec<f64> {
-    let starts_s = problem.twin.starts_s();
-    let span_s = [starts_s.first(), starts_s.last()].map(|end| end.copied().unwrap_or(0.0));
     let of_channel = |channel: usize| {
         let Some(fast) = excess(problem, model, channel, &floor[channel], setting.louder[channel])
             .filter(|_| !setting.scattered.contains(&channel))
@@ -54,7 +52,7 @@ pub fn within_stretches(problem: &Problem, model: &Model, floor: &[Vec<f64>], se
             return 0.0;
         };
         let rest = problem.in_sigmas(channel, &model.fitted.rest[channel]) / setting.louder[channel];
-        let binned = Binned::of(problem, channel, span_s, 1.0);
+        let binned = Binned::along(problem, channel, 1.0);
         let slow: f64 = binned.energy(rest.as_slice());
         let free = rest.len().saturating_sub(binned.bins.len()) as f64;
         (rest.norm_squared() - slow - free * (fast.floor + fast.bar(setting.bars))).max(0.0)

@@ -215,6 +215,18 @@ fn degrees(problem: &Problem, place: Where) -> Option<f64> {
     (rad.is_finite()).then(|| (rad * part).to_degrees())
 }
 
+/// \[deg\] of attitude that slow errors of some channels make, each with its root mean square in physical units: of the kind that makes most.
+pub fn attitude_deg(problem: &Problem, slow: &[(usize, f64)]) -> f64 {
+    let channels = &problem.twin.unit().channels;
+    let of_kind = |kind: Kind| {
+        let own = slow.iter().filter(|(channel, _)| channels[*channel].sensor == kind);
+        let square: f64 = own.map(|(channel, rms)| weight(problem, *channel) * rms * rms).sum();
+        degrees(problem, Where::VectorB(kind)).map_or(0.0, |degrees| degrees * square.sqrt())
+    };
+    let kinds = [Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer];
+    kinds.into_iter().map(of_kind).fold(0.0, f64::max)
+}
+
 /// How far one sensor moves the vector of its kind: `|(S'S)^-1 s|`; 1 where its kind has no three axes.
 fn weight(problem: &Problem, channel: usize) -> f64 {
     let channels = &problem.twin.unit().channels;
