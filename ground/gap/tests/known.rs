@@ -20,6 +20,7 @@ use twin::{
     environment::Environment,
     kinematics::{Attitude, Motion, Pose, Profile},
 };
+use twin_case::Log;
 
 /// \[s\] of a log.
 const SECONDS: f64 = 100.0;
@@ -93,7 +94,7 @@ fn flown(seed: u64, more: &str) -> (TempDir, Thrown) {
     let motion = Thrown::new(12.0);
     let windows = format!("[windows]\nfit = [[0.0, 90.0]]\nhold = [[90.0, 100.0]]\n{more}");
     let (site, span_s) = (Environment::alcantara(), (0.0, SECONDS));
-    let folder = twin_case::of("thrown", &motion, site, span_s, noise(seed), &windows);
+    let folder = Log::nominal(&motion, site, span_s).folder("thrown", noise(seed), "", &windows);
     (folder, motion)
 }
 
@@ -439,14 +440,8 @@ fn windows_in_free_fall_alone_say_that_a_turn_about_the_field_is_hardly_known() 
     let of = |fit: &str, more: &str| {
         let windows = format!("[windows]\nfit = {fit}\nhold = [[90.0, 100.0]]\n{more}");
         let span_s = (0.0, SECONDS);
-        told(&twin_case::of(
-            "thrown",
-            &motion,
-            Environment::alcantara(),
-            span_s,
-            noise(1),
-            &windows,
-        ))
+        let log = Log::nominal(&motion, Environment::alcantara(), span_s);
+        told(&log.folder("thrown", noise(1), "", &windows))
     };
     let falling = of("[[32.0, 90.0]]", "");
     let (error, stated) = off(&falling, &motion);

@@ -1,6 +1,8 @@
 //! Several logs of one unit in one call: simulated along motions of the twin, with the calibration off by what the description allows,
 //! once for the unit and not once a log.
 
+mod twin_case;
+
 use std::{fs, path::PathBuf};
 
 use gap::together::analysed;
@@ -11,8 +13,10 @@ use tempfile::TempDir;
 use twin::{
     effect::{Active, Cause, Locality, by_name},
     motion::{self, Motion},
-    predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
+    predict::{UnitDescription, emems, thesis_slot_s},
 };
+
+use twin_case::Log;
 
 /// \[s\] of a log, and of its fit window.
 const SECONDS: f64 = 90.0;
@@ -45,24 +49,21 @@ impl Unit {
     /// A log of it along a motion from `from_s` on; with what moved it where a reference saw that.
     fn log(&self, name: &str, from_s: f64, noise: u64, active: &[Active], has_reference: bool) -> TempDir {
         let world = motion::world_by_name(name).expect("a motion");
-        let environment = world.environment;
-        let scene = Scene::new(&world.motion, &environment, from_s - 2.0, from_s + SECONDS + 2.0, 0.01);
-        let starts_s: Vec<f64> = (0..(SECONDS / 0.2) as usize)
-            .map(|row| from_s + 0.2 * row as f64)
-            .collect();
-        let twin = Twin::new(self.real.clone(), environment, scene, starts_s.clone()).expect("a twin");
-        let readings = twin.predict(active);
+        let log = Log {
+            described: self.described.clone(),
+            real: self.real.clone(),
+            active,
+            zero_s: from_s,
+            ..Log::nominal(&world.motion, world.environment, (from_s, from_s + SECONDS))
+        };
         let mut random = Xoshiro256PlusPlus::seed_from_u64(noise);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let channels = &self.described.channels;
-        let names: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
-        let mut measured = format!("t_s,{}\n", names.join(","));
-        for (row, start_s) in starts_s.iter().enumerate() {
-            let cells = channels.iter().zip(&readings);
-            let cells =
-                cells.map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
-            measured += &format!("{:.1},{}\n", start_s - from_s, cells.collect::<Vec<_>>().join(","));
-        }
+        let normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let first = match has_reference {
+            true => "motion = \"motion.csv\"\n",
+            false => "[motion_known]\nnone = true\n",
+        };
+        let windows = format!("[windows]\nfit = [[0.0, {FIT_S}]]\nhold = [[{FIT_S}, {SECONDS}]]\n");
+        let folder = log.folder(name, normal, first, &windows);
         let mut told = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n");
         for row in 0..=((SECONDS + 1.0) / 0.01) as u32 {
             let t_s = 0.01 * f64::from(row);
@@ -75,31 +76,7 @@ impl Unit {
                 q.w, q.i, q.j, q.k, p.x, p.y, p.z
             );
         }
-        let motion = if has_reference {
-            "motion = \"motion.csv\"\n"
-        } else {
-            "[motion_known]\nnone = true\n"
-        };
-        let field = environment.field_n_ut;
-        let case = format!(
-            "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
-             {motion}[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n\
-             [windows]\nfit = [[0.0, {FIT_S}]]\nhold = [[{FIT_S}, {SECONDS}]]\n",
-            environment.gravity,
-            environment.latitude.to_degrees(),
-            field.x,
-            field.y,
-            field.z
-        );
-        let folder = tempfile::tempdir().expect("a folder");
-        for (name, text) in [
-            ("case.toml", case),
-            ("unit.toml", self.described.text()),
-            ("measured.csv", measured),
-            ("motion.csv", told),
-        ] {
-            fs::write(folder.path().join(name), text).expect("a file");
-        }
+        fs::write(folder.path().join("motion.csv"), told).expect("a motion");
         folder
     }
 }

@@ -10,6 +10,7 @@ use gap::parity::{
 };
 use tempfile::TempDir;
 use twin::motion;
+use twin_case::Log;
 
 /// \[s\] of lift-off.
 const LIFT_OFF_S: f64 = 30.0;
@@ -18,14 +19,7 @@ const LIFT_OFF_S: f64 = 30.0;
 fn flown(from_s: f64, more: &str) -> TempDir {
     let world = motion::world_by_name("rocket").expect("a motion");
     let settings = format!("[motion_known]\nnone = true\n{more}");
-    twin_case::of(
-        "rocket",
-        &world.motion,
-        world.environment,
-        (from_s, 595.0),
-        || 0.0,
-        &settings,
-    )
+    Log::nominal(&world.motion, world.environment, (from_s, 595.0)).folder("rocket", || 0.0, "", &settings)
 }
 
 fn open(folder: &TempDir) -> Flight {

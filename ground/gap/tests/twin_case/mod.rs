@@ -1,58 +1,94 @@
-//! A case without a reference whose log is of a motion of the twin.
+//! Cases whose log is of a motion of the twin.
 
 use std::{fmt::Write, fs};
 
 use tempfile::TempDir;
 use twin::{
+    effect::Active,
     environment::Environment,
-    motion::Motion,
-    predict::{Scene, Twin, emems, thesis_slot_s},
+    kinematics::Motion,
+    predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
 };
 
 /// \[s\] from row to row.
 const ROW_S: f64 = 0.2;
 
-/// The nominal unit along a motion from one instant \[s\] to another, each reading with its noise times a number of `normal`;
-/// `settings` is what case.toml says after the environment.
-pub fn of(
-    name: &str,
-    motion: &dyn Motion,
-    environment: Environment,
-    (from_s, to_s): (f64, f64),
-    mut normal: impl FnMut() -> f64,
-    settings: &str,
-) -> TempDir {
-    let unit = emems(thesis_slot_s);
-    let scene = Scene::new(motion, &environment, from_s - 2.0, to_s + 2.0, 0.01);
-    let rows = ((to_s - from_s) / ROW_S) as usize;
-    let starts_s: Vec<f64> = (0..rows).map(|row| from_s + ROW_S * row as f64).collect();
-    let twin = Twin::new(unit.clone(), environment, scene, starts_s.clone()).expect("a twin");
-    let readings = twin.predict(&[]);
-    let names: Vec<&str> = unit.channels.iter().map(|channel| channel.name.as_str()).collect();
-    let mut measured = format!("t_s,{}\n", names.join(","));
-    for (row, start_s) in starts_s.iter().enumerate() {
-        let channels = unit.channels.iter().zip(&readings);
-        let cells =
-            channels.map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
-        let _ = writeln!(measured, "{start_s:.1},{}", cells.collect::<Vec<_>>().join(","));
+/// A log of a unit along a motion.
+pub struct Log<'a> {
+    /// The unit as its file describes it.
+    pub described: UnitDescription,
+    /// As it is.
+    pub real: UnitDescription,
+    /// What else it has.
+    pub active: &'a [Active],
+    /// \[s\] of the motion where the log counts from.
+    pub zero_s: f64,
+    /// What moves it.
+    pub motion: &'a dyn Motion,
+    /// Where.
+    pub environment: Environment,
+    /// \[s\] from one instant of the motion to another.
+    pub span_s: (f64, f64),
+}
+
+impl<'a> Log<'a> {
+    /// Of the nominal unit from one instant \[s\] of the motion to another, counted as the motion is.
+    pub fn nominal(motion: &'a dyn Motion, environment: Environment, span_s: (f64, f64)) -> Self {
+        Self {
+            described: emems(thesis_slot_s),
+            real: emems(thesis_slot_s),
+            active: &[],
+            zero_s: 0.0,
+            motion,
+            environment,
+            span_s,
+        }
     }
-    let field = environment.field_n_ut;
-    let case = format!(
-        "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
-         [environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n{settings}",
-        environment.gravity,
-        environment.latitude.to_degrees(),
-        field.x,
-        field.y,
-        field.z
-    );
-    let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [
-        ("case.toml", case),
-        ("unit.toml", unit.text()),
-        ("measured.csv", measured),
-    ] {
-        fs::write(folder.path().join(name), text).expect("a file");
+
+    /// As a case, each reading with its noise times a number of `normal`; case.toml has the lines `first` before the environment and `last` after
+    /// it.
+    pub fn folder(&self, name: &str, mut normal: impl FnMut() -> f64, first: &str, last: &str) -> TempDir {
+        let (environment, (from_s, to_s)) = (self.environment, self.span_s);
+        let scene = Scene::new(self.motion, &environment, from_s - 2.0, to_s + 2.0, 0.01);
+        let rows = ((to_s - from_s) / ROW_S) as usize;
+        let starts_s: Vec<f64> = (0..rows).map(|row| from_s + ROW_S * row as f64).collect();
+        let mut real = self.real.clone();
+        // A part stops what it measures with its noise; the log does that below.
+        (real.channels.iter_mut()).for_each(|channel| channel.range = [f64::NEG_INFINITY, f64::INFINITY]);
+        let twin = Twin::new(real, environment, scene, starts_s.clone()).expect("a twin");
+        let readings = twin.predict(self.active);
+        let channels = &self.described.channels;
+        let names: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+        let mut measured = format!("t_s,{}\n", names.join(","));
+        for (row, start_s) in starts_s.iter().enumerate() {
+            let cells = channels.iter().zip(&readings);
+            let cells =
+                cells.map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
+            let _ = writeln!(
+                measured,
+                "{:.1},{}",
+                start_s - self.zero_s,
+                cells.collect::<Vec<_>>().join(",")
+            );
+        }
+        let field = environment.field_n_ut;
+        let case = format!(
+            "format = \"gap-case/1\"\nname = \"{name}\"\nkind = \"csv\"\nunit = \"unit.toml\"\nmeasured = \"measured.csv\"\n\
+             {first}[environment]\ngravity_m_s2 = {}\nlatitude_deg = {}\nfield_n_ut = [{}, {}, {}]\n{last}",
+            environment.gravity,
+            environment.latitude.to_degrees(),
+            field.x,
+            field.y,
+            field.z
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in [
+            ("case.toml", case),
+            ("unit.toml", self.described.text()),
+            ("measured.csv", measured),
+        ] {
+            fs::write(folder.path().join(name), text).expect("a file");
+        }
+        folder
     }
-    folder
 }
