@@ -5,7 +5,7 @@
 //!
 //! | step | file | gives |
 //! |---|---|---|
-//! | 1 | [`flight`] (by [`phases`]) | the fit windows of the log, and the unit in its environment; what it did when |
+//! | 1 | [`flight`] (by [`phases`], [`turning`]) | the fit windows of the log, and the unit in its environment; what it did when |
 //! | 2 | [`codes`] | samples sent twice, lost bits: no model is needed for these |
 //! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
@@ -50,6 +50,7 @@ pub mod smoothed;
 pub mod space;
 pub mod spline;
 pub mod text;
+pub mod turning;
 pub mod verdict;
 pub mod visible;
 

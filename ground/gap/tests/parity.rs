@@ -279,6 +279,7 @@ fn an_attitude_that_does_not_settle_is_said_and_not_written() {
         track: None,
         belief: None,
         kept: None,
+        lost: Vec::new(),
     };
     assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
     assert!(

@@ -21,6 +21,7 @@ use crate::{
         known::Known,
         phases::{self, Stretch},
         smooth::rests::rests,
+        turning,
     },
 };
 
@@ -52,6 +53,8 @@ pub struct Flight {
     pub held: Option<Log>,
     /// One row in so many was kept.
     pub thinned: usize,
+    /// Rows of the fit windows that were left out because nobody knows how fast the unit turned.
+    pub unturned: usize,
     /// How it was parted where its file does not say it.
     pub windows: Option<Windows>,
 }
@@ -77,9 +80,12 @@ impl Flight {
             let problem = format!("hold {} rows of the log; at least {LEAST_ROWS} are needed", rows.len());
             return Err(CaseError::key(&opened.file, "windows.fit", problem));
         }
+        let windowed = rows.len();
+        let rows = turning::known(&log, &unit, rows, LEAST_ROWS);
+        let unturned = windowed - rows.len();
         let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
         let rows: Vec<usize> = rows.into_iter().step_by(thinned).collect();
-        let held = self::rows(&log, windows.hold());
+        let held = turning::known(&log, &unit, self::rows(&log, windows.hold()), LEAST_ROWS);
         let every = held.len().div_ceil(MOST_ROWS).max(1);
         let held: Vec<usize> = held.into_iter().step_by(every).collect();
         let phases = match &opened.text.phases {
@@ -98,6 +104,7 @@ impl Flight {
             unit,
             environment,
             thinned,
+            unturned,
         })
     }
 

@@ -100,6 +100,11 @@ impl Followed {
         smoothed.twin(&self.log, &self.unit, &self.environment)
     }
 
+    /// \[s\] between the knots of its course.
+    pub fn knot_s(&self) -> f64 {
+        self.start.knot_s
+    }
+
     /// All of the log.
     pub fn fit(&self) -> Fit {
         smooth::fit(&self.log)

@@ -56,6 +56,7 @@ use crate::{
             trajectory::{State, Trajectory},
         },
         space::Space,
+        turning,
     },
 };
 
@@ -80,6 +81,9 @@ const STILL: f64 = 0.003;
 
 /// Part of gravity below which a unit falls: from there on a turn is known to no more than the root of two times what steps take it for.
 const LIGHT: f64 = 0.5;
+
+/// Part of a piece of a log in which a unit falls that is said to fall: what a burn or an entry adds at its ends tells no gravity either.
+const FALLS: f64 = 0.9;
 
 /// Knots a packet: two instants of field and force, and gyros between.
 const KNOTS_A_ROW: f64 = 2.0;
@@ -201,13 +205,14 @@ impl Smoothed {
         let motion = self.smoothing(&problem, course.0, course.1);
         let space = Space::new(&problem, &motion, Vec::new());
         let mut now = self.at(&problem, log, course)?;
+        let pieces = turning::pieces(&log.start_s, about.start.knot_s);
         let mut turned = 0.0;
         while self.turns.len() < until && turned < LINEAR_RAD && !self.is_settled() {
             progress(self.turns.len() as f64 / MOST_STEPS as f64);
             let prior = motion.prior_of(now.prior.iter().copied(), now.track.as_ref());
             let residual = space.project_residual(now.residuals, &prior);
             let correction = motion.correction(&space.motion_part(&residual));
-            let turn = self.trajectory.turn(&self.knots, &correction);
+            let turn = self.trajectory.turn(&self.knots, &correction, &pieces);
             self.turns.push(turn);
             turned += turn;
             let (before, cost) = (self.trajectory.clone(), now.cost);
@@ -263,6 +268,25 @@ impl Smoothed {
     /// Whether the last step turned nothing any more, and made the residuals no smaller than chance makes them.
     pub fn is_settled(&self) -> bool {
         self.turns.last().is_some_and(|turn| *turn < SETTLED_RAD) && self.gain.abs() < self.chance
+    }
+
+    /// \[s\] pieces of a log that nothing ties to the others, and in which the unit falls: there no sensor shows a turn about the field, and
+    /// the rotation of the Earth, the one thing left that does, has a curvature that a step takes for another. An attitude
+    /// that is told there ties it.
+    pub fn lost(&self, starts_s: &[f64], knot_s: f64) -> Vec<(f64, f64)> {
+        let pieces = turning::pieces(starts_s, knot_s);
+        if pieces.len() < 2 {
+            return Vec::new();
+        }
+        let light = LIGHT * self.trajectory.gravity();
+        let is_lost = |(from_s, to_s): &(f64, f64)| {
+            let is_in = |t_s: f64| (*from_s..=*to_s).contains(&t_s);
+            let is_told = self.ties.attitudes.all.iter().any(|own| is_in(own.t_s));
+            let falls = |t_s: &f64| self.trajectory.state(*t_s).force_b.norm() < light;
+            let own = || starts_s.iter().copied().filter(|t_s| is_in(*t_s));
+            !is_told && own().filter(falls).count() as f64 >= FALLS * own().count() as f64
+        };
+        pieces.into_iter().filter(is_lost).collect()
     }
 
     /// The twin along it.

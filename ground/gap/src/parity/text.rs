@@ -42,6 +42,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
         findings.rows
     );
     out += &parted(flight);
+    out += &unturned(flight);
     out += &flight.phases_line();
     out += &seen_and_not(findings);
     let _ = writeln!(
@@ -56,6 +57,17 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     out += &told.known_lines(&flight.known);
     let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
     wrapped(&out)
+}
+
+/// Packets that were left out because nobody knows how fast the unit turned, in a line.
+fn unturned(flight: &Flight) -> String {
+    match flight.unturned {
+        0 => String::new(),
+        rows => format!(
+            "LEFT OUT  {rows} packets of the fit windows in or beside which gyros stand at their stops: nobody knows how fast the unit \
+             turned, and nothing is linear about a guess\n"
+        ),
+    }
 }
 
 /// How the log was parted where its file does not say it, in a line.

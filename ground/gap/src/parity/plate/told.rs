@@ -80,6 +80,7 @@ pub fn attitude(findings: &Findings) -> Told {
         track: None,
         belief: None,
         kept: None,
+        lost: Vec::new(),
     }
 }
 

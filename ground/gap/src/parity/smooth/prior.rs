@@ -29,7 +29,12 @@ use crate::{
         rows::UNKNOWNS,
         trajectory::Trajectory,
     },
+    parity::turning,
 };
+
+/// Times their sigmas, rows of the prior between two pieces of a log ([`turning`]): there nothing is known of the motion, and the
+/// normal matrix has a factor all the same.
+const LOOSE: f64 = 1e3;
 
 /// A row of the prior: where it begins, what it says, what it is off by.
 pub struct Prior {
@@ -96,6 +101,7 @@ pub fn priors<'a>(
             .partition_point(|start_s| *start_s < t_s)
             .min(starts_s.len() - 1)
     };
+    let pieces = turning::pieces(starts_s, start.knot_s);
     let one = move |t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64| {
         self::row(knots, t_s, terms, sigma, is)
     };
@@ -103,6 +109,9 @@ pub fn priors<'a>(
         let t_s = knots.from_s + (interval as f64 + 0.5) * knots.step_s;
         let [bend, jerk] = trajectory.changes(t_s);
         let row = row(t_s);
+        let loose = if turning::is_in_hole(&pieces, t_s) { LOOSE } else { 1.0 };
+        // What the motion does in a hole is nothing that a step should make better.
+        let counts = if loose > 1.0 { 0.0 } else { 1.0 };
         let rest = rests.iter().find(|((from_s, to_s), _)| (*from_s..*to_s).contains(&t_s));
         let state = trajectory.state(t_s);
         let (w, w_dot, f) = (state.rate_b, state.rate_dot_b, state.force_b);
@@ -117,7 +126,12 @@ pub fn priors<'a>(
                 (1, 0, 2.0 * e.cross(&w_dot)),
                 (0, 0, e.cross(&bend)),
             ];
-            let turn = one(t_s, &turn, course.rate_dot_sigmas[row] / start.knot_s, bend[axis]);
+            let turn = one(
+                t_s,
+                &turn,
+                loose * course.rate_dot_sigmas[row] / start.knot_s,
+                counts * bend[axis],
+            );
             let by_rate = f.cross(&e);
             let moved = [
                 (1, 3, e),
@@ -125,12 +139,12 @@ pub fn priors<'a>(
                 (1, 0, by_rate),
                 (0, 0, by_rate.cross(&w)),
             ];
-            let moved = one(t_s, &moved, course.jerk_sigmas[row], jerk[axis]);
-            let acc_sigma = rest.map_or(start.acc_sigmas[row], |(_, sigma)| *sigma);
+            let moved = one(t_s, &moved, loose * course.jerk_sigmas[row], counts * jerk[axis]);
+            let acc_sigma = rest.map_or(loose * start.acc_sigmas[row], |(_, sigma)| *sigma);
             let still = [(0, 3, e), (0, 0, e.cross(&(acceleration - f)))];
             let still = Prior {
                 turning,
-                ..one(t_s, &still, acc_sigma, acceleration[axis])
+                ..one(t_s, &still, acc_sigma, counts * acceleration[axis])
             };
             [turn, moved, still]
         })

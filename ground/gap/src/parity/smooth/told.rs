@@ -29,6 +29,9 @@ use crate::{
 /// Why nothing else that is known of a motion was looked at.
 const NOT_SETTLED: &str = "the motion did not settle without it";
 
+/// Why neither a track nor a simulated trajectory was looked at along a motion that has settled.
+const HOLED: &str = "packets whose rate nobody knows were left out, and what happened meanwhile is not known";
+
 /// What an attitude is at a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Attitude {
@@ -54,6 +57,8 @@ pub struct Told {
     pub belief: Option<Belief>,
     /// What became of attitudes at instants; none where none are told.
     pub kept: Option<Vec<Kept>>,
+    /// \[s\] pieces of the log along which nothing tells an attitude ([`super::Smoothed::lost`]).
+    pub lost: Vec<(f64, f64)>,
 }
 
 impl Told {
@@ -79,6 +84,7 @@ impl Told {
             track: smoothed.track.map(|own| (own, None)),
             belief: smoothed.belief,
             kept: smoothed.attitudes.clone(),
+            lost: Vec::new(),
         };
         if !smoothed.is_settled() {
             return Ok(told);
@@ -98,7 +104,10 @@ impl Told {
             }
             None => covariances(&space, motion, &log.start_s),
         };
+        let lost = smoothed.lost(&log.start_s, followed.knot_s());
+        let is_lost = |t_s: f64| lost.iter().any(|(from_s, to_s)| (*from_s..=*to_s).contains(&t_s));
         told.attitudes = (log.start_s.iter().zip(&covariances))
+            .filter(|(t_s, _)| !is_lost(**t_s))
             .map(|(t_s, covariance)| Attitude {
                 t_s: *t_s,
                 q_nb: smoothed.trajectory.attitude(*t_s),
@@ -107,6 +116,7 @@ impl Told {
                     .map(|variance| variance.max(0.0).sqrt().to_degrees()),
             })
             .collect();
+        told.lost = lost;
         Ok(told)
     }
 
@@ -136,7 +146,7 @@ impl Told {
         let mut out = String::new();
         match (&self.belief, &known.simulated) {
             (Some(belief), _) => out += &belief.line(),
-            (None, Some(_)) => out += &format!("NOMINAL the simulated trajectory: not used: {NOT_SETTLED}\n"),
+            (None, Some(_)) => out += &format!("NOMINAL the simulated trajectory: not used: {}\n", self.not_used()),
             (None, None) => {}
         }
         match (&self.kept, known.attitudes.all.is_empty()) {
@@ -146,7 +156,7 @@ impl Told {
         }
         match (&self.track, &known.track) {
             (Some((found, sigma_s)), _) => out += &found.line(*sigma_s),
-            (None, Some(_)) => out += &format!("TRACK   not used: {NOT_SETTLED}\n"),
+            (None, Some(_)) => out += &format!("TRACK   not used: {}\n", self.not_used()),
             (None, None) => {}
         }
         out
@@ -154,25 +164,47 @@ impl Told {
 
     /// The same as JSON; nothing where nothing is known.
     pub fn known_json(&self, known: &Known) -> Map<String, Value> {
-        let not_settled = || json!({ "is_used": false, "why": NOT_SETTLED });
+        let not_used = |why: &str| json!({ "is_used": false, "why": why });
         let simulated = self.belief.as_ref().map(Belief::json);
         let track = self.track.as_ref().map(|(found, sigma_s)| found.json(*sigma_s));
         let kept = match (&self.kept, known.attitudes.all.is_empty()) {
             (Some(kept), _) => Some(instants::json(kept)),
-            (None, false) => Some(not_settled()),
+            (None, false) => Some(not_used(NOT_SETTLED)),
             (None, true) => None,
         };
         let all = [
             (
                 "simulated",
-                simulated.or_else(|| known.simulated.as_ref().map(|_| not_settled())),
+                simulated.or_else(|| known.simulated.as_ref().map(|_| not_used(self.not_used()))),
             ),
-            ("track", track.or_else(|| known.track.as_ref().map(|_| not_settled()))),
+            (
+                "track",
+                track.or_else(|| known.track.as_ref().map(|_| not_used(self.not_used()))),
+            ),
             ("attitude_at", kept),
         ];
         all.into_iter()
             .filter_map(|(key, value)| Some((key.to_owned(), value?)))
             .collect()
+    }
+
+    fn lost_words(&self) -> String {
+        let spans = self
+            .lost
+            .iter()
+            .map(|(from_s, to_s)| format!("{from_s:.0} to {to_s:.0} s"));
+        match spans.collect::<Vec<_>>().join(", ").as_str() {
+            "" => String::new(),
+            spans => format!(
+                "; none is given {spans}: beyond packets that were left out, and in free fall, nothing tells a turn about the field; \
+                 an attitude_at there would"
+            ),
+        }
+    }
+
+    /// Why a track or a simulated trajectory was not looked at.
+    fn not_used(&self) -> &'static str {
+        if self.attitudes.is_empty() { NOT_SETTLED } else { HOLED }
     }
 
     /// One line.
@@ -189,9 +221,10 @@ impl Told {
         let mean = (norms.map(|(_, norm)| norm * norm).sum::<f64>() / self.attitudes.len() as f64).sqrt();
         format!(
             "ATTITUDE  smoothed over the whole log, in attitude.csv: known to {mean:.2} deg (one sigma, all axes), to {worst:.2} deg \
-             at {worst_s:.0} s; at rest in {} spans; settled in {} steps",
+             at {worst_s:.0} s; at rest in {} spans; settled in {} steps{}",
             self.rests.len(),
-            self.turns.len()
+            self.turns.len(),
+            self.lost_words()
         )
     }
 

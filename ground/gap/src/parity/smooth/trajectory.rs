@@ -21,6 +21,7 @@ use twin::{
 use crate::{
     parity::course::Start,
     parity::smooth::{basis::Knots, rows::UNKNOWNS},
+    parity::turning,
 };
 
 /// \[s\] between nodes.
@@ -157,10 +158,12 @@ impl Trajectory {
         ]
     }
 
-    /// \[rad\] the largest turn that a correction asks for, whose coefficients are three of the turn and three of the force a knot.
-    pub fn turn(&self, knots: &Knots, correction: &[f64]) -> f64 {
+    /// \[rad\] the largest turn that a correction asks for in these pieces of a log, whose coefficients are three of the turn and three of the
+    /// force a knot.
+    pub fn turn(&self, knots: &Knots, correction: &[f64], pieces: &[(f64, f64)]) -> f64 {
         let all = (0..self.states.len()).map(|node| self.at_s(node));
-        all.map(|t_s| part_of(knots, correction, t_s, 0, 0).norm())
+        let seen = all.filter(|t_s| !turning::is_in_hole(pieces, *t_s));
+        seen.map(|t_s| part_of(knots, correction, t_s, 0, 0).norm())
             .fold(0.0, f64::max)
     }
 
@@ -278,7 +281,7 @@ mod tests {
         let correction: Vec<f64> = (0..6 * knots.coefficients())
             .map(|k| if k % 6 < 3 { 0.3 * (0.031 * k as f64).sin() } else { 0.0 })
             .collect();
-        let asked = trajectory.turn(&knots, &correction);
+        let asked = trajectory.turn(&knots, &correction, &[]);
         assert!((0.3..0.6).contains(&asked), "{asked}");
         trajectory.correct(&knots, &correction, 1.0);
         let earth_n = trajectory.environment.earth_rate_n();

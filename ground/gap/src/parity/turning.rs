@@ -1,0 +1,123 @@
+//! Rows in which nobody knows how fast the unit turns: too many gyros stand at their stops.
+//!
+//! In: a log, its unit, rows of it. Out: those in which the rate is known, and how many are not.
+//!
+//! Everything here is linear about a rate: a packet's unknowns are small changes of it, and samples of one packet lie some tenths of a
+//! second apart. Of a clipped gyro the log keeps no sample. Where those that are left do not span three axes for longer than a spline
+//! bridges, the rate between is a guess; about a guess that is wrong by turns a second nothing is linear, and what is left there is
+//! neither noise nor an effect. A rocket's spin leaves 18 sigma in its packets, and those on the pad and in micro-gravity say nothing
+//! beside it. So such rows are left out, and [`BESIDE`] to either side, whose splines are held by rows that are gone.
+//!
+//! A gyro that clips below what its description says has samples, at another stop; its rows stay.
+
+use nalgebra::Matrix3;
+use twin::predict::{Kind, UnitDescription};
+
+use crate::input::log::Log;
+
+/// Rows without a rate that a spline bridges: as many as its knots are held from one side.
+const BRIDGED: usize = 2;
+
+/// Rows to either side of a stretch without a rate: a cubic spline's coefficient reaches two knots, which are a row apart.
+const BESIDE: usize = 2;
+
+/// Least eigenvalue of the sum of squares of the axes of gyros that tell a rate: of three axes it is their volume that vanishes where
+/// they lie in a plane; five degrees beside one the rate is eleven times as uncertain as along the others.
+const SPANS: f64 = 0.01;
+
+/// Of these rows, those in which the rate is known. All of them where the unit's gyros never tell a rate, and where fewer than `least` are left.
+pub fn known(log: &Log, unit: &UnitDescription, rows: Vec<usize>, least: usize) -> Vec<usize> {
+    let mut axes = vec![Matrix3::<f64>::zeros(); log.start_s.len()];
+    for (channel, series) in unit.channels.iter().zip(&log.channels) {
+        if channel.sensor == Kind::Gyro {
+            let square = channel.axis_b * channel.axis_b.transpose();
+            series.rows.iter().for_each(|row| axes[*row as usize] += square);
+        }
+    }
+    let is_told: Vec<bool> = axes
+        .iter()
+        .map(|sum| sum.symmetric_eigenvalues().min() > SPANS)
+        .collect();
+    let mut is_kept = vec![true; is_told.len()];
+    let mut from = 0;
+    for stretch in is_told.chunk_by(|one, other| one == other) {
+        let to = from + stretch.len();
+        if !stretch[0] && stretch.len() > BRIDGED {
+            is_kept[from.saturating_sub(BESIDE)..(to + BESIDE).min(is_told.len())].fill(false);
+        }
+        from = to;
+    }
+    let kept: Vec<usize> = rows.iter().copied().filter(|row| is_kept[*row]).collect();
+    if kept.len() < least { rows } else { kept }
+}
+
+/// \[s\] pieces of rows between which some were left out: within a piece they lie as close as a spline bridges.
+pub fn pieces(starts_s: &[f64], step_s: f64) -> Vec<(f64, f64)> {
+    // What is left out is a stretch that is not bridged, and its neighbours.
+    let hole_s = (BRIDGED + 2 * BESIDE + 1) as f64 * step_s;
+    let pieces = starts_s.chunk_by(|one, next| next - one < hole_s + step_s);
+    pieces.map(|own| (own[0], own[own.len() - 1])).collect()
+}
+
+/// Whether an instant lies in a hole between two pieces.
+pub fn is_in_hole(pieces: &[(f64, f64)], t_s: f64) -> bool {
+    let next = pieces.partition_point(|(from_s, _)| *from_s <= t_s);
+    next > 0 && next < pieces.len() && pieces[next - 1].1 < t_s
+}
+
+#[cfg(test)]
+mod tests {
+    use twin::predict::emems;
+
+    use super::*;
+
+    /// A log of forty rows in which gyros have a sample where this says so.
+    fn log(unit: &UnitDescription, has: impl Fn(usize, usize) -> bool) -> Log {
+        let mut log = Log::empty(unit.channels.len());
+        (0..40).for_each(|row| log.begin_row(0.2 * f64::from(row)));
+        let mut gyro = 0;
+        for (channel, series) in unit.channels.iter().zip(&mut log.channels) {
+            let is_gyro = channel.sensor == Kind::Gyro;
+            for row in (0..40).filter(|row| !is_gyro || has(gyro, *row)) {
+                series.rows.push(row as u32);
+                series.values.push(0.0);
+            }
+            gyro += usize::from(is_gyro);
+        }
+        log
+    }
+
+    fn left(has: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+        let unit = emems::emems(emems::thesis_slot_s);
+        known(&log(&unit, has), &unit, (0..40).collect(), 16)
+    }
+
+    #[test]
+    fn rows_whose_gyros_stand_at_their_stops_are_left_out_with_their_neighbours() {
+        let spins = |row: usize| (20..26).contains(&row);
+        let expected: Vec<usize> = (0..18).chain(28..40).collect();
+        assert_eq!(left(|gyro, row| gyro < 2 || !spins(row)), expected);
+        // Three of the tetrahedron's four tell a rate.
+        assert_eq!(left(|gyro, row| gyro < 3 || !spins(row)).len(), 40);
+    }
+
+    #[test]
+    fn what_a_spline_bridges_stays_and_so_does_a_log_that_never_tells_a_rate() {
+        assert_eq!(left(|_, row| row != 20 && row != 21).len(), 40);
+        assert_eq!(left(|_, row| !(20..23).contains(&row)).len(), 40 - 7);
+        assert_eq!(left(|gyro, _| gyro == 0).len(), 40);
+    }
+
+    #[test]
+    fn pieces_are_parted_by_what_is_left_out_and_not_by_lost_packets() {
+        let starts = |rows: &[usize]| -> Vec<f64> { rows.iter().map(|row| 0.2 * *row as f64).collect() };
+        let holed = starts(&left(|_, row| !(20..23).contains(&row)));
+        let found = pieces(&holed, 0.2);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(
+            is_in_hole(&found, 4.3) && !is_in_hole(&found, 3.1) && !is_in_hole(&found, 5.1) && !is_in_hole(&found, 9.0)
+        );
+        let lost: Vec<usize> = (0..40).filter(|row| !(20..23).contains(row)).collect();
+        assert_eq!(pieces(&starts(&lost), 0.2).len(), 1);
+    }
+}
