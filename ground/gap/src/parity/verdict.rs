@@ -30,6 +30,9 @@ pub struct Verdict {
     gap: Gap,
     phases: Vec<Stretch>,
     phases_from: &'static str,
+    /// Packets of the fit windows whose rate nobody knows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left_out: Option<usize>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     chips: Vec<serde_json::Value>,
     #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
@@ -146,6 +149,7 @@ impl Verdict {
             },
             phases: phases::rounded(&flight.phases),
             phases_from: phases::told_by(flight.are_phases_told),
+            left_out: Some(flight.unturned).filter(|rows| *rows > 0),
             chips: chips::text::json(&findings.chips),
             motion_known: told.known_json(&flight.known),
             attitude: Attitude {
