@@ -67,7 +67,7 @@ pub fn is_in_hole(pieces: &[(f64, f64)], t_s: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use twin::predict::emems;
+    use twin::predict::{emems, thesis_slot_s};
 
     use super::*;
 
@@ -88,7 +88,7 @@ mod tests {
     }
 
     fn left(has: impl Fn(usize, usize) -> bool) -> Vec<usize> {
-        let unit = emems::emems(emems::thesis_slot_s);
+        let unit = emems(thesis_slot_s);
         known(&log(&unit, has), &unit, (0..40).collect(), 16)
     }
 
