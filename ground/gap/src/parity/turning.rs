@@ -53,9 +53,9 @@ pub fn known(log: &Log, unit: &UnitDescription, rows: Vec<usize>, least: usize) 
 
 /// \[s\] pieces of rows between which some were left out: within a piece they lie as close as a spline bridges.
 pub fn pieces(starts_s: &[f64], step_s: f64) -> Vec<(f64, f64)> {
-    // What is left out is a stretch that is not bridged, and its neighbours.
-    let hole_s = (BRIDGED + 2 * BESIDE + 1) as f64 * step_s;
-    let pieces = starts_s.chunk_by(|one, next| next - one < hole_s + step_s);
+    // What is left out is at least a stretch that is not bridged, and its neighbours: between those that stay lies a step more.
+    let least_s = (BRIDGED + 2 * BESIDE) as f64 * step_s + 1.5 * step_s;
+    let pieces = starts_s.chunk_by(|one, next| next - one < least_s);
     pieces.map(|own| (own[0], own[own.len() - 1])).collect()
 }
 
