@@ -295,7 +295,13 @@ impl Window {
             && rate_spread < square(params.rest.rate_spread)
             && acc_spread < square(params.rest.acc_spread);
         let moving = square(params.velocity_sd) + square(params.velocity_per_spread_s) * acc_spread;
-        let excess = self.excess(params);
+        // In flight what a window has beyond one g that is far from it is thrust or drag, and no vibration. The re-entry's 10 g would
+        // be remembered for twenty seconds of the parachute.
+        let excess = if lift_off && !vertical {
+            0.0
+        } else {
+            self.excess(params)
+        };
         let tilt_variance = (START_SPREAD + 1.0 / at_least(1.0, self.acc.count)) * acc_spread / square(params.gravity);
         Means {
             duration_s: self.duration_s,

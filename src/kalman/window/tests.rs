@@ -179,8 +179,12 @@ fn means_are_those_of_the_samples() {
         let rate_spread = sum(second.turns.iter().map(apart)) / covered;
         let g = of(params.gravity);
         let near_one_g = (second.mean().norm() - g).abs() < 0.2 * g + 0.2 * spread.sqrt();
-        let wild = second.acc.iter().any(|acc| (acc.0.norm() - g).abs() >= 0.1 * g);
-        let vertical = near_one_g && !(lift_off && wild);
+        let is_vertical = |window: &Given| {
+            let near_one_g = (window.mean().norm() - g).abs() < 0.2 * g + 0.2 * window.spread().sqrt();
+            let wild = window.acc.iter().any(|acc| (acc.0.norm() - g).abs() >= 0.1 * g);
+            near_one_g && !(lift_off && wild)
+        };
+        let vertical = is_vertical(&second);
         let rest = !lift_off
             && near_one_g
             && rate_b.norm() < of(params.rest.rate)
@@ -193,12 +197,21 @@ fn means_are_those_of_the_samples() {
         is(found.vertical_s, vertical_s, "vertical");
         let gained = second.integral_mean(&first) * vertical_s;
         are(found.velocity_change_n.as_slice(), &gained.as_slice()[..2], "velocity");
-        // By how much force exceeds one g: a mean over three seconds, of which this window is a part.
+        // By how much force exceeds one g: a mean over three seconds, of which this window is a part. Of thrust and drag nothing stays.
+        let is_of_flight = |window: &Given| lift_off && !is_vertical(window);
         let of_first = first.mean().norm() - g;
-        let excess_before = of_first * (first.duration() / 3.0).min(1.0);
+        let excess_before = if is_of_flight(&first) {
+            0.0
+        } else {
+            of_first * (first.duration() / 3.0).min(1.0)
+        };
         is(before.excess, excess_before, "excess before");
         let now = second.integral_mean(&first).norm() - g;
-        let excess = excess_before + (now - excess_before) * (duration / 3.0).min(1.0);
+        let excess = if is_of_flight(&second) {
+            0.0
+        } else {
+            excess_before + (now - excess_before) * (duration / 3.0).min(1.0)
+        };
         is(found.excess, excess, "excess");
         let of_sample = second.missed(&first);
         missed += u32::from(of_sample > second.noise());
