@@ -148,7 +148,7 @@ impl Estimator {
         Estimator {
             temperatures: Temperatures::default(),
             monitor: Monitor::new(&set),
-            filter: Filter::new(site.params(&set)),
+            filter: filter(&set, site),
             turn_solver: turn::Solver::default(),
             averager: Averager::EMPTY,
             boost: Boost::WAITING,
@@ -170,7 +170,7 @@ impl Estimator {
         self.set = *set;
         self.temperatures = Temperatures::default();
         self.monitor = Monitor::new(set);
-        self.filter = Filter::new(site.params(set));
+        self.filter = filter(set, site);
         self.turn_solver = turn::Solver::default();
         self.averager = Averager::EMPTY;
         self.boost = Boost::WAITING;
@@ -449,6 +449,18 @@ impl Estimator {
         }
         triad::attitude(-force_b.vector_b, field_b_ut.vector_b, self.axes_n.as_ref()?).ok()
     }
+}
+
+/// A filter that knows nothing yet but what the set says of the gyros.
+#[inline(never)]
+fn filter(set: &Set, site: &Site) -> Filter {
+    let mut filter = Filter::new(site.params(set));
+    let axes_b = set.gyro.map(|axis| axis.axis_b);
+    let [_, _, gyro] = set.uncertainty;
+    if let Some((least_squares, _)) = crate::redundancy::matrix(&axes_b, 0b1111) {
+        filter.know_gyros(&least_squares, &axes_b, [gyro.scale, gyro.direction]);
+    }
+    filter
 }
 
 /// The axes that the vertical and the field of a site span, which are never collinear.

@@ -11,7 +11,7 @@
 //! `u = p - k s/2`: the same for any `k`, so an error of `k` is of second order in it, where the short `P - k p'` goes
 //! indefinite in f32. What is above the diagonal is mirrored below it.
 
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::{
     Params,
@@ -20,6 +20,7 @@ use super::{
     square,
     state::{DRIVEN, DRIVERS, GYRO_MATRIX, STATES, State, VELOCITY, are_finite, dot},
 };
+use crate::geometry::PLATES;
 
 /// Floors of the variances: below them f32 rounding of the sums above is no longer small beside them. Attitude \[rad^2\]
 /// (0.002 deg), velocity, bias, gyro matrix.
@@ -89,11 +90,6 @@ impl Covariance {
         let [north, east, down, ..] = [0, 1, 2].map(|k| self.driven[k][k]);
         let level = if north > east { north } else { east };
         if level > down { level } else { down }
-    }
-
-    /// Variance of a driver.
-    pub(super) fn of_driver_itself(&self, driver: usize) -> f32 {
-        self.drivers[driver][driver]
     }
 
     /// The column of a driver.
@@ -220,6 +216,54 @@ impl Covariance {
         }
     }
 
+    /// The gyro matrix as it is before anything was seen of it: each gyro's own scale and direction, through the least squares that
+    /// make a rate of all. See [`super::Filter::know_gyros`].
+    pub(super) fn know_gyros(
+        &mut self,
+        least_squares: &SMatrix<f32, 3, PLATES>,
+        axes_b: &[Vector3<f32>; PLATES],
+        [scale, direction]: [f32; 2],
+    ) {
+        let (across, more_along) = (square(direction), square(scale) - square(direction));
+        for row in &mut self.drivers[GYRO_MATRIX..] {
+            row[GYRO_MATRIX..].fill(0.0);
+        }
+        let parts = <[[f32; 3]; PLATES]>::from(*least_squares);
+        let axes = axes_b.map(<[f32; 3]>::from);
+        for (part, axis) in parts.iter().zip(&axes) {
+            // Of each element of the matrix: what least squares make of this gyro, and its axis.
+            let elements: [(f32, f32, usize); 9] = core::array::from_fn(|k| (part[k / 3], axis[k % 3], k % 3));
+            for (row, (a, n, column)) in self.drivers.iter_mut().skip(GYRO_MATRIX).zip(&elements) {
+                for (sum, (a_2, n_2, column_2)) in row.iter_mut().skip(GYRO_MATRIX).zip(&elements) {
+                    let same = if column == column_2 { across } else { 0.0 };
+                    *sum += a * a_2 * (same + more_along * n * n_2);
+                }
+            }
+        }
+    }
+
+    /// A driver is known with this variance, and what goes with it is known better too: `P <- P - p p' (p_k - v)/p_k^2`, `p` its
+    /// column. By how much each driver changes for a change of one of it; `None` if it was known as well.
+    pub(super) fn learn_driver(&mut self, driver: usize, variance: f32) -> Option<[f32; DRIVERS]> {
+        let drivers = *self.drivers.get(driver)?;
+        let before = *drivers.get(driver)?;
+        let better = variance < before;
+        if !better {
+            return None;
+        }
+        let mut driven = [0.0; DRIVEN];
+        for (element, row) in driven.iter_mut().zip(&self.across) {
+            *element = *row.get(driver)?;
+        }
+        let column = State { driven, drivers };
+        let seen = Seen {
+            column,
+            variance: before * before / (before - variance),
+        };
+        self.update(&seen, &Seen::NOTHING);
+        Some(column.drivers.map(|part| part / before))
+    }
+
     /// Nothing known of the attitude.
     pub(super) fn forget_attitude(&mut self) {
         let unknown = square(core::f32::consts::PI);
@@ -266,11 +310,14 @@ impl Covariance {
     }
 
     pub(super) fn forget_driver(&mut self, k: usize, variance: f32) {
-        for row in self.across.iter_mut().chain(&mut self.drivers) {
-            row[k] = 0.0;
+        let column = self.across.iter_mut().chain(&mut self.drivers);
+        column
+            .filter_map(|row| row.get_mut(k))
+            .for_each(|element| *element = 0.0);
+        if let Some(row) = self.drivers.get_mut(k) {
+            *row = [0.0; DRIVERS];
+            row.iter_mut().skip(k).take(1).for_each(|own| *own = variance);
         }
-        self.drivers[k] = [0.0; DRIVERS];
-        self.drivers[k][k] = variance;
     }
 
     /// Raises what fell below its floor. `false` if a variance had become negative: rounding has won.

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector2, Vector3};
 
 use super::{Covariance, Filter, pending::Pending, spell::Spell, state::GYRO_MATRIX, window::Window};
+use crate::geometry::PLATES;
 
 /// Attitude and bias, and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +40,10 @@ impl Filter {
         self.pending = Pending::nothing();
         self.covariance.take_over(&known.covariance, self.params.velocity_sd);
         for row in 0..3 {
-            if self.covariance.knows_spin(row, known.sees_spin_variance[row]) {
-                self.gyro_matrix[(row, 0)] = known.sees_spin_b[row];
+            let driver = GYRO_MATRIX + 3 * row;
+            let change = known.sees_spin_b[row] - self.gyro_matrix[(row, 0)];
+            if let Some(with_it) = self.covariance.learn_driver(driver, known.sees_spin_variance[row]) {
+                self.gyro_matrix += Matrix3::from_row_slice(&with_it[GYRO_MATRIX..]) * change;
             }
         }
         self.iron.take_over(known.iron_b, &known.iron_covariance);
@@ -58,6 +61,23 @@ impl Filter {
         self.keep_finite();
     }
 
+    /// What is known of the gyros beforehand: each one's scale and direction are off by themselves, with these standard deviations, and
+    /// the rate is made of all by `least_squares`. So the elements of the matrix go together: with directions alone its trace is
+    /// zero, if the axes are those of a tetrahedron, and what the spin shows of one column tells of the others.
+    ///
+    /// ```text
+    /// M = sum a_k d_k',  cov d_k = direction^2 (1 - n_k n_k') + scale^2 n_k n_k'
+    /// ```
+    #[inline(never)]
+    pub fn know_gyros(
+        &mut self,
+        least_squares: &SMatrix<f32, 3, PLATES>,
+        axes_b: &[Vector3<f32>; PLATES],
+        sd: [f32; 2],
+    ) {
+        self.covariance.know_gyros(least_squares, axes_b, sd);
+    }
+
     /// Forgets all but its parameters.
     pub fn forget(&mut self) {
         self.begin_anew();
@@ -70,16 +90,5 @@ impl Covariance {
         self.align(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
         self.forget_velocity(velocity_sd);
         self.set_bias(covariance);
-    }
-
-    /// What the first column of the gyro matrix has in this row is known with this variance, and independent of the rest; `false` if
-    /// it was known better.
-    fn knows_spin(&mut self, row: usize, variance: f32) -> bool {
-        let driver = GYRO_MATRIX + 3 * row;
-        let better = variance < self.of_driver_itself(driver);
-        if better {
-            self.forget_driver(driver, variance);
-        }
-        better
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! Each unit is told a field that is off by what a model is: each component by a normal number of
 //! [`FIELD_OFF_UT`]. Its vehicle has hard iron as large as the crew says that swinging leaves of it
-//! ([`Launch::iron_sd_ut`]), which turns with the spin. Rough flights are as [`Levels`] has them, and their gyros feel force.
+//! ([`Launch::iron_sd_ut`]), which turns with the spin. Its gyros' scales and directions are off as the set that all fly with says
+//! ([`gyros`]). Rough flights are as [`Levels`] has them, and their gyros feel force.
 //!
 //! The error is the rotation vector from the attitude that the unit sent to the truth at the same instant, in n. Total: root mean
 //! square of its length over all packets of a phase and all units. Nose: the same of the angle between the two x axes. Said: the root
@@ -17,6 +18,7 @@ use std::{env, error::Error, fs, sync::Arc, sync::Mutex, thread};
 
 use chart::{Axis, Block, Figure, Layer, Marks, Panel, html};
 use emems::{
+    calibration::{Ranges, Set},
     derived::{self, DERIVED_BYTES, Derived},
     estimate::{Launch, Site},
     unit::Settings,
@@ -110,16 +112,19 @@ fn told(seed: u64, levels: Option<Levels>) -> Site {
     }
 }
 
-/// A flight in a vehicle with hard iron.
+/// A flight in a vehicle with hard iron, by a unit whose gyros are off.
 struct InVehicle<T> {
     source: T,
     iron_b_ut: Vector3<f64>,
+    /// Of the rate, what the gyros have beyond it.
+    gyros: Matrix3<f64>,
 }
 
 impl<T: TruthSource> TruthSource for InVehicle<T> {
     fn at(&self, t_s: f64) -> Truth {
         let mut truth = self.source.at(t_s);
         truth.field_b_ut += self.iron_b_ut;
+        truth.rate_b += self.gyros * truth.rate_b;
         truth
     }
 
@@ -133,6 +138,23 @@ fn iron_b_ut(seed: u64, site: &Site) -> Vector3<f64> {
     let sd_ut = site.launch.map_or(0.0, |launch| f64::from(launch.iron_sd_ut));
     let drawn = Noise::new(seed).stream(0x1204);
     Vector3::from_fn(|axis, _| sd_ut * drawn.normal(axis as u64))
+}
+
+/// What the gyros of this unit have of the rate beyond it: each one's scale and direction are off by normal numbers with the deviations
+/// of the set. It is what least squares over the four make of that; what they would disagree on beside is left out.
+fn gyros(seed: u64, set: &Set) -> Matrix3<f64> {
+    let drawn = Noise::new(seed).stream(0x6_9705);
+    let [_, _, sd] = set.uncertainty;
+    let [scale, direction] = [sd.scale, sd.direction].map(f64::from);
+    let axes_b = set.gyro.map(|axis| axis.axis_b.map(f64::from));
+    let off = |(k, axis_b): (u64, &Vector3<f64>)| {
+        let normal = Vector3::from_fn(|axis, _| drawn.normal(3 * k + axis as u64));
+        let along = axis_b * axis_b.dot(&normal);
+        axis_b * ((normal - along) * direction + along * scale).transpose()
+    };
+    let squares: Matrix3<f64> = axes_b.iter().map(|axis_b| axis_b * axis_b.transpose()).sum();
+    let solved = squares.try_inverse().expect("four axes of a tetrahedron span space");
+    solved * (0..).zip(&axes_b).map(off).sum::<Matrix3<f64>>()
 }
 
 /// Flies the unit of this seed.
@@ -149,6 +171,7 @@ fn fly(seed: u64, levels: Option<Levels>) -> Vec<Sent> {
             environment,
         },
         iron_b_ut: iron_b_ut(seed, &settings.site),
+        gyros: gyros(seed, &Set::compiled_in(Ranges::of(&settings))),
     };
     let world: Arc<dyn TruthSource> = match levels {
         Some(levels) => Arc::new(Rough::new(smooth, LIFT_OFF_S, levels, seed)),
