@@ -141,13 +141,13 @@ mod tests {
             for part in 0..2 {
                 let chance: f64 = StandardNormal.sample(&mut random);
                 let old = row > 0 && is_old(part, row, statrs::function::erf::erf(chance.abs() / 2f64.sqrt()));
-                for index in 3 * part..3 * part + 3 {
+                for (index, before) in before.iter_mut().enumerate().skip(3 * part).take(3) {
                     let noise: f64 = StandardNormal.sample(&mut random);
                     let fresh =
                         0.1 * (2.0 * noise + moved * (f64::from(row) * (0.11 + 0.02 * index as f64)).sin()).round();
-                    before[index] = if old { before[index] } else { fresh };
+                    *before = if old { *before } else { fresh };
                     log.channels[index].rows.push(row);
-                    log.channels[index].values.push(before[index]);
+                    log.channels[index].values.push(*before);
                 }
             }
         }
