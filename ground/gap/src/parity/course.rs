@@ -16,7 +16,10 @@ use twin::{
 
 use crate::{
     input::log::Log,
-    parity::spline::{Sample, Spline},
+    parity::{
+        spline::{Sample, Spline},
+        turning::Holes,
+    },
 };
 
 /// \[s\] between the states of the scene; no part has a faster low-pass than some of these.
@@ -72,6 +75,8 @@ pub struct Start {
     pub knot_s: f64,
     /// [m/s2] row by row, how far the acceleration may be off nothing.
     pub acc_sigmas: Vec<f64>,
+    /// Where nobody knows how fast the unit turned.
+    pub holes: Holes,
     rates: Spline<3>,
     /// [rad/s] what gravity and field add to the rates.
     towards: Spline<3>,
@@ -98,6 +103,7 @@ impl Start {
             span_s,
             knot_s,
             acc_sigmas: vec![1.0; rows],
+            holes: Holes::default(),
             rates: none(),
             towards: none(),
         }
@@ -192,6 +198,7 @@ impl Course {
             knot_s,
             towards: turned.towards(span_s),
             acc_sigmas: goes_nowhere(&forces_n, &log.start_s, environment.gravity),
+            holes: Holes::default(),
             rates,
         };
         (course, start)

@@ -21,7 +21,7 @@ use crate::{
         known::Known,
         phases::{self, Stretch},
         smooth::rests::rests,
-        turning,
+        turning::Holes,
     },
 };
 
@@ -55,6 +55,8 @@ pub struct Flight {
     pub thinned: usize,
     /// Rows of the fit windows that were left out because nobody knows how fast the unit turned.
     pub unturned: usize,
+    /// Where such rows are.
+    pub holes: Holes,
     /// How it was parted where its file does not say it.
     pub windows: Option<Windows>,
 }
@@ -81,11 +83,12 @@ impl Flight {
             return Err(CaseError::key(&opened.file, "windows.fit", problem));
         }
         let windowed = rows.len();
-        let rows = turning::known(&log, &unit, rows, LEAST_ROWS);
+        let holes = Holes::of(&log, &unit);
+        let rows = holes.without(rows, LEAST_ROWS);
         let unturned = windowed - rows.len();
         let thinned = rows.len().div_ceil(MOST_ROWS).max(1);
         let rows: Vec<usize> = rows.into_iter().step_by(thinned).collect();
-        let held = turning::known(&log, &unit, self::rows(&log, windows.hold()), LEAST_ROWS);
+        let held = holes.without(self::rows(&log, windows.hold()), LEAST_ROWS);
         let every = held.len().div_ceil(MOST_ROWS).max(1);
         let held: Vec<usize> = held.into_iter().step_by(every).collect();
         let phases = match &opened.text.phases {
@@ -105,6 +108,7 @@ impl Flight {
             environment,
             thinned,
             unturned,
+            holes,
         })
     }
 

@@ -20,6 +20,7 @@ use crate::{
         known::Known,
         smooth::{self, About, Smoothed, smoothing::Smoothing},
         space::Space,
+        turning::Holes,
     },
 };
 
@@ -46,7 +47,8 @@ impl Followed {
         let (mut log, mut unit) = (log.clone(), flight.unit.clone());
         codes::taken_out(&mut log, &mut unit, coded);
         let environment = flight.environment;
-        let (course, start) = Course::of(&log, &unit, &environment);
+        let (course, mut start) = Course::of(&log, &unit, &environment);
+        start.holes.clone_from(&flight.holes);
         Self {
             course,
             smoothed: OnceCell::new(),
@@ -100,9 +102,9 @@ impl Followed {
         smoothed.twin(&self.log, &self.unit, &self.environment)
     }
 
-    /// \[s\] between the knots of its course.
-    pub fn knot_s(&self) -> f64 {
-        self.start.knot_s
+    /// Where nobody knows how fast it turned.
+    pub fn holes(&self) -> &Holes {
+        &self.start.holes
     }
 
     /// All of the log.

@@ -56,7 +56,7 @@ use crate::{
             trajectory::{State, Trajectory},
         },
         space::Space,
-        turning,
+        turning::Holes,
     },
 };
 
@@ -205,7 +205,7 @@ impl Smoothed {
         let motion = self.smoothing(&problem, course.0, course.1);
         let space = Space::new(&problem, &motion, Vec::new());
         let mut now = self.at(&problem, log, course)?;
-        let pieces = turning::pieces(&log.start_s, about.start.knot_s);
+        let pieces = about.start.holes.pieces(&log.start_s);
         let mut turned = 0.0;
         while self.turns.len() < until && turned < LINEAR_RAD && !self.is_settled() {
             progress(self.turns.len() as f64 / MOST_STEPS as f64);
@@ -273,8 +273,8 @@ impl Smoothed {
     /// \[s\] pieces of a log that nothing ties to the others, and in which the unit falls: there no sensor shows a turn about the field, and
     /// the rotation of the Earth, the one thing left that does, has a curvature that a step takes for another. An attitude
     /// that is told there ties it.
-    pub fn lost(&self, starts_s: &[f64], knot_s: f64) -> Vec<(f64, f64)> {
-        let pieces = turning::pieces(starts_s, knot_s);
+    pub fn lost(&self, starts_s: &[f64], holes: &Holes) -> Vec<(f64, f64)> {
+        let pieces = holes.pieces(starts_s);
         if pieces.len() < 2 {
             return Vec::new();
         }

@@ -1,6 +1,6 @@
 //! Rows in which nobody knows how fast the unit turns: too many gyros stand at their stops.
 //!
-//! In: a log, its unit, rows of it. Out: those in which the rate is known, and how many are not.
+//! In: a log and its unit. Out: [`Holes`], the rows that are left out, and the pieces of a log that they part.
 //!
 //! Everything here is linear about a rate: a packet's unknowns are small changes of it, and samples of one packet lie some tenths of a
 //! second apart. Of a clipped gyro the log keeps no sample. Where those that are left do not span three axes for longer than a spline
@@ -9,6 +9,8 @@
 //! beside it. So such rows are left out, and [`BESIDE`] to either side, whose splines are held by rows that are gone.
 //!
 //! A gyro that clips below what its description says has samples, at another stop; its rows stay.
+
+use std::ops::Range;
 
 use nalgebra::Matrix3;
 use twin::predict::{Kind, UnitDescription};
@@ -25,38 +27,57 @@ const BESIDE: usize = 2;
 /// they lie in a plane; five degrees beside one the rate is eleven times as uncertain as along the others.
 const SPANS: f64 = 0.01;
 
-/// Of these rows, those in which the rate is known. All of them where the unit's gyros never tell a rate, and where fewer than `least` are left.
-pub fn known(log: &Log, unit: &UnitDescription, rows: Vec<usize>, least: usize) -> Vec<usize> {
-    let mut axes = vec![Matrix3::<f64>::zeros(); log.start_s.len()];
-    for (channel, series) in unit.channels.iter().zip(&log.channels) {
-        if channel.sensor == Kind::Gyro {
-            let square = channel.axis_b * channel.axis_b.transpose();
-            series.rows.iter().for_each(|row| axes[*row as usize] += square);
-        }
-    }
-    let is_told: Vec<bool> = axes
-        .iter()
-        .map(|sum| sum.symmetric_eigenvalues().min() > SPANS)
-        .collect();
-    let mut is_kept = vec![true; is_told.len()];
-    let mut from = 0;
-    for stretch in is_told.chunk_by(|one, other| one == other) {
-        let to = from + stretch.len();
-        if !stretch[0] && stretch.len() > BRIDGED {
-            is_kept[from.saturating_sub(BESIDE)..(to + BESIDE).min(is_told.len())].fill(false);
-        }
-        from = to;
-    }
-    let kept: Vec<usize> = rows.iter().copied().filter(|row| is_kept[*row]).collect();
-    if kept.len() < least { rows } else { kept }
+/// Stretches of a log in which nobody knows the rate.
+#[derive(Clone, Debug, Default)]
+pub struct Holes {
+    rows: Vec<Range<usize>>,
+    /// \[s\] the start of the first row of each and of its last.
+    spans_s: Vec<(f64, f64)>,
 }
 
-/// \[s\] pieces of rows between which some were left out: within a piece they lie as close as a spline bridges.
-pub fn pieces(starts_s: &[f64], step_s: f64) -> Vec<(f64, f64)> {
-    // What is left out is at least a stretch that is not bridged, and its neighbours: between those that stay lies a step more.
-    let least_s = (BRIDGED + 2 * BESIDE) as f64 * step_s + 1.5 * step_s;
-    let pieces = starts_s.chunk_by(|one, next| next - one < least_s);
-    pieces.map(|own| (own[0], own[own.len() - 1])).collect()
+impl Holes {
+    /// Of a log.
+    pub fn of(log: &Log, unit: &UnitDescription) -> Self {
+        let mut axes = vec![Matrix3::<f64>::zeros(); log.start_s.len()];
+        for (channel, series) in unit.channels.iter().zip(&log.channels) {
+            if channel.sensor == Kind::Gyro {
+                let square = channel.axis_b * channel.axis_b.transpose();
+                series.rows.iter().for_each(|row| axes[*row as usize] += square);
+            }
+        }
+        let is_told: Vec<bool> = axes
+            .iter()
+            .map(|sum| sum.symmetric_eigenvalues().min() > SPANS)
+            .collect();
+        let mut rows = Vec::new();
+        let mut from = 0;
+        for stretch in is_told.chunk_by(|one, other| one == other) {
+            let to = from + stretch.len();
+            if !stretch[0] && stretch.len() > BRIDGED {
+                rows.push(from.saturating_sub(BESIDE)..(to + BESIDE).min(is_told.len()));
+            }
+            from = to;
+        }
+        let span_s = |rows: &Range<usize>| (log.start_s[rows.start], log.start_s[rows.end - 1]);
+        Self {
+            spans_s: rows.iter().map(span_s).collect(),
+            rows,
+        }
+    }
+
+    /// Of these rows, those in which the rate is known. All of them where fewer than `least` are left: there the unit's gyros never tell a rate.
+    pub fn without(&self, rows: Vec<usize>, least: usize) -> Vec<usize> {
+        let is_known = |row: &usize| self.rows.iter().all(|hole| !hole.contains(row));
+        let kept: Vec<usize> = rows.iter().copied().filter(is_known).collect();
+        if kept.len() < least { rows } else { kept }
+    }
+
+    /// \[s\] pieces of rows between which a hole was left out. Windows that are parted and packets that were lost part nothing.
+    pub fn pieces(&self, starts_s: &[f64]) -> Vec<(f64, f64)> {
+        let is_whole = |one: &f64, next: &f64| !self.spans_s.iter().any(|(from_s, to_s)| one < from_s && to_s < next);
+        let pieces = starts_s.chunk_by(is_whole);
+        pieces.map(|own| (own[0], own[own.len() - 1])).collect()
+    }
 }
 
 /// Whether an instant lies in a hole between two pieces.
@@ -89,7 +110,7 @@ mod tests {
 
     fn left(has: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         let unit = emems(thesis_slot_s);
-        known(&log(&unit, has), &unit, (0..40).collect(), 16)
+        Holes::of(&log(&unit, has), &unit).without((0..40).collect(), 16)
     }
 
     #[test]
@@ -109,15 +130,24 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_parted_by_what_is_left_out_and_not_by_lost_packets() {
+    fn pieces_are_parted_by_what_is_left_out_and_not_by_lost_packets_or_windows() {
+        let unit = emems(thesis_slot_s);
+        let holes = Holes::of(&log(&unit, |_, row| !(20..23).contains(&row)), &unit);
         let starts = |rows: &[usize]| -> Vec<f64> { rows.iter().map(|row| 0.2 * *row as f64).collect() };
-        let holed = starts(&left(|_, row| !(20..23).contains(&row)));
-        let found = pieces(&holed, 0.2);
+        let every: Vec<usize> = (0..40).collect();
+        let found = holes.pieces(&starts(&holes.without(every.clone(), 16)));
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(
             is_in_hole(&found, 4.3) && !is_in_hole(&found, 3.1) && !is_in_hole(&found, 5.1) && !is_in_hole(&found, 9.0)
         );
-        let lost: Vec<usize> = (0..40).filter(|row| !(20..23).contains(row)).collect();
-        assert_eq!(pieces(&starts(&lost), 0.2).len(), 1);
+        // Windows to either side of a hole are parted by it, and two on one side are not.
+        let behind: Vec<usize> = (0..10).chain(27..40).collect();
+        assert_eq!(holes.pieces(&starts(&behind)).len(), 2);
+        let parted: Vec<usize> = (0..5).chain(12..18).collect();
+        assert_eq!(holes.pieces(&starts(&parted)).len(), 1);
+        // Where the rows stay after all nothing is parted.
+        assert_eq!(holes.pieces(&starts(&every)).len(), 1);
+        let lost: Vec<usize> = every.iter().copied().filter(|row| !(5..18).contains(row)).collect();
+        assert_eq!(Holes::default().pieces(&starts(&lost)).len(), 1);
     }
 }

@@ -19,18 +19,17 @@ use crate::{
         },
         smooth::{About, Smoothed, covariances, fit},
         space::Space,
-        turning,
     },
 };
 
 impl Smoothed {
-    /// Takes in what is known. Where packets were left out ([`turning`]) nobody knows how the velocity changed, and a track and a simulated
+    /// Takes in what is known. Where packets were left out ([`crate::parity::turning`]) nobody knows how the velocity changed, and a track and a simulated
     /// trajectory run through it: neither is used.
     ///
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn hold(&mut self, known: &Known, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
-        let is_whole = turning::pieces(&about.log.start_s, about.start.knot_s).len() == 1;
+        let is_whole = about.start.holes.pieces(&about.log.start_s).len() == 1;
         if let Some(simulated) = known.simulated.as_ref().filter(|_| is_whole) {
             self.believe(simulated, about, progress)?;
         }

@@ -101,7 +101,7 @@ pub fn priors<'a>(
             .partition_point(|start_s| *start_s < t_s)
             .min(starts_s.len() - 1)
     };
-    let pieces = turning::pieces(starts_s, start.knot_s);
+    let pieces = start.holes.pieces(starts_s);
     let one = move |t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64| {
         self::row(knots, t_s, terms, sigma, is)
     };

@@ -104,7 +104,7 @@ impl Told {
             }
             None => covariances(&space, motion, &log.start_s),
         };
-        let lost = smoothed.lost(&log.start_s, followed.knot_s());
+        let lost = smoothed.lost(&log.start_s, followed.holes());
         let is_lost = |t_s: f64| lost.iter().any(|(from_s, to_s)| (*from_s..=*to_s).contains(&t_s));
         told.attitudes = (log.start_s.iter().zip(&covariances))
             .filter(|(t_s, _)| !is_lost(**t_s))
