@@ -259,7 +259,7 @@ thresholds! {
     CERTAIN: f64 = 32.0, in "nats",
         larger: "plain small effects get no names",
         smaller: "what every real recording has gets names",
-        Derived("an effect of ratio 8, the least that a name is asked for, is worth 8 x 8 / 2; healthy recordings have up to 23");
+        Derived("an effect of ratio 8, the least that a name is asked for, is worth 8 x 8 / 2; healthy recordings have up to 23, and two effects that take each other back 34");
     /// Step that multiplies those odds by e.
     DOUBT_STEP: f64 = 3.0, in "nats",
         larger: "a softer threshold",

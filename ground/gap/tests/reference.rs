@@ -2,14 +2,14 @@
 
 mod gyros;
 
-use std::fs;
+use std::{f64::consts::TAU, fs};
 
 use gap::{
     input::case::Subject,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     search::readings::Chosen,
-    unknown::{recognised::recognised, remainder::Setting},
+    unknown::{fast::within_stretches, recognised::recognised, remainder::Setting},
 };
 use gyros::{diagnosed_in, erring, rate};
 use tempfile::TempDir;
@@ -24,21 +24,25 @@ fn beside_reference(error: impl Fn(f64) -> f64) -> TempDir {
     folder
 }
 
+/// What is left is judged with nothing found on the scatter.
+fn setting(subject: &Subject) -> Setting<'_> {
+    Setting {
+        slow: &subject.slow,
+        bars: &subject.bars,
+        louder: &[1.0; 3],
+        scattered: &[],
+        wandering: &[],
+    }
+}
+
 /// What is recognised where nothing was found, by name.
 fn seen(error: impl Fn(f64) -> f64) -> Option<(&'static str, Chosen)> {
     let folder = beside_reference(error);
     let subject = Subject::open(folder.path()).expect("opens");
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let library = Library::new(&problem, &[], &|_| {});
-    let setting = Setting {
-        slow: &subject.slow,
-        bars: &subject.bars,
-        louder: &[1.0; 3],
-        scattered: &[],
-        wandering: &[],
-    };
     let quiet = Model::around(&problem, Vec::new());
-    let chosen = recognised(&problem, &library, &quiet, &[], &setting)?;
+    let chosen = recognised(&problem, &library, &quiet, &[], &setting(&subject))?;
     Some((library.hypotheses[chosen.hypothesis].effect(), chosen))
 }
 
@@ -55,6 +59,25 @@ fn a_slow_error_with_the_law_of_an_effect_is_recognised_and_another_is_not() {
     let other = seen(switched).map(|(name, _)| name);
     assert_eq!(other, None);
     assert!(seen(|_| 0.0).is_none());
+}
+
+/// What counts against a name beside such a reference: a tone of seven sigmas, and not as much that is slow, which courses judge.
+#[test]
+fn what_is_fast_has_energy_within_stretches_and_what_is_slow_has_not() {
+    let energy = |error: &dyn Fn(f64) -> f64| {
+        let folder = beside_reference(error);
+        let subject = Subject::open(folder.path()).expect("opens");
+        let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+        let floor: Vec<Vec<f64>> = problem.sigmas.iter().map(|own| vec![1.0; own.len()]).collect();
+        let quiet = Model::around(&problem, Vec::new());
+        within_stretches(&problem, &quiet, &floor, &setting(&subject))
+    };
+    let fast = energy(&|t_s| 0.03 * (TAU * 1.9 * t_s).sin());
+    let slow = energy(&|t_s| 0.03 * (TAU * 0.02 * t_s).sin());
+    // 600 rows in stretches of two, of which a tone at 1.9 of 5 Hz keeps nine tenths: half of (0.03/0.003)^2 each.
+    assert!((20_000.0..30_000.0).contains(&fast[2]), "{fast:?}");
+    assert_eq!([fast[0], fast[1]], [0.0; 2]);
+    assert!(slow[2] < 0.02 * fast[2], "{slow:?}");
 }
 
 /// A gyro that bends by a hundredth at a radian per second is a quarter of its noise and certain; by three quarters of that it is still

@@ -4,10 +4,11 @@
 //! oftener than they do by chance.
 //!
 //! A sample that is a few steps wide repeats by chance, on one axis in ten or fifty. All axes of a part do so with the product of these
-//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. That leaves
-//! out what rest in shorter times brings, and rows that the logger wrote twice say how often it does so; so what is expected is taken
-//! [`SPREAD`] times, with them. With `c` repeats where `e` are expected chance has `c ln(c/e) - c + e` nats against it (Chernoff's bound of
-//! Poisson's tail). Whether the motion was followed does not matter, and of rows that were thinned it cannot be seen.
+//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Rows that the
+//! logger wrote twice say how often it does so, and are expected too. With `c` repeats where `e` are expected chance has
+//! `c ln(c/e) - c + e` nats against it (Chernoff's bound of Poisson's tail). Rests shorter than a stretch still bring more than is expected
+//! (gyros of six healthy recordings repeat 0.7 to 1.2 times as often), so a repeat has to be likelier old than not too, `(c - e)/c`.
+//! Whether the motion was followed does not matter, and of rows that were thinned it cannot be seen.
 //!
 //! Refuses nothing. Not looked at: units that send codes (the search for effects on the scatter knows their steps), parts with fewer than
 //! three axes, of which one repeats too often, and magnetometers, which are often read oftener than they measure.
@@ -16,7 +17,7 @@ use twin::predict::{Kind, UnitDescription};
 
 use crate::{
     input::log::{Log, Series},
-    thresholds::REPEATS_CHANCE,
+    thresholds::{REPEATS_CHANCE, SAID},
 };
 
 /// Axes of a part that are taken together.
@@ -24,9 +25,6 @@ const AXES: usize = 3;
 
 /// Rows over which axes repeat alike: of 32 to 300 all say the same of six recordings.
 const STRETCH: usize = 64;
-
-/// How many times what chance brings is expected. Gyros of six healthy recordings repeat 0.7 to 1.2 times as often.
-const SPREAD: f64 = 2.0;
 
 /// A part that sends samples twice.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,8 +66,8 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
             rows.len() as f64 * channels.iter().map(share).product::<f64>()
         };
         let chance: f64 = rows.chunks(STRETCH).map(by_chance).sum();
-        let expected = SPREAD * (chance + by_logger + 1.0);
-        let nats = if count > expected {
+        let expected = chance + by_logger + 1.0;
+        let nats = if count - expected >= SAID * count {
             count * (count / expected).ln() - count + expected
         } else {
             0.0

@@ -174,6 +174,23 @@ mod tests {
     }
 
     #[test]
+    fn beside_a_parameter_that_is_held_the_other_is_what_it_is_without_it() {
+        let residual = DVector::from_fn(50, |row, _| (row as f64 * 0.3).sin());
+        let both = Joint::new(vec![columns(0.1)], &[0.5, 2.0]);
+        let held = both.fit_beside(std::slice::from_ref(&residual), &[Some(0.7), None]);
+        // The same by taking the first off the residual and having the second alone.
+        let Columns { nuisance, effects } = columns(0.1);
+        let alone = Columns {
+            nuisance,
+            effects: effects.columns(1, 1).into_owned(),
+        };
+        let expected = Joint::new(vec![alone], &[2.0]).fit(&[residual - effects.column(0) * 0.7]);
+        assert_eq!(held.parameters[0], 0.7);
+        assert!((held.parameters[1] - expected.parameters[0]).abs() < ROUNDING);
+        assert!((&held.rest[0] - &expected.rest[0]).norm() < ROUNDING);
+    }
+
+    #[test]
     fn what_cannot_be_fitted_has_parameters_and_a_covariance_nevertheless() {
         let mut broken = columns(0.1);
         broken.effects[(3, 0)] = f64::NAN;
