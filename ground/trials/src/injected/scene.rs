@@ -76,6 +76,22 @@ impl Scene {
             .collect()
     }
 
+    /// The same at the instants of a sensor, a slot beside those of the rows.
+    pub fn followed_by(&self, sensor: usize) -> Vec<(UnitQuaternion<f64>, Vector3<f64>)> {
+        let rows = self.followed();
+        let last = rows.len().saturating_sub(1);
+        let at = |row: usize| {
+            let instant = (row as f64 + self.sensors[sensor].slot_s / self.step_s).clamp(0.0, last as f64);
+            let (from, part) = (instant as usize, instant.fract());
+            let [(q_nb, place_n), (q_next, place_next)] = [rows[from], rows[(from + 1).min(last)]];
+            (
+                q_nb.try_slerp(&q_next, part, 1e-9).unwrap_or(q_nb),
+                place_n.lerp(&place_next, part),
+            )
+        };
+        (0..rows.len()).map(at).collect()
+    }
+
     /// Notes a size of each axis of a sensor.
     pub fn sizes_of(&mut self, parameter: &str, sensor: usize, values: &Vector3<f64>) {
         let names = self.sensors[sensor].names.clone();

@@ -104,7 +104,8 @@ fn field_gradient(scene: &mut Scene, draw: &mut Draw, strength: f64) -> Vec<Stri
     let half: Matrix3<f64> = Matrix3::from_fn(|_, _| strength * 2.0 * draw.normal());
     let whole = half + half.transpose();
     let gradient_n = whole - Matrix3::identity() * (whole.trace() / 3.0);
-    let followed = scene.followed();
+    // Where the magnetometer was when it measured, a slot before the row.
+    let followed = scene.followed_by(sensor);
     let middle = followed.iter().map(|one| one.1).sum::<Vector3<f64>>() / followed.len() as f64;
     each(scene, &[sensor], |row, field| {
         let (q_nb, place_n) = followed[row];
