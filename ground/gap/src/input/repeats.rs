@@ -4,8 +4,9 @@
 //! oftener than they do by chance.
 //!
 //! A sample that is a few steps wide repeats by chance, on one axis in ten or fifty. All axes of a part do so with the product of these
-//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Rows that the
-//! logger wrote twice say how often it does so, and are expected too. With `c` repeats where `e` are expected chance has
+//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Rows in which
+//! another part repeats too are the logger's, which wrote them twice, and are not looked at. Those in which every part does so say how often it
+//! does: one part may have been changed since. With `c` repeats where `e` are expected chance has
 //! `c ln(c/e) - c + e` nats against it (Chernoff's bound of Poisson's tail). Rests shorter than a stretch still bring more than is expected
 //! (gyros of six healthy recordings repeat 0.7 to 1.2 times as often), so a repeat has to be likelier old than not too, `(c - e)/c`.
 //! Whether the motion was followed does not matter, and of rows that were thinned it cannot be seen.
@@ -44,19 +45,20 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
     if unit.channels.iter().any(|channel| channel.bits.is_some()) {
         return None;
     }
-    let parts = parts(unit);
+    let parts = parts(unit, &[Kind::Accelerometer, Kind::Gyro]);
+    let every = self::parts(unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
     let repeated: Vec<Vec<bool>> = (log.channels.iter())
         .map(|series| repeated(series, log.start_s.len()))
         .collect();
     let rows: Vec<usize> = (0..log.start_s.len()).collect();
     let all_of = |row: usize, channels: &[usize]| channels.iter().all(|channel| repeated[*channel][row]);
-    // Rows in which every part repeats are the logger's, unless there is but one part.
+    let is_of_another = |row: usize, part: &[usize]| every.iter().any(|other| other != part && all_of(row, other));
     let whole = |row: usize| parts.len() > 1 && parts.iter().all(|part| all_of(row, part));
     let by_logger = rows.iter().filter(|row| whole(**row)).count() as f64;
     let of_part = |channels: &Vec<usize>| {
         let count = rows
             .iter()
-            .filter(|row| all_of(**row, channels) && !whole(**row))
+            .filter(|row| all_of(**row, channels) && !is_of_another(**row, channels))
             .count() as f64;
         let by_chance = |rows: &[usize]| {
             let share = |channel: &usize| {
@@ -72,7 +74,13 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
         } else {
             0.0
         };
-        let samples = log.channels[channels[0]].rows.len().max(1) as f64;
+        let is_looked_at = |row: &&u32| !is_of_another(**row as usize, channels);
+        let samples = log.channels[channels[0]]
+            .rows
+            .iter()
+            .filter(is_looked_at)
+            .count()
+            .max(1) as f64;
         Repeats {
             channels: channels.clone(),
             share: (count - chance).max(0.0) / samples,
@@ -95,8 +103,8 @@ fn repeated(series: &Series, rows: usize) -> Vec<bool> {
     repeated
 }
 
-/// Channels of each part: those of one kind in one group.
-fn parts(unit: &UnitDescription) -> Vec<Vec<usize>> {
+/// Channels of each part of some kinds: those of one kind in one group.
+fn parts(unit: &UnitDescription, kinds: &[Kind]) -> Vec<Vec<usize>> {
     let of = |kind: Kind| {
         unit.groups().into_iter().map(move |group| {
             let channels = unit.channels.iter().enumerate();
@@ -104,8 +112,7 @@ fn parts(unit: &UnitDescription) -> Vec<Vec<usize>> {
             own.map(|(index, _)| index).collect::<Vec<usize>>()
         })
     };
-    [Kind::Accelerometer, Kind::Gyro]
-        .into_iter()
+    (kinds.iter().copied())
         .flat_map(of)
         .filter(|part| part.len() >= AXES)
         .collect()
@@ -119,24 +126,25 @@ mod tests {
 
     const ROWS: u32 = 6000;
 
-    /// An accelerometer and a gyro, a noise of two steps, at rest in every second stretch; `is_old` says of part and row whether the row
+    /// An accelerometer, a gyro and a magnetometer, a noise of two steps, at rest in every second stretch; `is_old` says of part and row whether the row
     /// before is sent again, with some number between none and one.
     fn found(is_old: impl Fn(usize, u32, f64) -> bool) -> Vec<Repeats> {
         let mut text = "name = \"x\"\ncycle_s = 0.01\n".to_owned();
-        for (index, sensor) in ["accelerometer", "gyro"].iter().flat_map(|one| [one; 3]).enumerate() {
+        let sensors = ["accelerometer", "gyro", "magnetometer"];
+        for (index, sensor) in sensors.iter().flat_map(|one| [one; 3]).enumerate() {
             text += &format!(
                 "[[channel]]\nname = \"c{index}\"\nsensor = \"{sensor}\"\ngroup = \"unit\"\naxis_b = [1.0, 0.0, 0.0]\nlsb = 1.0\n\
                  noise_sigma = 0.2\n"
             );
         }
         let unit = UnitDescription::read(&text, "unit.toml").expect("a unit");
-        let mut log = Log::empty(6);
+        let mut log = Log::empty(9);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
-        let mut before = [0.0; 6];
+        let mut before = [0.0; 9];
         for row in 0..ROWS {
             log.start_s.push(0.01 * f64::from(row));
             let moved = if row / 500 % 2 == 0 { 0.0 } else { 3.0 };
-            for part in 0..2 {
+            for part in 0..3 {
                 let chance: f64 = StandardNormal.sample(&mut random);
                 let old = row > 0 && is_old(part, row, statrs::function::erf::erf(chance.abs() / 2f64.sqrt()));
                 for (index, before) in before.iter_mut().enumerate().skip(3 * part).take(3) {
@@ -170,7 +178,8 @@ mod tests {
     #[test]
     fn rows_that_the_logger_wrote_twice_are_of_no_part() {
         assert_eq!(found(|_, row, _| row % 20 == 0), []);
-        // Nor are some of them, in which another part was changed since.
+        // Nor are some of them, or all, in which another part was changed since.
         assert_eq!(found(|part, row, _| row % 20 == 0 && (part == 0 || row % 80 != 0)), []);
+        assert_eq!(found(|part, row, _| row % 20 == 0 && part != 1), []);
     }
 }
