@@ -247,3 +247,10 @@ fn every_page_of_the_book_is_in_its_summary() {
         );
     }
 }
+
+#[test]
+fn the_citation_names_the_version_that_is_built() {
+    let citation = fs::read_to_string(root().join("CITATION.cff")).expect("is there");
+    let version = citation.lines().find_map(|line| line.strip_prefix("version: "));
+    assert_eq!(version, Some(env!("CARGO_PKG_VERSION")), "CITATION.cff");
+}
