@@ -50,7 +50,7 @@ use crate::{
 #[command(
     after_help = "Examples:\n  ground acceptance /dev/ttyUSB0 --unit EM-7\n  ground acceptance --emulated\n  ground acceptance --host --defect exchanged-plates:1,2 --defect silent:m3@0s"
 )]
-pub struct Arguments {
+pub struct AcceptanceArguments {
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3)
     #[arg(required_unless_present_any = ["emulated", "host"], conflicts_with_all = ["emulated", "host"])]
     pub port: Option<String>,
@@ -140,7 +140,7 @@ fn heard(item: Item) -> Heard {
 ///
 /// # Errors
 /// See [`AcceptanceError`]; a unit that is not good is one.
-pub fn acceptance(arguments: &Arguments) -> Result<(), AcceptanceError> {
+pub fn acceptance(arguments: &AcceptanceArguments) -> Result<(), AcceptanceError> {
     if !(9.7..=9.9).contains(&arguments.gravity) {
         return Err(AcceptanceError::Number(
             "--gravity is 9.76 to 9.84 m/s2 anywhere on Earth",
@@ -187,7 +187,7 @@ pub fn acceptance(arguments: &Arguments) -> Result<(), AcceptanceError> {
     }
 }
 
-fn heard_from(arguments: &Arguments) -> Result<Run, AcceptanceError> {
+fn heard_from(arguments: &AcceptanceArguments) -> Result<Run, AcceptanceError> {
     if let Some(port) = &arguments.port {
         if crate::console::is_no_port(Path::new(port)) {
             return Err(AcceptanceError::NoPort(port.clone()));

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, clap::Subcommand)]
 pub enum Step {
     /// Makes a case of a log and a reference: finds out formats, units, clocks, windows
-    New(Box<made::Arguments>),
+    New(Box<made::NewCaseArguments>),
     /// Says what a case has, and what it lacks
     Check {
         /// Folder of the case

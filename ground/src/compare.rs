@@ -36,7 +36,7 @@ const COLUMN: usize = 42;
 #[command(
     after_help = "Examples:\n  ground compare flights/rocket-1 flights/rocket-2\n  ground compare before.txt.gz after.txt.gz --page both.html"
 )]
-pub struct Arguments {
+pub struct CompareArguments {
     /// The one
     pub a: PathBuf,
     /// The other
@@ -91,7 +91,7 @@ struct Flown {
 ///
 /// # Errors
 /// See [`CompareError`].
-pub fn compare(arguments: &Arguments) -> Result<(), CompareError> {
+pub fn compare(arguments: &CompareArguments) -> Result<(), CompareError> {
     let mut flown = [read(&arguments.a)?, read(&arguments.b)?];
     if flown[0].name == flown[1].name {
         for (flown, mark) in flown.iter_mut().zip(["A: ", "B: "]) {

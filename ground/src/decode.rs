@@ -46,7 +46,7 @@ const HEAD: u64 = 1 << 20;
 #[command(
     after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded\n  ground decode nand.bin --out decoded"
 )]
-pub struct Arguments {
+pub struct DecodeArguments {
     /// File of packets, gzip or not; - for standard input
     pub file: PathBuf,
     /// Values in counts instead of SI, with counter, error bits and flags
@@ -118,7 +118,7 @@ pub enum DecodeError {
 /// When the file cannot be read, holds no packet, contradicts the cycle that was told, or is an image of a newer log; and when
 /// the output cannot be written. What else is in the file is passed over, and said. Of a file that breaks off, what came
 /// before is written first.
-pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
+pub fn decode(arguments: &DecodeArguments) -> Result<(), DecodeError> {
     let mut input = Input::open(&arguments.file)?;
     // A stream that is still being sent is not kept waiting: its first bytes are text, those of an image are not.
     let mut head = input.first(PAGE_BYTES as u64)?;
@@ -152,7 +152,7 @@ pub fn decode(arguments: &Arguments) -> Result<(), DecodeError> {
     if any { Ok(()) } else { Err(no_packets()) }
 }
 
-fn name(arguments: &Arguments) -> String {
+fn name(arguments: &DecodeArguments) -> String {
     let name = arguments
         .file
         .file_name()
@@ -186,7 +186,7 @@ fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str, json: bool
 /// that breaks off is an error for afterwards.
 #[allow(clippy::type_complexity)] // A pair of what was found and what went wrong at last.
 fn stream(
-    arguments: &Arguments,
+    arguments: &DecodeArguments,
     input: Input,
     mut put: impl FnMut(f64, &[Entry]) -> Result<(), DecodeError>,
 ) -> Result<(Cycle, Digest, Option<DecodeError>), DecodeError> {
@@ -228,7 +228,7 @@ fn stream(
 
 /// Rows and remarks; whether there was a packet.
 fn to_text(
-    arguments: &Arguments,
+    arguments: &DecodeArguments,
     input: Input,
     rows: &mut dyn Write,
     remarks: &mut dyn Write,
@@ -272,7 +272,7 @@ fn to_text(
 }
 
 /// A folder; none without a packet, and whether there was one.
-fn to_folder(arguments: &Arguments, input: Input, parent: &Path) -> Result<bool, DecodeError> {
+fn to_folder(arguments: &DecodeArguments, input: Input, parent: &Path) -> Result<bool, DecodeError> {
     let name = name(arguments);
     let mut made: Option<Folder> = None;
     let (_, digest, broken) = stream(arguments, input, |cycle_s, entries| {
@@ -287,7 +287,7 @@ fn to_folder(arguments: &Arguments, input: Input, parent: &Path) -> Result<bool,
     broken.map_or(Ok(true), Err)
 }
 
-fn bytes_5_to_8(arguments: &Arguments) -> Bytes5To8 {
+fn bytes_5_to_8(arguments: &DecodeArguments) -> Bytes5To8 {
     if arguments.crc {
         Bytes5To8::Crc
     } else {
@@ -312,8 +312,8 @@ mod tests {
 
     use super::*;
 
-    fn arguments(file: &Path) -> Arguments {
-        Arguments {
+    fn arguments(file: &Path) -> DecodeArguments {
+        DecodeArguments {
             file: file.into(),
             counts: true,
             out: None,
@@ -368,7 +368,7 @@ mod tests {
             let file = place.path().join(name);
             std::fs::write(&file, bytes).expect("written");
             let out = place.path().join("out");
-            let asked = Arguments {
+            let asked = DecodeArguments {
                 counts: false,
                 out: Some(out.clone()),
                 ..arguments(&file)

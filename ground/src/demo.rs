@@ -67,7 +67,7 @@ const SURE: f64 = 0.5;
 #[command(
     after_help = "Examples:\n  ground demo\n  ground demo --seed 5       something else is wrong\n  ground demo --host         without the emulated board"
 )]
-pub struct Arguments {
+pub struct DemoArguments {
     /// What is wrong, and with which specimen of the unit
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -159,7 +159,7 @@ fn withheld(seed: u64) -> &'static str {
 ///
 /// # Errors
 /// See [`DemoError`].
-pub fn demo(arguments: &Arguments) -> Result<(), DemoError> {
+pub fn demo(arguments: &DemoArguments) -> Result<(), DemoError> {
     let began = Instant::now();
     let say = |words: &str| eprintln!("{:4.0} s  {words}", began.elapsed().as_secs_f64());
     let mut host = arguments.host;
@@ -260,7 +260,7 @@ fn flown(words: &str, seed: u64, host: bool, out: &Path) -> Result<PathBuf, Demo
     #[derive(Parser)]
     struct Words {
         #[command(flatten)]
-        arguments: plan::Arguments,
+        arguments: plan::FlyArguments,
     }
     let trouble = |error: &dyn std::fmt::Display| DemoError::Flight(error.to_string());
     let fixed = ["fly", "--quiet", "--out"].into_iter().map(str::to_owned);
@@ -493,7 +493,7 @@ mod tests {
         #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
         fn the_whole_loop_ends_with_a_page_and_names_what_was_withheld() {
             let place = tempfile::tempdir().expect("a folder");
-            let arguments = Arguments {
+            let arguments = DemoArguments {
                 seed: 1,
                 host: true,
                 out: place.path().into(),

@@ -24,7 +24,7 @@ const SCENE_S: f64 = 60.0;
 /// Lists the effects that a unit may have: what, sizes, how each shows, how to confirm it
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ground effects\n  ground effects gyro-scale\n  ground effects mag")]
-pub struct Arguments {
+pub struct EffectsArguments {
     /// Only effects whose name holds this
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
@@ -42,7 +42,7 @@ pub struct NoEffect(String);
 ///
 /// # Errors
 /// When no effect has such a name.
-pub fn effects(arguments: &Arguments) -> Result<String, NoEffect> {
+pub fn effects(arguments: &EffectsArguments) -> Result<String, NoEffect> {
     let wanted = arguments.name.as_deref().unwrap_or_default();
     let pages = LIBRARY.iter().map(|effect| effect.page());
     let pages: Vec<&Page> = pages.filter(|page| page.name.contains(wanted)).collect();
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn every_effect_is_listed_with_all_that_is_to_be_known() {
-        let text = effects(&Arguments {
+        let text = effects(&EffectsArguments {
             name: None,
             json: false,
         })
@@ -180,14 +180,14 @@ mod tests {
 
     #[test]
     fn a_name_narrows_the_list_and_a_strange_one_is_refused() {
-        let text = effects(&Arguments {
+        let text = effects(&EffectsArguments {
             name: Some("hard-iron".into()),
             json: false,
         })
         .expect("one");
         assert_eq!(text.matches("    what").count(), 1);
         assert!(
-            effects(&Arguments {
+            effects(&EffectsArguments {
                 name: Some("softiron".into()),
                 json: false,
             })

@@ -1,6 +1,6 @@
 //! `ground fly`: the unit in the air, watched, on the emulated board or on the host.
 //!
-//! In: [`Arguments`]. Out: what [`flight`] leaves, and the summary on standard output. Here is what `cargo fly` builds after its first
+//! In: [`FlyArguments`]. Out: what [`flight`] leaves, and the summary on standard output. Here is what `cargo fly` builds after its first
 //! page: the image's board, the console at its umbilical, and the comparison with the first flight, whose place it takes.
 
 mod beside;
@@ -9,13 +9,13 @@ mod replace;
 
 use std::error::Error;
 
-use flight::{FlyError, Landed, fly_until, interrupt::Interrupt, plan::Arguments};
+use flight::{FlyError, Landed, fly_until, interrupt::Interrupt, plan::FlyArguments};
 
 /// Runs `ground fly`.
 ///
 /// # Errors
 /// See [`FlyError`]; and when the image did not send what the host did.
-pub fn fly(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+pub fn fly(arguments: &FlyArguments) -> Result<(), Box<dyn Error>> {
     let landed = flown(arguments, &Interrupt::listen()?)?;
     let page = match &arguments.in_place_of {
         Some(first) if landed.whole => replace::replace(first, &landed.folder)?,
@@ -29,7 +29,7 @@ pub fn fly(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 ///
 /// # Errors
 /// See [`FlyError`].
-pub fn flown(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
+pub fn flown(arguments: &FlyArguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
     let image = arguments.image.as_deref();
     let board = |site| match arguments.host {
         true => Ok(flight::board::host(site)),

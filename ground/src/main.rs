@@ -17,31 +17,31 @@ struct Words {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    Fly(flight::plan::Arguments),
+    Fly(flight::plan::FlyArguments),
     Sources(flight::source::List),
     /// Makes a gap case of a real unit's log, and says what a case lacks
     #[command(subcommand)]
     Case(ground::case::Step),
-    Compare(ground::compare::Arguments),
-    Demo(ground::demo::Arguments),
-    Effects(ground::effects::Arguments),
-    Decode(ground::decode::Arguments),
-    Drill(drill::Arguments),
+    Compare(ground::compare::CompareArguments),
+    Demo(ground::demo::DemoArguments),
+    Effects(ground::effects::EffectsArguments),
+    Decode(ground::decode::DecodeArguments),
+    Drill(drill::DrillArguments),
     /// Talks to the unit over its umbilical, shows all sensors live, keeps everything it says
-    Console(ground::console::Arguments),
-    Acceptance(ground::acceptance::Arguments),
+    Console(ground::console::ConsoleArguments),
+    Acceptance(ground::acceptance::AcceptanceArguments),
     Gap(Gap),
-    Size(ground::size::Arguments),
-    Sbom(ground::sbom::Arguments),
-    Xtce(ground::xtce::Arguments),
-    Attitude(attitude::Arguments),
-    Dump(recorder::dump::Arguments),
-    Recover(recorder::recover::Arguments),
-    Allan(bench::allan::Arguments),
-    Calibrate(bench::calibrate::Arguments),
-    Calibration(bench::calibration::Arguments),
-    Design(bench::design::command::Arguments),
-    Report(bench::reproduction::Arguments),
+    Size(ground::size::SizeArguments),
+    Sbom(ground::sbom::SbomArguments),
+    Xtce(ground::xtce::XtceArguments),
+    Attitude(attitude::AttitudeArguments),
+    Dump(recorder::dump::DumpArguments),
+    Recover(recorder::recover::RecoverArguments),
+    Allan(bench::allan::AllanArguments),
+    Calibrate(bench::calibrate::CalibrateArguments),
+    Calibration(bench::calibration::CalibrationArguments),
+    Design(bench::design::command::DesignArguments),
+    Report(bench::reproduction::ReportArguments),
     Completions(ground::words::Completions),
     Man(ground::words::Man),
 }
@@ -55,14 +55,14 @@ enum Command {
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Gap {
     #[command(flatten)]
-    case: Option<gap::Arguments>,
+    case: Option<gap::GapArguments>,
     #[command(subcommand)]
     challenge: Option<Challenge>,
 }
 
 #[derive(clap::Subcommand)]
 enum Challenge {
-    Blind(trials::command::Arguments),
+    Blind(trials::command::BlindArguments),
 }
 
 fn main() -> ExitCode {

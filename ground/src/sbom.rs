@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 /// Asks cargo, in the folder of the sources; run it from there.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  ground sbom image > image.cdx.json\n  ground sbom ground > ground.cdx.json")]
-pub struct Arguments {
+pub struct SbomArguments {
     /// Which program
     #[arg(value_enum)]
     program: Program,
@@ -58,7 +58,7 @@ pub enum SbomError {
 ///
 /// # Errors
 /// When cargo or Cargo.lock cannot be asked, or a package is not from a registry.
-pub fn sbom(arguments: &Arguments) -> Result<(), SbomError> {
+pub fn sbom(arguments: &SbomArguments) -> Result<(), SbomError> {
     let (package, target) = match arguments.program {
         Program::Image => ("emems", "thumbv7em-none-eabihf"),
         Program::Ground => ("emems-ground", "host-tuple"),

@@ -24,7 +24,7 @@ use panics::Call;
 
 /// Prints the sizes of a firmware image and fails over a ceiling
 #[derive(clap::Args)]
-pub struct Arguments {
+pub struct SizeArguments {
     /// The image, an ELF file
     image: PathBuf,
     /// Bytes of flash it may take (text and data)
@@ -84,7 +84,7 @@ struct Sizes {
 /// # Errors
 ///
 /// An image that cannot be read, or is over a ceiling.
-pub fn size(arguments: &Arguments) -> Result<(), SizeError> {
+pub fn size(arguments: &SizeArguments) -> Result<(), SizeError> {
     let path = &arguments.image;
     let bytes = std::fs::read(path).map_err(|error| SizeError::Read(path.clone(), error))?;
     let Sizes { text, data, bss } = sizes(&bytes).map_err(|error| SizeError::Parse(path.clone(), error))?;

@@ -25,7 +25,7 @@ use packets::channel::{CHANNELS, Channel, Quantity};
 /// Values in counts and nominal SI, the error identifier as one flag a sensor, lift-off and micro-gravity.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  ground xtce > e-mems.xml")]
-pub struct Arguments {}
+pub struct XtceArguments {}
 
 /// Bits of a byte.
 const BITS: usize = 8;

@@ -26,13 +26,13 @@ use twin::predict::UnitDescription;
 #[derive(Parser)]
 struct Words {
     #[command(flatten)]
-    arguments: plan::Arguments,
+    arguments: plan::FlyArguments,
 }
 
 #[derive(Parser)]
 struct New {
     #[command(flatten)]
-    arguments: made::Arguments,
+    arguments: made::NewCaseArguments,
 }
 
 /// Flies on the host board; the folder.
@@ -51,7 +51,7 @@ fn calibrated(flight: &Path, set: &Path) {
     #[derive(Parser)]
     struct Words {
         #[command(flatten)]
-        arguments: bench::calibrate::Arguments,
+        arguments: bench::calibrate::CalibrateArguments,
     }
     let (log, unit) = (flight.join("packets.txt"), flight.join("unit.toml"));
     let words = [

@@ -5,7 +5,7 @@ use clap::Parser;
 #[derive(Parser)]
 struct Command {
     #[command(flatten)]
-    arguments: attitude::Arguments,
+    arguments: attitude::AttitudeArguments,
 }
 
 fn main() -> Result<(), attitude::AttitudeError> {

@@ -47,7 +47,7 @@ use crate::{
 #[command(
     after_help = "Examples:\n  ground attitude flights/tumble-1/packets.txt --page attitude.html\n  ground attitude log.txt --set lms.toml --set ellipsoid.toml --reference motion.csv\n  ground attitude --recordings data/broad --peers\n  ground attitude --theses"
 )]
-pub struct Arguments {
+pub struct AttitudeArguments {
     /// Packets or CSV, gzip or not
     #[arg(required_unless_present_any = ["recordings", "theses"], conflicts_with_all = ["recordings", "theses"])]
     pub log: Option<PathBuf>,
@@ -141,11 +141,11 @@ pub enum AttitudeError {
     NeverMeet(String),
 }
 
-/// Seed of the flights of [`Arguments::theses`].
+/// Seed of the flights of [`AttitudeArguments::theses`].
 const SEED: u64 = 7;
 
 /// Runs the subcommand.
-pub fn run(arguments: &Arguments) -> Result<(), AttitudeError> {
+pub fn run(arguments: &AttitudeArguments) -> Result<(), AttitudeError> {
     if let Some(folder) = &arguments.recordings {
         return table(folder, arguments.peers);
     }
@@ -235,7 +235,7 @@ fn split(line: &str) -> (String, String) {
 }
 
 /// What to say of a reference whose clock seems to be off.
-fn warning(arguments: &Arguments, offset: &Offset) -> String {
+fn warning(arguments: &AttitudeArguments, offset: &Offset) -> String {
     let said = match arguments.reference {
         Some(_) => format!(
             "--offset-s {:.4}",
@@ -254,13 +254,13 @@ fn warning(arguments: &Arguments, offset: &Offset) -> String {
     )
 }
 
-fn reference_missed(arguments: &Arguments, met: &Option<Comparison>) -> bool {
+fn reference_missed(arguments: &AttitudeArguments, met: &Option<Comparison>) -> bool {
     arguments.reference.is_some() && met.is_none()
 }
 
 /// The methods beside each other; the last set's flight is what is looked at closer. `None` without an attitude.
 fn of_unit(
-    arguments: &Arguments,
+    arguments: &AttitudeArguments,
     cycles: &[Cycle],
     reference: Option<&[recording::Row]>,
 ) -> Result<Option<(Flight, Option<Comparison>)>, AttitudeError> {

@@ -22,4 +22,4 @@ pub mod rails;
 pub mod reference;
 pub mod replay;
 
-pub use command::{Arguments, AttitudeError, run};
+pub use command::{AttitudeArguments, AttitudeError, run};

@@ -37,7 +37,7 @@ use crate::table::{Table, TableError};
 
 /// Measures the noise of records: Allan, modified, time and Hadamard deviations, and what they are made of
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct AllanArguments {
     /// Table of records: CSV, tab-separated or LabVIEW; decimal points or commas
     file: PathBuf,
     /// Columns to analyse; all but the times if none is named
@@ -114,7 +114,7 @@ pub enum AllanError {
 /// # Errors
 /// When it cannot be read, or the report not written; and when a record is not good, so that a script does not take its
 /// coefficients for noise.
-pub fn run(arguments: &Arguments) -> Result<(), AllanError> {
+pub fn run(arguments: &AllanArguments) -> Result<(), AllanError> {
     let table = Table::open(&arguments.file)?;
     let selection = Selection {
         columns: arguments.columns.clone(),
@@ -191,7 +191,7 @@ fn print(analysis: &Analysis, unit: &str) {
     }
 }
 
-fn write(analyses: &[Analysis], arguments: &Arguments) -> Result<PathBuf, AllanError> {
+fn write(analyses: &[Analysis], arguments: &AllanArguments) -> Result<PathBuf, AllanError> {
     let stem = arguments
         .file
         .file_stem()

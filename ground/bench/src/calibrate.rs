@@ -19,12 +19,12 @@ use crate::{
 
 /// Calibrates sensors from bench data, with uncertainties and what the test could not see
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct CalibrateArguments {
     #[command(subcommand)]
     what: What,
 }
 
-impl Arguments {
+impl CalibrateArguments {
     /// Whether standard output is for programs.
     pub fn json(&self) -> bool {
         match &self.what {
@@ -40,8 +40,8 @@ impl Arguments {
 enum What {
     RateTable(controlled::RateTable),
     MultiPosition(controlled::MultiPosition),
-    Ellipsoid(ellipsoid::Arguments),
-    Drift(crate::drift::Arguments),
+    Ellipsoid(ellipsoid::EllipsoidArguments),
+    Drift(crate::drift::DriftArguments),
 }
 
 /// Why a calibration failed.
@@ -80,7 +80,7 @@ impl CalibrateError {
 /// # Errors
 /// When files cannot be read or written, or do not determine what is asked for; and when the result is not good, so that
 /// a script does not take it for one.
-pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
+pub fn run(arguments: &CalibrateArguments) -> Result<(), CalibrateError> {
     let good = match &arguments.what {
         What::RateTable(arguments) => controlled::rate_table(arguments),
         What::MultiPosition(arguments) => controlled::multi_position(arguments),

@@ -7,12 +7,12 @@ use crate::calibrate::CalibrateError;
 
 /// Puts a calibration set into the unit or the twin, or compares two
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct CalibrationArguments {
     #[command(subcommand)]
     what: What,
 }
 
-impl Arguments {
+impl CalibrationArguments {
     /// Whether standard output is for programs.
     pub fn json(&self) -> bool {
         match &self.what {
@@ -25,7 +25,7 @@ impl Arguments {
 
 #[derive(Clone, Debug, clap::Subcommand)]
 enum What {
-    Apply(apply::Arguments),
+    Apply(apply::ApplyArguments),
     Diff(sets::Diff),
     Unit(sets::Unit),
 }
@@ -34,7 +34,7 @@ enum What {
 ///
 /// # Errors
 /// When files cannot be read or written, or the unit refuses; and when two sets differ.
-pub fn run(arguments: &Arguments) -> Result<(), CalibrateError> {
+pub fn run(arguments: &CalibrationArguments) -> Result<(), CalibrateError> {
     let good = match &arguments.what {
         What::Apply(arguments) => apply::apply(arguments).map(|()| true),
         What::Diff(arguments) => sets::diff(arguments),

@@ -24,7 +24,7 @@ use crate::{
 /// Tests a dry-tuned gyro: sensitivity to acceleration, scale factor, rotor, drift stability
 #[derive(Clone, Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
-pub struct Arguments {
+pub struct DriftArguments {
     /// Multi-position test: columns inner_deg, middle_deg, output
     #[arg(long, value_name = "FILE", requires = "latitude_deg")]
     positions: Option<PathBuf>,
@@ -99,7 +99,7 @@ pub enum DriftError {
 ///
 /// # Errors
 /// When a table cannot be read, a test is not conclusive, or the report not written.
-pub fn run(arguments: &Arguments) -> Result<bool, DriftError> {
+pub fn run(arguments: &DriftArguments) -> Result<bool, DriftError> {
     let mut sections = Vec::new();
     if let (Some(file), Some(latitude_deg)) = (&arguments.positions, arguments.latitude_deg) {
         let rows = columns(file, ["inner_deg", "middle_deg", "output"])?;

@@ -26,7 +26,7 @@ use crate::{
 
 /// Writes pages that are about no single run
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct ReportArguments {
     #[command(subcommand)]
     what: What,
 }
@@ -218,7 +218,7 @@ pub fn all(sources: &Sources<'_>) -> Result<Vec<Reproduced>, ReproductionError> 
 ///
 /// # Errors
 /// When the tables cannot be read or the page not written.
-pub fn run(arguments: &Arguments) -> Result<(), ReproductionError> {
+pub fn run(arguments: &ReportArguments) -> Result<(), ReproductionError> {
     let What::Reproductions(Reproductions { sources, out }) = &arguments.what;
     let all = all(&Sources(sources))?;
     for one in &all {

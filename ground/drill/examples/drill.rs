@@ -5,7 +5,7 @@ use clap::Parser;
 #[derive(Parser)]
 struct Command {
     #[command(flatten)]
-    arguments: drill::Arguments,
+    arguments: drill::DrillArguments,
 }
 
 fn main() -> Result<(), drill::DrillError> {

@@ -26,7 +26,7 @@ use crate::{
   ground drill --faults              the names of faults
   ground drill --guards              each guard's test, without the guard
   ground drill --write ground/drill/catalogue.csv")]
-pub struct Arguments {
+pub struct DrillArguments {
     /// Rows of the catalogue, such as F8 [default: all]
     pub rows: Vec<String>,
     /// What is drawn follows from this number
@@ -94,7 +94,7 @@ const LONG_SEEDS: u64 = 10;
 /// # Errors
 /// See [`DrillError`]. What is not accepted is in the table too, which is kept all the same.
 pub fn run(
-    arguments: &Arguments,
+    arguments: &DrillArguments,
     image: impl FnOnce() -> Result<Box<OnImage<'static>>, String>,
 ) -> Result<(), DrillError> {
     if arguments.faults && arguments.json {

@@ -32,5 +32,5 @@ pub mod guards;
 pub mod judge;
 mod table;
 
-pub use command::{Arguments, DrillError, run};
+pub use command::{DrillArguments, DrillError, run};
 pub use flight::{Board, OnImage};

@@ -17,7 +17,7 @@ use twin::{motion::AnyWorld, plant::Views, predict::UnitDescription, truth::Trut
 
 use crate::{
     case::LONGEST_S,
-    plan::Arguments,
+    plan::FlyArguments,
     taught::{self, TaughtError},
 };
 
@@ -57,7 +57,7 @@ pub struct Prepared {
 /// # Errors
 /// When it cannot be flown as asked.
 pub fn prepare(
-    arguments: &Arguments,
+    arguments: &FlyArguments,
     world: Option<&AnyWorld>,
     source: &Arc<dyn TruthSource>,
     duration_s: f64,

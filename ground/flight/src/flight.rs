@@ -1,6 +1,6 @@
 //! One flight, from the command line to its folder.
 //!
-//! In: [`Arguments`], and what makes the board that flies (the emulated one or the host's): everything here is the same for both. Out:
+//! In: [`FlyArguments`], and what makes the board that flies (the emulated one or the host's): everything here is the same for both. Out:
 //! a folder with all that was seen, and the summary ([`Landed`]).
 
 use std::{
@@ -23,7 +23,7 @@ use crate::{
     case::{self, CaseError, Flown},
     disturb::{DisturbError, Prepared, prepare},
     interrupt::Interrupt,
-    plan::{self, Arguments, PlanError},
+    plan::{self, FlyArguments, PlanError},
     progress::Progress,
     source::{self, Source, SourceError},
     transit::Through,
@@ -81,7 +81,7 @@ impl Landed {
     }
 
     /// What a flight says of itself, with the line's end: the summary, unless nothing but the page is asked for, and where `page` is.
-    pub fn text(&self, arguments: &Arguments, page: &Path) -> String {
+    pub fn text(&self, arguments: &FlyArguments, page: &Path) -> String {
         let rows = self.rows.iter();
         if arguments.json {
             let rows: serde_json::Map<_, _> = rows
@@ -108,7 +108,7 @@ pub type TakeOff = Box<dyn FnOnce(Option<Box<dyn Umbilical>>) -> Result<(Seen, V
 /// # Errors
 /// See [`FlyError`].
 pub fn fly_until(
-    arguments: &Arguments,
+    arguments: &FlyArguments,
     interrupt: &Interrupt,
     board: impl FnOnce(Site) -> Result<Board, Trouble>,
     beside: impl FnOnce(&Path, TakeOff) -> Result<(Seen, Vec<Remark>), FlyError>,
@@ -190,7 +190,7 @@ const IMAGE: &str = "image";
 
 /// Makes the folder a case; a row of the summary, and what went wrong with it that is not the flight's nature.
 fn written(
-    arguments: &Arguments,
+    arguments: &FlyArguments,
     source: &Source,
     prepared: Option<&Prepared>,
     instants: Option<&Instants>,
@@ -237,7 +237,7 @@ fn written(
 
 /// Writes the page and the summary.
 fn report(
-    arguments: &Arguments,
+    arguments: &FlyArguments,
     board: &str,
     source: &Source,
     planned: Duration,
@@ -294,10 +294,10 @@ mod tests {
     #[derive(Parser)]
     struct Words {
         #[command(flatten)]
-        arguments: Arguments,
+        arguments: FlyArguments,
     }
 
-    fn on_host(arguments: &Arguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
+    fn on_host(arguments: &FlyArguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
         fly_until(
             arguments,
             interrupt,
@@ -306,7 +306,7 @@ mod tests {
         )
     }
 
-    fn words(words: &[&str]) -> Result<Arguments, clap::Error> {
+    fn words(words: &[&str]) -> Result<FlyArguments, clap::Error> {
         Words::try_parse_from([&["fly"], words].concat()).map(|words| words.arguments)
     }
 

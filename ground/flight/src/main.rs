@@ -9,13 +9,13 @@ mod rest;
 use std::{error::Error, process::ExitCode};
 
 use clap::Parser;
-use flight::{FlyError, Landed, board, exit, fly_until, interrupt::Interrupt, plan::Arguments};
+use flight::{FlyError, Landed, board, exit, fly_until, interrupt::Interrupt, plan::FlyArguments};
 
 #[derive(Parser)]
 #[command(name = "fly", bin_name = "cargo fly")]
 struct Words {
     #[command(flatten)]
-    arguments: Arguments,
+    arguments: FlyArguments,
 }
 
 fn main() -> ExitCode {
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn fly(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
+fn fly(arguments: &FlyArguments) -> Result<ExitCode, Box<dyn Error>> {
     if arguments.console || arguments.image.is_some() || arguments.in_place_of.is_some() {
         return Ok(rest::fly(None)?);
     }
@@ -42,7 +42,7 @@ fn fly(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ExitCode::SUCCESS);
     }
     // Real time is for whoever watches the board.
-    let first = Arguments {
+    let first = FlyArguments {
         host: true,
         real_time: false,
         ..arguments.clone()
@@ -58,7 +58,7 @@ fn fly(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// Flies on the host; `follows` is said of it in the summary.
-fn on_host(arguments: &Arguments, interrupt: &Interrupt, follows: &str) -> Result<Landed, FlyError> {
+fn on_host(arguments: &FlyArguments, interrupt: &Interrupt, follows: &str) -> Result<Landed, FlyError> {
     let board = |site| {
         let mut board = board::host(site);
         board.name.push_str(follows);

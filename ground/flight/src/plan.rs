@@ -38,7 +38,7 @@ const ENDLESS_S: f64 = 60.0;
   ground fly --motion tumble --duration 3min --with gyro-scale=0.01@g2 --with vibration@20s..80s
   ground fly --motion rotation-1 --unit flights/tumble-1/corrected/unit.toml
   ground fly --console                             and talk to it; type G_HE")]
-pub struct Arguments {
+pub struct FlyArguments {
     /// Motion to fly; `ground sources` lists them [default: rocket]
     #[arg(long, value_name = "NAME", group = "source")]
     pub motion: Option<String>,
@@ -102,7 +102,7 @@ pub struct Arguments {
     pub json: bool,
     #[command(flatten)]
     #[allow(missing_docs)] // clap would take the text for the command's.
-    pub site: site::Arguments,
+    pub site: site::SiteArguments,
 }
 
 /// A sensor that does not answer for a while.

@@ -19,7 +19,7 @@ const TEMPERATURE: RangeInclusive<f64> = -40.0..=85.0;
 /// The place of a recorded motion.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Where a --motion-file took place [default: the laboratory]")]
-pub struct Arguments {
+pub struct SiteArguments {
     /// Latitude, north positive [default: -23.2111]
     #[arg(long, value_name = "DEG", requires = "motion_file", conflicts_with_all = ["motion", "recording"], allow_negative_numbers = true,
         value_parser = |text: &str| number(text, LATITUDE))]
@@ -36,7 +36,7 @@ pub struct Arguments {
     pub temperature_c: Option<f64>,
 }
 
-impl Arguments {
+impl SiteArguments {
     /// The place.
     pub fn environment(&self) -> Environment {
         let laboratory = Environment::laboratory();
@@ -95,11 +95,11 @@ mod tests {
 
     #[test]
     fn what_is_not_named_is_the_laboratorys() {
-        assert_eq!(Arguments::default().environment(), Environment::laboratory());
-        let place = Arguments {
+        assert_eq!(SiteArguments::default().environment(), Environment::laboratory());
+        let place = SiteArguments {
             latitude_deg: Some(-2.3733),
             field_n_ut: Some([26.0, -9.0, -5.5]),
-            ..Arguments::default()
+            ..SiteArguments::default()
         };
         let environment = place.environment();
         assert_eq!(environment.gravity, Environment::laboratory().gravity);

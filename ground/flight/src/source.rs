@@ -23,7 +23,7 @@ use twin::{
     truth::{Truth, TruthSource},
 };
 
-use crate::{case::text, plan::Arguments};
+use crate::{case::text, plan::FlyArguments};
 
 /// Flown when nothing is named.
 const DEFAULT_MOTION: &str = "rocket";
@@ -87,7 +87,7 @@ pub enum SourceError {
 ///
 /// # Errors
 /// When there is no such thing.
-pub fn open(arguments: &Arguments) -> Result<Source, SourceError> {
+pub fn open(arguments: &FlyArguments) -> Result<Source, SourceError> {
     match (&arguments.recording, &arguments.motion_file) {
         (Some(path), _) => Ok(Source {
             name: stem(path),

@@ -10,13 +10,13 @@ use emems::{
 use nalgebra::Vector3;
 use twin::motion::Motion as _;
 
-use crate::{plan::Arguments, source::Source};
+use crate::{plan::FlyArguments, source::Source};
 
 /// [0.1 deg] of azimuth and elevation, standard deviation: marks along a rail of some metres, a bubble.
 const CREW_SD: [u8; 2] = [5, 3];
 
 /// Before a flight.
-pub fn before(arguments: &Arguments, source: &Source) -> Vec<u8> {
+pub fn before(arguments: &FlyArguments, source: &Source) -> Vec<u8> {
     let mut words = Vec::new();
     if arguments.derived {
         words.extend(word_of(Command::DerivedOn));

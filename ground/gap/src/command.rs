@@ -37,7 +37,7 @@ use crate::{
 #[command(
     after_help = "Examples:\n  ground gap flights/tumble-1\n  ground gap limits flights/tumble-1\n  ground gap flights/tumble-1 --against flights/rotation-1-1\n  ground gap flights/tumble-1 --out verdicts/flight-7\n  ground gap bench-3 flights/rocket-1 flights/rocket-2"
 )]
-pub struct Arguments {
+pub struct GapArguments {
     /// What to say: all of it, or only where, why, shrink, next or limits
     #[arg(value_name = "WHAT", num_args = 1.., required = true, help = "[where|why|shrink|next|limits] CASE...: a folder with case.toml; several are logs of one unit, diagnosed together")]
     pub words: Vec<String>,
@@ -124,7 +124,7 @@ impl From<ParityError> for GapError {
 ///
 /// # Errors
 /// When the case cannot be judged or a file not written.
-pub fn run(arguments: &Arguments) -> Result<(), GapError> {
+pub fn run(arguments: &GapArguments) -> Result<(), GapError> {
     let (word, cases) = parted(&arguments.words)?;
     if let Some(stranger) = arguments
         .withhold
@@ -191,7 +191,7 @@ fn parted(words: &[String]) -> Result<(&str, Vec<PathBuf>), GapError> {
 }
 
 /// Several logs of one unit: says what they say together, and leaves verdict and page beside the first.
-fn run_together(arguments: &Arguments, word: &str, cases: &[PathBuf]) -> Result<(), GapError> {
+fn run_together(arguments: &GapArguments, word: &str, cases: &[PathBuf]) -> Result<(), GapError> {
     if arguments.against.is_some() {
         return Err(GapError::AgainstSeveral);
     }

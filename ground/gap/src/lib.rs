@@ -53,4 +53,4 @@ pub mod thresholds;
 pub mod together;
 pub mod unknown;
 
-pub use command::{Arguments, GapError, run, write_baselines, write_verdict, write_withheld};
+pub use command::{GapArguments, GapError, run, write_baselines, write_verdict, write_withheld};

@@ -4,7 +4,7 @@ use std::fs;
 
 use clap::Parser;
 use gap::{
-    command::{Arguments, run},
+    command::{GapArguments, run},
     input::case::Subject,
     parity::{analysed, findings::Findings, flight::Flight, name::By, smooth::told::Told, visible::Row},
     probability::outcome::Outcome,
@@ -338,7 +338,7 @@ fn what_no_effect_of_the_library_explains_is_called_unknown() {
 #[derive(Parser)]
 struct Line {
     #[command(flatten)]
-    arguments: Arguments,
+    arguments: GapArguments,
 }
 
 #[test]

@@ -30,7 +30,7 @@ const WINDOW: usize = 4096;
 /// Interrupted, it goes on where it was when called again with the same file. Damaged pages are asked for again.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ground dump /dev/ttyUSB0 flight.dump\n  ground recover flight.dump > flight.csv")]
-pub struct Arguments {
+pub struct DumpArguments {
     /// Serial port
     pub port: String,
     /// Where to keep what comes; an earlier dump of the same log is completed
@@ -69,7 +69,7 @@ pub enum DumpError {
 ///
 /// # Errors
 /// When the port, the line or the file fails, or the unit refuses; what came before is kept.
-pub fn run(arguments: &Arguments) -> Result<(), DumpError> {
+pub fn run(arguments: &DumpArguments) -> Result<(), DumpError> {
     let port = serialport::new(&arguments.port, 115_200).timeout(Duration::from_secs(1));
     let mut line = port.open().map_err(|source| DumpError::Port {
         port: arguments.port.clone(),

@@ -36,7 +36,7 @@ const GAPS_LISTED: usize = 100;
 #[command(
     after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --table all.csv\n  ground recover nand.bin --table flight.parquet"
 )]
-pub struct Arguments {
+pub struct RecoverArguments {
     /// Raw image of the chip or a dump, gzip or not
     pub file: PathBuf,
     /// Values in counts instead of SI
@@ -89,7 +89,7 @@ pub enum RecoverError {
 ///
 /// # Errors
 /// When the file cannot be read or is no log, or the output cannot be written.
-pub fn run(arguments: &Arguments) -> Result<(), RecoverError> {
+pub fn run(arguments: &RecoverArguments) -> Result<(), RecoverError> {
     let path = &arguments.file;
     let content = content(path)?;
     let log = log::read(&content).map_err(|source| RecoverError::Log {
@@ -210,7 +210,7 @@ fn nothing(content: &[u8]) -> &'static str {
     }
 }
 
-fn write_rows(log: &Log, arguments: &Arguments, rows: &mut dyn Write) -> io::Result<()> {
+fn write_rows(log: &Log, arguments: &RecoverArguments, rows: &mut dyn Write) -> io::Result<()> {
     writeln!(rows, "{}", table::header())?;
     for (key, entry) in log.packets_of(arguments.all_epochs) {
         writeln!(rows, "{}", table::row(*key, entry, !arguments.counts))?;
@@ -428,7 +428,7 @@ mod tests {
         let recover = |name: &str, bytes: &[u8]| {
             let file = place.path().join(name);
             std::fs::write(&file, bytes).expect("written");
-            let arguments = Arguments {
+            let arguments = RecoverArguments {
                 file,
                 counts: true,
                 all_epochs: false,
@@ -466,7 +466,7 @@ mod tests {
     #[test]
     fn what_is_missing_is_said() {
         let (mut rows, mut remarks) = (Vec::new(), Vec::new());
-        let arguments = Arguments {
+        let arguments = RecoverArguments {
             file: "none".into(),
             counts: true,
             all_epochs: false,

@@ -11,7 +11,7 @@ use gap::input::{case::Kind as LogKind, log::Column};
 use packets::stream::{Bytes5To8, Decoder, Item};
 use twin::predict::{Channel, Kind, UnitDescription, emems};
 
-use super::made::{Arguments, MadeError};
+use super::made::{MadeError, NewCaseArguments};
 
 /// \[s\] conversions of a part by its own clock; a reading is half of it old on the average.
 const PERIODS_S: [(Kind, f64); 4] = [
@@ -58,7 +58,7 @@ pub fn format_of(bytes: &[u8], name: &str) -> Result<(LogKind, Option<Vec<f64>>)
 /// # Errors
 /// When a file of it cannot be used.
 pub fn unit(
-    arguments: &Arguments,
+    arguments: &NewCaseArguments,
     kind: LogKind,
     slots: Option<&Vec<f64>>,
     said: &mut Vec<String>,

@@ -47,7 +47,7 @@ const REFERENCE: [f64; 2] = [1e-3, 1e-3];
 #[command(
     after_help = "Examples:\n  ground case new --log umbilical.txt --reference mocap.csv --set set.toml --latitude-deg -23.2 --out flight-7\n  ground case check flight-7"
 )]
-pub struct Arguments {
+pub struct NewCaseArguments {
     /// What the unit sent: packets as the console kept them or `recover` gave them, or CSV with t_s and a column a channel in SI
     #[arg(long, value_name = "FILE")]
     pub log: PathBuf,
@@ -132,7 +132,7 @@ pub enum MadeError {
 ///
 /// # Errors
 /// When no case can be made.
-pub fn made(arguments: &Arguments) -> Result<String, MadeError> {
+pub fn made(arguments: &NewCaseArguments) -> Result<String, MadeError> {
     make(&arguments.out)?;
     let made = make_case(arguments);
     if made.is_err() {
@@ -142,7 +142,7 @@ pub fn made(arguments: &Arguments) -> Result<String, MadeError> {
     made
 }
 
-fn make_case(arguments: &Arguments) -> Result<String, MadeError> {
+fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
     let mut said = Vec::new();
     let bytes = read_bytes(&arguments.log)?;
     let log_name = arguments.log.display().to_string();

@@ -17,7 +17,7 @@ use twin::{
 
 use super::{
     clock,
-    made::{Arguments, MadeError},
+    made::{MadeError, NewCaseArguments},
     reference::{Axes, Told},
 };
 
@@ -172,7 +172,11 @@ pub fn settled(
 ///
 /// # Errors
 /// When there is no such place.
-pub fn environment(arguments: &Arguments, place: &Place, said: &mut Vec<String>) -> Result<Environment, MadeError> {
+pub fn environment(
+    arguments: &NewCaseArguments,
+    place: &Place,
+    said: &mut Vec<String>,
+) -> Result<Environment, MadeError> {
     let gravity = match arguments.gravity_m_s2 {
         Some(gravity) => gravity,
         None => {

@@ -50,7 +50,7 @@ use session::Session;
 #[command(
     after_help = "Examples:\n  ground console /dev/ttyUSB0 --record pad.log\n  echo G_ST | ground console /dev/ttyUSB0 --plain"
 )]
-pub struct Arguments {
+pub struct ConsoleArguments {
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3); it may be plugged in later
     pub port: String,
     /// File to append every received byte to; FILE.commands.txt takes what was sent [default: umbilical-TIME.log]
@@ -98,7 +98,7 @@ pub enum Error {
 ///
 /// # Errors
 /// See [`run`].
-pub fn console(arguments: &Arguments) -> Result<(), Error> {
+pub fn console(arguments: &ConsoleArguments) -> Result<(), Error> {
     if is_no_port(Path::new(&arguments.port)) {
         return Err(Error::NoPort(arguments.port.clone()));
     }
@@ -147,7 +147,7 @@ mod tests {
         let file = place.path().join("flight.log");
         std::fs::write(&file, "not a port").expect("written");
         for port in [place.path(), &file] {
-            let arguments = Arguments {
+            let arguments = ConsoleArguments {
                 port: port.display().to_string(),
                 record: Some(place.path().join("kept.log")),
                 options: Options::default(),

@@ -8,7 +8,7 @@ use std::{io, path::Path, thread, time::Duration};
 use flight::{
     FlyError, TakeOff,
     board::{Remark, Trouble},
-    plan::Arguments,
+    plan::FlyArguments,
     watch::{Seen, Umbilical},
 };
 
@@ -42,7 +42,7 @@ impl Umbilical for UnitEnd {
 ///
 /// # Errors
 /// Those of the flight, then those of the console.
-pub fn console(arguments: &Arguments, folder: &Path, take_off: TakeOff) -> Result<(Seen, Vec<Remark>), FlyError> {
+pub fn console(arguments: &FlyArguments, folder: &Path, take_off: TakeOff) -> Result<(Seen, Vec<Remark>), FlyError> {
     let trouble = |why: Trouble| FlyError::Board(why);
     let (line, unit) = line::channel("the flying unit");
     // With an input that ends, a flight whose length was asked for goes on to its end.

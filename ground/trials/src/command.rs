@@ -23,7 +23,7 @@ use crate::{
 
 /// Runs a blind challenge on the diagnosis, or on any other that reads cases and writes verdicts
 #[derive(Args)]
-pub struct Arguments {
+pub struct BlindArguments {
     #[command(subcommand)]
     step: Step,
 }
@@ -132,7 +132,7 @@ pub type Baselines = dyn Fn(&Path, &[String]) -> Result<(), Box<dyn Error>>;
 ///
 /// # Errors
 /// When a file cannot be read or written, or was changed after its hash was published.
-pub fn run(arguments: &Arguments, diagnose: &Diagnose, baselines: &Baselines) -> Result<(), BlindError> {
+pub fn run(arguments: &BlindArguments, diagnose: &Diagnose, baselines: &Baselines) -> Result<(), BlindError> {
     match &arguments.step {
         Step::Deal {
             folder,

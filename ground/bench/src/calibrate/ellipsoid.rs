@@ -25,7 +25,7 @@ use crate::{
 /// FILE is a raw log (packets, or a table with a column a channel); every sample is a point, or with --still every stretch
 /// at rest. The nine parameters do not say how the triad sits in the body: --unit gives that for the set.
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct EllipsoidArguments {
     /// Raw log
     file: PathBuf,
     /// The three channels x, y, z, separated by commas
@@ -47,13 +47,13 @@ pub struct Arguments {
     output: Output,
 }
 
-impl Arguments {
+impl EllipsoidArguments {
     pub fn json(&self) -> bool {
         self.output.json()
     }
 }
 
-pub fn run(arguments: &Arguments) -> Result<bool, CalibrateError> {
+pub fn run(arguments: &EllipsoidArguments) -> Result<bool, CalibrateError> {
     let fail = CalibrateError::of(&arguments.file);
     let names: [String; 3] = arguments
         .channels
@@ -243,7 +243,7 @@ fn held_against(
     wrong
 }
 
-fn describe(found: &Ellipsoid, points: &[Vector3<f64>], arguments: &Arguments) -> Report {
+fn describe(found: &Ellipsoid, points: &[Vector3<f64>], arguments: &EllipsoidArguments) -> Report {
     let convention = match arguments.angles {
         Convention::Thesis => "angles as in Eq 4.44 of the thesis",
         Convention::Standard => "angles as in public code",

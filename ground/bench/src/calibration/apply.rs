@@ -26,7 +26,7 @@ const BAUD: u32 = 115_200;
 /// EMEMS_CALIBRATION naming the file that --image wrote. The set is for the unit's nominal ranges: 6 g, 1.3 gauss, 320 deg/s.
 #[derive(Clone, Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("where").required(true).multiple(true).args(["port", "out"]))]
-pub struct Arguments {
+pub struct ApplyArguments {
     /// Calibration set
     set: PathBuf,
     /// Serial port of the umbilical (/dev/ttyUSB0, COM3): load it and read it back
@@ -43,7 +43,7 @@ pub struct Arguments {
     pub json: bool,
 }
 
-pub fn apply(arguments: &Arguments) -> Result<(), CalibrateError> {
+pub fn apply(arguments: &ApplyArguments) -> Result<(), CalibrateError> {
     let set = read_set(&arguments.set)?;
     let image = image::image(&set, Ranges::of(&Settings::NOMINAL));
     let image = image.map_err(|error| CalibrateError::of(&arguments.set)(error.to_string()))?;

@@ -15,7 +15,7 @@ use crate::{
 
 /// Plans table time: positions and runs that determine the wanted parameters best
 #[derive(Clone, Debug, clap::Args)]
-pub struct Arguments {
+pub struct DesignArguments {
     /// Gyros on a rate table, or accelerometers in positions
     #[arg(value_enum)]
     sensors: Sensors,
@@ -50,7 +50,7 @@ pub struct Arguments {
     page: Option<PathBuf>,
 }
 
-impl Arguments {
+impl DesignArguments {
     /// Whether the plan goes to standard output.
     pub fn prints_the_plan(&self) -> bool {
         self.out.is_none()
@@ -81,7 +81,7 @@ pub enum DesignError {
 ///
 /// # Errors
 /// When the unit file lacks axes or noise, or there is too little time.
-pub fn run(arguments: &Arguments) -> Result<(), DesignError> {
+pub fn run(arguments: &DesignArguments) -> Result<(), DesignError> {
     let means = means(arguments)?;
     let plan = plan(&means, &arguments.want)?;
     let table = table(&plan);
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DesignError> {
         .map_err(DesignError::Missing)
 }
 
-fn describe(plan: &Plan, means: &Means, arguments: &Arguments) -> Report {
+fn describe(plan: &Plan, means: &Means, arguments: &DesignArguments) -> Report {
     let (unit, command) = match means.kind {
         Kind::Rate => ("rad/s", "rate-table"),
         Kind::Force => ("m/s²", "multi-position"),
@@ -135,7 +135,7 @@ fn describe(plan: &Plan, means: &Means, arguments: &Arguments) -> Report {
     report
 }
 
-fn means(arguments: &Arguments) -> Result<Means, DesignError> {
+fn means(arguments: &DesignArguments) -> Result<Means, DesignError> {
     let nominal = read_nominal(&arguments.unit)?;
     let (kind, sensor) = match arguments.sensors {
         Sensors::Gyros => (Kind::Rate, "gyro"),
