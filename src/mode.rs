@@ -15,7 +15,7 @@
 //! After power-on the mode is WAIT until the log was heard. What it says of the time before is taken once, and not after
 //! a command or lift-off, which know better; so a log that is mounted again later changes nothing.
 
-use crate::{command::Command, rail::Rail, resume::Resume};
+use crate::{command::Command, rail::Rail};
 
 /// \[us\] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -221,21 +221,6 @@ impl Copies {
 }
 
 impl State {
-    /// The state after a start: what a reset struck goes on; after power-on the log is waited for.
-    pub fn resumed(resume: Option<Resume>) -> Self {
-        let resume = resume.unwrap_or(Resume {
-            awaits_log: true,
-            ..Resume::default()
-        });
-        State {
-            mode: resume.mode,
-            recording: resume.recording,
-            derived: resume.derived,
-            awaits_log: resume.awaits_log,
-            ..State::default()
-        }
-    }
-
     /// What of it must not change by itself, in one byte.
     fn vital(&self) -> u8 {
         let flags = [self.mode == Mode::Flight, self.recording, self.derived, self.awaits_log];

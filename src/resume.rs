@@ -14,7 +14,7 @@ use crate::{
     board::{ResetCause, Retained},
     crash::CrashRecord,
     kalman::Outage,
-    mode::Mode,
+    mode::{Mode, State},
     retained::{PULSE, Place, STARTS, STATE},
 };
 
@@ -71,6 +71,18 @@ impl Resume {
             next_counter: u16::from_le_bytes([a, b]),
             dips: u16::from_le_bytes([c, d]),
         })
+    }
+
+    /// The state after a start: what a reset struck goes on; after power-on, when nothing was kept, the log is waited for.
+    pub fn state(kept: Option<Resume>) -> State {
+        let mut state = State::default();
+        if let Some(kept) = kept {
+            state.mode = kept.mode;
+            state.recording = kept.recording;
+            state.derived = kept.derived;
+        }
+        state.awaits_log = kept.is_none_or(|kept| kept.awaits_log);
+        state
     }
 }
 
@@ -265,6 +277,28 @@ mod tests {
         healthy.keep(&memory);
         assert_eq!(Starts::count(&memory).without_health, 1);
         assert_eq!(Starts::count(&memory).since_power_on, 5);
+    }
+
+    #[test]
+    fn a_reset_goes_on_and_power_on_waits_for_the_log() {
+        for n in 0..16_u8 {
+            let [flight, recording, derived, awaits_log] = [1, 2, 4, 8].map(|bit| n & bit != 0);
+            let mode = if flight { Mode::Flight } else { Mode::Wait };
+            let kept = Resume {
+                mode,
+                recording,
+                derived,
+                awaits_log,
+                ..Resume::default()
+            };
+            let state = Resume::state(Some(kept));
+            assert_eq!((state.mode, state.recording), (mode, recording), "{kept:?}");
+            assert_eq!((state.derived, state.awaits_log), (derived, awaits_log), "{kept:?}");
+        }
+        let mut after_power_on = Resume::state(None);
+        assert!(after_power_on.awaits_log);
+        after_power_on.awaits_log = false;
+        assert_eq!(after_power_on, State::default());
     }
 
     #[test]

@@ -327,7 +327,11 @@ fn the_log_is_believed_once_and_only_before_anybody_else_has_spoken() {
         derived: true,
         ..Resumed::default()
     };
-    let mut after_power_on = State::resumed(None);
+    let awaiting = State {
+        awaits_log: true,
+        ..State::default()
+    };
+    let mut after_power_on = awaiting;
     after_power_on.recovered(flying);
     assert_eq!(
         (after_power_on.mode, after_power_on.recording, after_power_on.derived),
@@ -339,21 +343,14 @@ fn the_log_is_believed_once_and_only_before_anybody_else_has_spoken() {
     after_power_on.recovered(flying);
     assert_eq!(after_power_on.mode, Mode::Wait, "a mode that was commanded stands");
 
-    let mut commanded = State::resumed(None);
+    let mut commanded = awaiting;
     for now_us in [0, 1] {
         commanded.command(Command::Wait, now_us);
     }
     commanded.recovered(flying);
     assert_eq!(commanded.mode, Mode::Wait, "also where the command came before the log");
 
-    let awaiting = Resume {
-        awaits_log: true,
-        ..Resume::default()
-    };
-    let mut after_a_reset = State::resumed(Some(awaiting));
-    after_a_reset.recovered(flying);
-    assert_eq!(after_a_reset.mode, Mode::Flight, "a reset before the log was heard");
-    let mut known = State::resumed(Some(Resume::default()));
+    let mut known = State::default();
     known.recovered(flying);
     assert_eq!(known.mode, Mode::Wait, "retained memory knows better");
 }

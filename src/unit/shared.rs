@@ -202,7 +202,7 @@ pub struct Shared {
 impl Shared {
     /// The state at start.
     pub fn new(settings: Settings, start: Start) -> Self {
-        let state = State::resumed(start.resume);
+        let state = Resume::state(start.resume);
         let set = Set::compiled_in(Ranges::of(&settings));
         Shared {
             clock: Clock::new(),
