@@ -33,7 +33,7 @@ use crate::{
     crash::CrashCause,
     estimate::Estimate,
     faults::SensorHealth,
-    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
+    increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::hex_value,
     sample::{NO_SLOT, SENSOR_COUNT},
@@ -257,7 +257,7 @@ pub fn decode(bytes: &[u8]) -> Result<Derived, DerivedError> {
             angle_b: fields.reals(),
             gyro: core::array::from_fn(|_| {
                 let [integral_counts_s] = fields.reals();
-                Channel {
+                GyroCycle {
                     integral_counts_s,
                     least: fields.word() as i16,
                     most: fields.word() as i16,

@@ -40,7 +40,7 @@ mod tests;
 
 pub use self::{error::LogError, status::Status, superblock::LOG_START};
 use self::{
-    page::Kind,
+    page::PageKind,
     record::{BootHeader, Entry, Key, RecordBytes},
     superblock::Superblock,
 };
@@ -397,7 +397,7 @@ impl<N: Nand> FlightLog<N> {
                     page: 0,
                 },
             };
-            let tag = self.tag(Kind::Log);
+            let tag = self.tag(PageKind::Log);
             page::address(&mut self.page, at, tag);
             if self.program(at).await? {
                 let page = at.page.wrapping_add(1);

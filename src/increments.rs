@@ -39,7 +39,7 @@ pub struct Increments {
     /// \[us\] instant of the newest fast sample, since the unit's clock started: the increment's end. 0 before the first.
     pub end_us: u64,
     /// Each gyro.
-    pub gyro: [Channel; 4],
+    pub gyro: [GyroCycle; 4],
     /// The accelerometers, oldest reading first.
     pub forces: Forces,
     /// The gyros slice by slice, oldest first.
@@ -49,7 +49,7 @@ pub struct Increments {
 /// One gyro over a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Channel {
+pub struct GyroCycle {
     /// [counts s] integral of the rate.
     pub integral_counts_s: f32,
     /// \[counts\] smallest sample; [`NOT_READ`] without samples.
@@ -64,7 +64,7 @@ const EMPTY: Increments = Increments {
     angle_b: [0.0; 3],
     covered_us: 0,
     end_us: 0,
-    gyro: [Channel {
+    gyro: [GyroCycle {
         integral_counts_s: 0.0,
         least: NOT_READ,
         most: NOT_READ,
@@ -177,7 +177,7 @@ impl Integrator {
     }
 }
 
-impl Channel {
+impl GyroCycle {
     fn note(&mut self, counts: i16) {
         if counts == NOT_READ {
             return;

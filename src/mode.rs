@@ -1,6 +1,6 @@
 //! WAIT and FLIGHT: which command is accepted when, what it starts, and what survives a reset.
 //!
-//! In: commands, lift-off, time. Out: a [`Verdict`] for the console and an [`Action`] for whoever does the work.
+//! In: commands, lift-off, time. Out: a [`Reply`] for the console and an [`Action`] for whoever does the work.
 //!
 //! One flipped bit turns G_ME (to WAIT) into G_MA (erase) or G_MG (record), G_MT (send packets) into G_MV (to FLIGHT) or
 //! G_Mt (stop). So no word that one bit makes of another acts alone: G_MV, G_ME, G_MG, G_MT and G_Mt take effect when sent
@@ -143,7 +143,7 @@ pub enum Refusal {
 /// What became of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub enum Verdict {
+pub enum Reply {
     /// Accepted.
     Done(Action),
     /// Send this command within [`CONFIRM_WITHIN_US`] to make it so.
@@ -247,7 +247,7 @@ impl State {
     }
 
     /// Takes a command that came at `now_us`.
-    pub fn command(&mut self, command: Command, now_us: u64) -> Verdict {
+    pub fn command(&mut self, command: Command, now_us: u64) -> Reply {
         let pending = self.pending.take().filter(|pending| now_us <= pending.until_us);
         let armed = pending
             .filter(|pending| pending.with == command)
@@ -258,32 +258,32 @@ impl State {
             Command::Flight => self.enter(Mode::Flight),
             Command::Wait => self.enter(Mode::Wait),
             Command::Status | Command::Version | Command::Alignment | Command::Help => {
-                Verdict::Done(Action::Report(command))
+                Reply::Done(Action::Report(command))
             }
-            Command::LeaveSafeMode => Verdict::Done(Action::None),
+            Command::LeaveSafeMode => Reply::Done(Action::None),
             Command::DerivedOn | Command::DerivedOff => {
                 self.derived = command == Command::DerivedOn;
-                Verdict::Done(Action::None)
+                Reply::Done(Action::None)
             }
             Command::Record => self.only_in(Mode::Flight, |state| {
                 if !confirmed {
                     return state.confirm(command, command, now_us);
                 }
                 state.recording = true;
-                Verdict::Done(Action::None)
+                Reply::Done(Action::None)
             }),
             Command::Erase => self.only_in(Mode::Wait, |state| {
                 if state.lift_off {
-                    return Verdict::Refused(Refusal::LiftOff);
+                    return Reply::Refused(Refusal::LiftOff);
                 }
                 state.confirm(command, Command::ConfirmErase, now_us)
             }),
             Command::ConfirmErase => self.only_in(Mode::Wait, |state| {
                 if !confirmed {
-                    return Verdict::Refused(Refusal::NothingToConfirm);
+                    return Reply::Refused(Refusal::NothingToConfirm);
                 }
                 state.task = Task::Idle;
-                Verdict::Done(Action::Erase)
+                Reply::Done(Action::Erase)
             }),
             Command::SendPackets | Command::Stop if !confirmed => {
                 self.only_in(Mode::Wait, |state| state.confirm(command, command, now_us))
@@ -295,21 +295,21 @@ impl State {
                 end: first.saturating_add(count),
             }),
             Command::Stop => self.start(Task::Idle),
-            Command::SelfTest => self.only_in(Mode::Wait, |_| Verdict::Done(Action::SelfTest)),
+            Command::SelfTest => self.only_in(Mode::Wait, |_| Reply::Done(Action::SelfTest)),
             Command::SetWord { .. } | Command::ReadSet => {
-                self.only_in(Mode::Wait, |_| Verdict::Done(Action::Calibration(command)))
+                self.only_in(Mode::Wait, |_| Reply::Done(Action::Calibration(command)))
             }
             Command::Rail(rail) => self.only_in(Mode::Wait, |state| match rail.fault() {
-                Some(why) => Verdict::Refused(Refusal::Number(why)),
+                Some(why) => Reply::Refused(Refusal::Number(why)),
                 None => state.confirm(command, Command::ConfirmSet, now_us),
             }),
             Command::LoadSet | Command::ForgetSet => {
                 self.only_in(Mode::Wait, |state| state.confirm(command, Command::ConfirmSet, now_us))
             }
             Command::ConfirmSet => self.only_in(Mode::Wait, |_| match armed {
-                Some(Command::Rail(rail)) => Verdict::Done(Action::Rail(rail)),
-                Some(armed) => Verdict::Done(Action::Calibration(armed)),
-                None => Verdict::Refused(Refusal::NothingToConfirm),
+                Some(Command::Rail(rail)) => Reply::Done(Action::Rail(rail)),
+                Some(armed) => Reply::Done(Action::Calibration(armed)),
+                None => Reply::Refused(Refusal::NothingToConfirm),
             }),
         }
     }
@@ -327,34 +327,34 @@ impl State {
         begins
     }
 
-    fn enter(&mut self, mode: Mode) -> Verdict {
+    fn enter(&mut self, mode: Mode) -> Reply {
         self.awaits_log = false;
         if self.mode != mode {
             self.mode = mode;
             self.task = Task::Idle;
             self.recording = false;
         }
-        Verdict::Done(Action::None)
+        Reply::Done(Action::None)
     }
 
-    fn start(&mut self, task: Task) -> Verdict {
+    fn start(&mut self, task: Task) -> Reply {
         self.only_in(Mode::Wait, |state| {
             state.task = task;
-            Verdict::Done(Action::None)
+            Reply::Done(Action::None)
         })
     }
 
-    fn confirm(&mut self, armed: Command, with: Command, now_us: u64) -> Verdict {
+    fn confirm(&mut self, armed: Command, with: Command, now_us: u64) -> Reply {
         let until_us = now_us.saturating_add(CONFIRM_WITHIN_US);
         self.pending = Some(Pending { armed, with, until_us });
-        Verdict::Confirm(with)
+        Reply::Confirm(with)
     }
 
-    fn only_in(&mut self, mode: Mode, accept: impl FnOnce(&mut Self) -> Verdict) -> Verdict {
+    fn only_in(&mut self, mode: Mode, accept: impl FnOnce(&mut Self) -> Reply) -> Reply {
         if self.mode == mode {
             accept(self)
         } else {
-            Verdict::Refused(Refusal::Mode(mode))
+            Reply::Refused(Refusal::Mode(mode))
         }
     }
 }

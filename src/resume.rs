@@ -15,7 +15,7 @@ use crate::{
     crash::CrashRecord,
     kalman::Outage,
     mode::{Mode, State},
-    retained::{PULSE, Place, STARTS, STATE},
+    retained::{PULSE, Region, STARTS, STATE},
 };
 
 const RECORDING: u8 = 1 << 0;
@@ -213,9 +213,9 @@ pub fn outage(kept_us: u64, reset: ResetCause, pulse: Pulse, crash: Option<&Cras
     }
 }
 
-fn recall<const N: usize>(place: Place, memory: &impl Retained) -> Option<[u8; N]> {
+fn recall<const N: usize>(region: Region, memory: &impl Retained) -> Option<[u8; N]> {
     let mut bytes = [0; N];
-    (place.recall(memory, &mut bytes)?.len() == N).then_some(bytes)
+    (region.recall(memory, &mut bytes)?.len() == N).then_some(bytes)
 }
 
 #[cfg(test)]

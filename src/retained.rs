@@ -33,7 +33,7 @@ const CHUNK: usize = 64;
 
 /// A part of the retained memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Region {
     /// Where its first copy begins.
     at: usize,
     /// Bytes of a copy.
@@ -41,27 +41,27 @@ pub struct Place {
 }
 
 /// What the unit was doing: [`crate::resume::Resume`].
-pub const STATE: Place = Place { at: 0, room: 64 };
+pub const STATE: Region = Region { at: 0, room: 64 };
 /// How often it started: [`crate::resume::Starts`].
-pub const STARTS: Place = STATE.before(64);
+pub const STARTS: Region = STATE.before(64);
 /// When it was last alive: [`crate::resume::Pulse`].
-pub const PULSE: Place = STARTS.before(64);
+pub const PULSE: Region = STARTS.before(64);
 /// What ended the run before: [`crate::crash::CrashRecord`].
-pub const CRASH: Place = PULSE.before(128);
+pub const CRASH: Region = PULSE.before(128);
 /// The attitude filters: [`crate::estimate::Estimator::keep`].
-pub const ATTITUDE: Place = CRASH.before(1536);
+pub const ATTITUDE: Region = CRASH.before(1536);
 /// The calibration set in use: [`crate::calibration::Set::encode`]; empty for the one compiled in.
-pub const SET: Place = ATTITUDE.before(1280);
+pub const SET: Region = ATTITUDE.before(1280);
 
 /// The launch rail: [`crate::rail::Rail::bytes`].
-pub const RAIL: Place = SET.before(16);
+pub const RAIL: Region = SET.before(16);
 
 const _: () = assert!(RAIL.at + 2 * RAIL.room <= RETAINED_BYTES);
 
-impl Place {
+impl Region {
     /// The part behind this one, with so many bytes a copy.
-    const fn before(self, room: usize) -> Place {
-        Place {
+    const fn before(self, room: usize) -> Region {
+        Region {
             at: self.at + 2 * self.room,
             room,
         }
@@ -81,10 +81,10 @@ impl Place {
         digest.update(content);
         let crc = digest.finalize().to_le_bytes();
         for at in self.copies() {
-            let place = at.wrapping_add(HEAD);
+            let content_at = at.wrapping_add(HEAD);
             memory.write(at, &head);
-            memory.write(place, content);
-            memory.write(place.wrapping_add(content.len()), &crc);
+            memory.write(content_at, content);
+            memory.write(content_at.wrapping_add(content.len()), &crc);
         }
     }
 
@@ -114,14 +114,14 @@ impl Place {
         }
         let content = buffer.get_mut(..length)?;
         let mut digest = self.digest(&head);
-        let mut place = at.wrapping_add(HEAD);
+        let mut next_at = at.wrapping_add(HEAD);
         for chunk in content.chunks_mut(CHUNK) {
-            memory.read(place, chunk);
-            place = place.wrapping_add(chunk.len());
+            memory.read(next_at, chunk);
+            next_at = next_at.wrapping_add(chunk.len());
             digest.update(chunk);
         }
         let mut crc = [0; TAIL];
-        memory.read(place, &mut crc);
+        memory.read(next_at, &mut crc);
         (crc == digest.finalize().to_le_bytes()).then_some(length)
     }
 
@@ -173,26 +173,26 @@ mod tests {
         }
     }
 
-    const PLACES: [Place; 6] = [STATE, STARTS, PULSE, CRASH, ATTITUDE, SET];
+    const REGIONS: [Region; 6] = [STATE, STARTS, PULSE, CRASH, ATTITUDE, SET];
 
-    fn recalled(place: Place, memory: &Memory) -> Option<Vec<u8>> {
+    fn recalled(region: Region, memory: &Memory) -> Option<Vec<u8>> {
         let mut buffer = [0; 2048];
-        place.recall(memory, &mut buffer).map(<[u8]>::to_vec)
+        region.recall(memory, &mut buffer).map(<[u8]>::to_vec)
     }
 
     #[test]
     fn every_part_keeps_what_it_was_given_beside_the_others() {
         let memory = Memory::after_power_on(0xA5);
-        for (number, place) in PLACES.into_iter().enumerate() {
-            place.keep(&memory, &vec![number as u8; place.fits() - number]);
+        for (number, region) in REGIONS.into_iter().enumerate() {
+            region.keep(&memory, &vec![number as u8; region.fits() - number]);
         }
-        for (number, place) in PLACES.into_iter().enumerate() {
+        for (number, region) in REGIONS.into_iter().enumerate() {
             assert_eq!(
-                recalled(place, &memory),
-                Some(vec![number as u8; place.fits() - number])
+                recalled(region, &memory),
+                Some(vec![number as u8; region.fits() - number])
             );
-            place.forget(&memory);
-            assert_eq!(recalled(place, &memory), None);
+            region.forget(&memory);
+            assert_eq!(recalled(region, &memory), None);
         }
         SET.keep(&memory, &[]);
         assert_eq!(recalled(SET, &memory), Some(vec![]), "nothing is content, too");
@@ -202,7 +202,7 @@ mod tests {
     fn memory_after_power_on_holds_nothing() {
         for fill in [0, 0xFF, 0x5A] {
             let memory = Memory::after_power_on(fill);
-            assert!(PLACES.into_iter().all(|place| recalled(place, &memory).is_none()));
+            assert!(REGIONS.into_iter().all(|region| recalled(region, &memory).is_none()));
         }
     }
 

@@ -92,12 +92,12 @@ pub struct Start<'a> {
     /// \[uT2\]
     pub iron_covariance: Matrix3<f32>,
     /// What does not change in the spin.
-    pub place: Place,
+    pub surroundings: Surroundings,
 }
 
 /// What does not change in the spin.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct Surroundings {
     /// \[uT\] field, in n.
     pub field_n_ut: Vector3<f32>,
     /// \[rad\] how far its direction is not known.
@@ -113,7 +113,7 @@ pub struct Place {
 /// The filter of the spin phase.
 #[derive(Clone, Debug)]
 pub struct Spin {
-    place: Place,
+    surroundings: Surroundings,
     /// \[us\] instant of the state.
     at_us: u64,
     q_nb: UnitQuaternion<f32>,
@@ -158,7 +158,7 @@ impl Spin {
         let square = |x: f32| x * x;
         let [_, _, of_gyro] = set.uncertainty;
         let on_pad = start.pad.rate_variance(set);
-        let earth_b = start.q_nb.inverse_transform_vector(&start.place.earth_rate_n);
+        let earth_b = start.q_nb.inverse_transform_vector(&start.surroundings.earth_rate_n);
         let bias = core::array::from_fn(|k| {
             let axis_b = &set.gyro[k].axis_b;
             match on_pad {
@@ -183,14 +183,14 @@ impl Spin {
             .iter()
             .fold(f32::MAX, |least, place| least.min(place.norm()));
         for variance in &mut variances[BY_LOAD..] {
-            *variance = square(start.place.bias_per_g);
+            *variance = square(start.surroundings.bias_per_g);
         }
         variances[LEVER] = square(set.place_sigma / shortest.max(1e-3));
         let mut covariance = Covariance::of(&variances);
         covariance.set_block(ATTITUDE, &start.covariance_n);
         covariance.set_block(IRON, &start.iron_covariance);
         Spin {
-            place: start.place,
+            surroundings: start.surroundings,
             at_us: start.at_us,
             q_nb: start.q_nb,
             spin: start.rate_b.x,
@@ -264,9 +264,10 @@ impl Spin {
 
     /// \[rad2\] covariance of the attitude in n, with what the field's model may be off by.
     pub fn covariance_n(&self) -> Matrix3<f32> {
-        let along_n = self.place.field_n_ut.normalize();
+        let along_n = self.surroundings.field_n_ut.normalize();
         let across = Matrix3::identity() - along_n * along_n.transpose();
-        self.covariance.block::<3, 3>(ATTITUDE, ATTITUDE) + across * (self.place.field_sd * self.place.field_sd)
+        self.covariance.block::<3, 3>(ATTITUDE, ATTITUDE)
+            + across * (self.surroundings.field_sd * self.surroundings.field_sd)
     }
 
     /// Two components across the spin, in axes that do not spin, as a vector in b.

@@ -5,7 +5,7 @@ use embassy_futures::block_on;
 use emems::{
     flight_log::{
         LogError,
-        page::{self, Kind, Tag},
+        page::{self, PageKind, Tag},
     },
     nand::{PAGE_BYTES, PAGES_PER_BLOCK, PageAddress},
 };
@@ -143,7 +143,7 @@ fn bad_and_worn_blocks_are_passed_over() {
 fn live_records_in_these_blocks_are_not_erased() {
     let mut flown = three_boots(BLOCKS, 1);
     let tag = Tag {
-        kind: Kind::Log,
+        kind: PageKind::Log,
         epoch: 0,
         boot: 3,
     };

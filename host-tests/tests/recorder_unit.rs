@@ -289,7 +289,7 @@ fn f16_a_full_recorder_says_so_and_packets_go_on() {
     // All blocks but two begin with a page of this log.
     let chip = &mut flight.plant.nand.cells;
     let tag = page::Tag {
-        kind: page::Kind::Log,
+        kind: page::PageKind::Log,
         epoch: 0,
         boot: 0,
     };

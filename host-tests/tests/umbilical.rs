@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use emems::{
     command::{COMMANDS, Command, Heard, Parser, WORD_BYTES, Word},
     flight_log::dump::{self, DUMP_START},
-    mode::{Action, CONFIRM_WITHIN_US, Mode, State, Task, Verdict},
+    mode::{Action, CONFIRM_WITHIN_US, Mode, Reply, State, Task},
     packet::PACKET_BYTES,
 };
 use host_tests::{Flight, S, world};
@@ -54,17 +54,17 @@ fn deed(word: &[u8; WORD_BYTES]) -> Vec<u8> {
     }
 }
 
-/// The verdicts on these bytes, one a millisecond, and the state after them.
-fn after(mut state: State, bytes: &[u8]) -> (State, Vec<Verdict>) {
+/// The replies on these bytes, one a millisecond, and the state after them.
+fn after(mut state: State, bytes: &[u8]) -> (State, Vec<Reply>) {
     let mut parser = Parser::default();
-    let mut verdicts = Vec::new();
+    let mut replies = Vec::new();
     for (at_ms, byte) in bytes.iter().enumerate() {
         let now_us = 1000 * at_ms as u64;
         if let Some(Heard::Command(command)) = parser.hear(*byte, now_us) {
-            verdicts.push(state.command(command, now_us));
+            replies.push(state.command(command, now_us));
         }
     }
-    (state, verdicts)
+    (state, replies)
 }
 
 fn state(words: &[u8]) -> State {
@@ -83,22 +83,21 @@ fn one_wrong_bit_in_a_word_costs_a_report_at_most() {
                 let mut came = sent.clone();
                 came[bit / 8] ^= 1 << (bit % 8);
                 let text = String::from_utf8_lossy(&came).into_owned();
-                let (state, verdicts) = after(before, &came);
-                assert!(verdicts.len() <= 1, "{text}: {verdicts:?}");
+                let (state, replies) = after(before, &came);
+                assert!(replies.len() <= 1, "{text}: {replies:?}");
                 assert_eq!(
                     (state.mode, state.recording, state.task),
                     (before.mode, before.recording, task_after(before, &sent, &came)),
                     "{text}"
                 );
-                for verdict in verdicts {
+                for reply in replies {
                     if came[..WORD_BYTES] != sent[..WORD_BYTES] {
                         exchanged.insert(format!("{}>{}", String::from_utf8_lossy(&sent[..4]), &text[..4]));
                     }
-                    match verdict {
-                        Verdict::Refused(_) | Verdict::Confirm(_) | Verdict::Done(Action::None | Action::Report(_)) => {
-                        }
+                    match reply {
+                        Reply::Refused(_) | Reply::Confirm(_) | Reply::Done(Action::None | Action::Report(_)) => {}
                         // Digits that came wrong: another place or content of a set that its checksum covers.
-                        Verdict::Done(Action::Calibration(Command::SetWord { .. })) => {
+                        Reply::Done(Action::Calibration(Command::SetWord { .. })) => {
                             assert_eq!(entry.word, b"G_CW", "{text}");
                         }
                         done => panic!("{text} for {}: {done:?}", String::from_utf8_lossy(&sent)),
@@ -166,7 +165,7 @@ fn a_parser_keeps_sixteen_letters_whatever_comes() {
             let time = came.get(word).and_then(|times| times[nth]);
             time.is_some_and(|time| now_us - time <= CONFIRM_WITHIN_US)
         };
-        if state.command(command, now_us) == Verdict::Done(Action::Erase) {
+        if state.command(command, now_us) == Reply::Done(Action::Erase) {
             erased += 1;
             assert!(last == *b"G_CA" && recent(b"G_MA", 1), "byte {at}");
         }

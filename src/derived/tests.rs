@@ -4,7 +4,7 @@ use super::*;
 use crate::{packet, sample::NOT_READ};
 
 fn derived() -> Derived {
-    let channel = |count| Channel {
+    let channel = |count| GyroCycle {
         integral_counts_s: -1.25,
         least: -300,
         most: 12,

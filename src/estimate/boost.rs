@@ -18,7 +18,7 @@ use crate::{
     increments::{Increments, Slice, slices::BEYOND},
     kalman::{self, Delays, Outage, Params},
     sample::Sample,
-    spin::{self, Place, Spin, Start, pad::Pad},
+    spin::{self, Spin, Start, Surroundings, pad::Pad},
 };
 
 /// [rad/s] the spin at which it begins: 77 % of what the first gyro to stop can see of it, so that a second of spin-up at half a
@@ -133,7 +133,9 @@ impl Estimator {
         }
         let delays = self.filter.params.delays;
         let at_us = increments.end_us.saturating_sub((delays.gyro_s * 1e6) as u64);
-        let Some(place) = self.place(delays) else { return };
+        let Some(surroundings) = self.surroundings(delays) else {
+            return;
+        };
         let covariance_n = self.filter.attitude_covariance_n();
         let nose_n = crate::attitude::dcm_nb(&self.filter.q_nb).column(0).into_owned();
         let lost = nose_n * nose_n.transpose() * (core::f32::consts::PI * core::f32::consts::PI);
@@ -155,7 +157,7 @@ impl Estimator {
             pad: &self.boost.pad,
             iron_b: self.filter.iron.iron_b,
             iron_covariance: self.filter.iron.covariance,
-            place,
+            surroundings,
         };
         self.boost.spin = Some(Spin::begin(&start, &self.set));
         self.boost.quiet = 0;
@@ -163,7 +165,8 @@ impl Estimator {
 
     /// Goes on in the spin after a reset, if it was on.
     pub(super) fn resume_boost(&mut self, of_spin: &[u8], outage: Outage) {
-        let (Some(bytes), Some(place)) = (of_spin.first_chunk(), self.place(self.filter.params.delays)) else {
+        let (Some(bytes), Some(surroundings)) = (of_spin.first_chunk(), self.surroundings(self.filter.params.delays))
+        else {
             return;
         };
         let start = Start {
@@ -177,14 +180,14 @@ impl Estimator {
             pad: &Pad::EMPTY,
             iron_b: Vector3::zeros(),
             iron_covariance: Matrix3::zeros(),
-            place,
+            surroundings,
         };
         self.boost.spin = Spin::resumed(bytes, outage, &start, &self.set);
     }
 
-    fn place(&self, delays: Delays) -> Option<Place> {
+    fn surroundings(&self, delays: Delays) -> Option<Surroundings> {
         let params = &self.filter.params;
-        Some(Place {
+        Some(Surroundings {
             field_n_ut: self.filter.reference.field_n_ut()?,
             field_sd: params.heading_sd,
             earth_rate_n: params.earth_rate_n,

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     calibration::Axis,
-    increments::{Channel, Force, SLICES, Slice, forces::READINGS},
+    increments::{Force, GyroCycle, SLICES, Slice, forces::READINGS},
     sample::{NO_SLOT, NOT_READ, Reading, SENSOR_COUNT},
 };
 
@@ -39,7 +39,7 @@ fn resting(counter: u16) -> (Sample, Increments) {
         start_us,
         slots_us: core::array::from_fn(|slot| 250 * slot as u32),
     };
-    let still = Channel {
+    let still = GyroCycle {
         integral_counts_s: 0.0,
         least: 0,
         most: 0,
@@ -173,7 +173,7 @@ prop_compose! {
     ) -> (Sample, Increments) {
         let (resting, still) = resting(counter);
         let reading = Reading { acc_p, mag_p, gyro, gyro_temperature, temperature, lift_off, ..resting.reading };
-        let gyro = core::array::from_fn(|k| Channel {
+        let gyro = core::array::from_fn(|k| GyroCycle {
             integral_counts_s: f32::from_bits(integrals[k]), least: ends[k].0, most: ends[k].1, count: ends[k].2,
         });
         let forces = between.map(|(acc_p, angles, covered_us, after_us)| Force {

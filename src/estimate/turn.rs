@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3, Vector4};
 use crate::{
     calibration::Set,
     geometry::{PLATES, rate_from_gyros},
-    increments::{Channel, Increments},
+    increments::{GyroCycle, Increments},
     redundancy::matrix,
     sample::Kind,
 };
@@ -68,7 +68,7 @@ pub(super) fn turn(
 ) -> Turn {
     let covered_s = increments.covered_us as f32 * 1e-6;
     let samples = increments.gyro.iter().fold(0, |most, gyro| most.max(gyro.count));
-    let which = |is: &dyn Fn(&Channel) -> bool| {
+    let which = |is: &dyn Fn(&GyroCycle) -> bool| {
         let each = increments.gyro.iter().enumerate();
         each.fold(0_u16, |bits, (k, gyro)| bits | u16::from(is(gyro)) << k)
     };

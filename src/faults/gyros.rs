@@ -218,8 +218,8 @@ impl Gyros {
             self.watches.iter_mut().for_each(|watch| watch.strike(false));
         }
         let counted = (systematic + self.parity.offset_variance) / noise;
-        let place = self.of_parity.push(root(counted));
-        self.parity.note(place, parity, 1.0, counted);
+        let cursor = self.of_parity.push(root(counted));
+        self.parity.note(cursor, parity, 1.0, counted);
         let alarm = self.parity.learn(parity, variance, LIMITS, &self.of_parity.added());
         self.quiet_for = if alarm < QUIET {
             self.quiet_for.saturating_add(1)
@@ -297,8 +297,8 @@ impl Gyros {
             let watch = &mut self.watches[k];
             let disagreement = cycle.values[k] - watch.offset - expected;
             let counted = (systematic + watch.offset_variance / share) / watch.noise;
-            let place = self.of_gyros[k].push(root(counted));
-            watch.note(place, disagreement, share, counted);
+            let cursor = self.of_gyros[k].push(root(counted));
+            watch.note(cursor, disagreement, share, counted);
             watch.reconsider(&self.of_gyros[k].added());
         }
     }

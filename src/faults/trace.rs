@@ -7,7 +7,7 @@
 //! wild sample does not fill the window alone.
 //!
 //! What is systematic is the same for all sensors of a kind, so it is kept once for all their axes ([`Systematic`]), and
-//! every axis keeps its disagreements in the same [`Place`]s.
+//! every axis keeps its disagreements in the same [`Cursor`]s.
 
 use crate::root::root;
 
@@ -25,7 +25,7 @@ const SYSTEMATIC_SQUARES: f32 = WILD * WILD;
 
 /// Where the cycle stands in a window: the newest place, which held the oldest, and that of the one [`SHORT`] before it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct Cursor {
     newest: usize,
     left: usize,
 }
@@ -47,10 +47,10 @@ impl Window {
         squares: 0,
     };
 
-    fn push(&mut self, place: Place, value: i16) {
+    fn push(&mut self, cursor: Cursor, value: i16) {
         // Both are within it.
-        let left = self.ring.get(place.left).copied().unwrap_or_default();
-        let Some(newest) = self.ring.get_mut(place.newest) else {
+        let left = self.ring.get(cursor.left).copied().unwrap_or_default();
+        let Some(newest) = self.ring.get_mut(cursor.newest) else {
             return;
         };
         let (new, left, old) = (i32::from(value), i32::from(left), i32::from(*newest));
@@ -85,7 +85,7 @@ impl Systematic {
     };
 
     /// Takes a cycle; where that stands.
-    pub(super) fn push(&mut self, sigmas: f32) -> Place {
+    pub(super) fn push(&mut self, sigmas: f32) -> Cursor {
         let newest = usize::from(self.next);
         let left = if newest < SHORT {
             newest + (LONG - SHORT)
@@ -93,9 +93,9 @@ impl Systematic {
             newest - SHORT
         };
         self.next = if newest < LONG - 1 { newest as u8 + 1 } else { 0 };
-        let place = Place { newest, left };
-        self.window.push(place, clipped(sigmas));
-        place
+        let cursor = Cursor { newest, left };
+        self.window.push(cursor, clipped(sigmas));
+        cursor
     }
 
     pub(super) fn added(&self) -> Added {
@@ -158,8 +158,8 @@ impl Trace {
     };
 
     /// Takes a cycle; what is not a number is as wild as can be.
-    pub(super) fn push(&mut self, place: Place, disagreement: f32) {
-        self.window.push(place, clipped(disagreement));
+    pub(super) fn push(&mut self, cursor: Cursor, disagreement: f32) {
+        self.window.push(cursor, clipped(disagreement));
         self.held = if self.held < LONG as u8 {
             self.held + 1
         } else {

@@ -210,7 +210,7 @@ impl Triads {
     fn watch(&mut self, present: u16, systematic: f32) {
         let offsets = self.watches.iter().map(|watch| watch.offset_variance);
         let counted = (systematic + offsets.fold(0.0, larger)) * self.per_noise;
-        let place = self.of_all.push(root(counted));
+        let cursor = self.of_all.push(root(counted));
         let added = self.of_all.added();
         let bounds = self.of_all.bounds(LIMITS, &added, QUIET, self.least_relative);
         let (mut alarms, mut loudest, mut doubted) = ([0.0; TRIAD_AXES], 0.0, false);
@@ -224,8 +224,8 @@ impl Triads {
             };
             match disagreement {
                 // The parts of the disagreement's variance are in the same proportion as the axis's own.
-                Some(Disagreement { by, share }) => watch.note(place, by, share, counted),
-                None => watch.miss(place),
+                Some(Disagreement { by, share }) => watch.note(cursor, by, share, counted),
+                None => watch.miss(cursor),
             }
             match disagreement {
                 _ if watch.excluded() => {

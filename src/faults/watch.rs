@@ -11,7 +11,7 @@
 
 use super::{
     health::Verdict,
-    trace::{Added, Bounds, LONG, Limits, Place, Trace, WILD, larger},
+    trace::{Added, Bounds, Cursor, LONG, Limits, Trace, WILD, larger},
 };
 use crate::root::{reciprocal_root, root};
 
@@ -83,7 +83,7 @@ impl Watch {
     /// Takes a cycle's disagreement beyond the offset, whose noise has `share` times the variance of the axis's own.
     /// `systematic` is the variance of what is systematic, in the noise that is counted in.
     #[inline]
-    pub(super) fn note(&mut self, place: Place, disagreement: f32, share: f32, systematic: f32) {
+    pub(super) fn note(&mut self, cursor: Cursor, disagreement: f32, share: f32, systematic: f32) {
         // One wild value, as of an ignition between two plates' conversions, is the gate's business, not the window's.
         let mut sigmas = disagreement * reciprocal_root(self.noise * share);
         // The root is worth its while only beyond what it is at least.
@@ -97,12 +97,12 @@ impl Watch {
                 sigmas
             };
         }
-        self.trace.push(place, sigmas);
+        self.trace.push(cursor, sigmas);
     }
 
     /// Takes a cycle in which it was not read.
-    pub(super) fn miss(&mut self, place: Place) {
-        self.trace.push(place, 0.0);
+    pub(super) fn miss(&mut self, cursor: Cursor) {
+        self.trace.push(cursor, 0.0);
     }
 
     /// Notes that the axis was beyond the gate in this cycle, or not.

@@ -2,7 +2,7 @@
 
 use super::{
     FlightLog, LOG_START, LogError,
-    page::{self, Kind, Stamp, Tag},
+    page::{self, PageKind, Stamp, Tag},
     record, superblock,
 };
 use crate::nand::{BAD_MARK, Nand, NandError, PAGES_PER_BLOCK, PageAddress, SPARE_BYTES};
@@ -11,7 +11,7 @@ use crate::nand::{BAD_MARK, Nand, NandError, PAGES_PER_BLOCK, PageAddress, SPARE
 const COPIES: u8 = 2;
 
 impl<N: Nand> FlightLog<N> {
-    pub(super) fn tag(&self, kind: Kind) -> Tag {
+    pub(super) fn tag(&self, kind: PageKind) -> Tag {
         Tag {
             kind,
             epoch: self.superblock.epoch,
@@ -40,7 +40,7 @@ impl<N: Nand> FlightLog<N> {
         let (Stamp::Ours(tag) | Stamp::Astray(tag, _)) = stamp else {
             return false;
         };
-        tag.kind == Kind::Log && tag.epoch == self.superblock.epoch
+        tag.kind == PageKind::Log && tag.epoch == self.superblock.epoch
     }
 
     /// Whether there is such a block, and it is none of the superblock's.
@@ -210,7 +210,7 @@ impl<N: Nand> FlightLog<N> {
     async fn put_superblock(&mut self, at: PageAddress) -> Result<bool, LogError> {
         let bytes = superblock::encode(&self.superblock);
         page::compose(&mut self.back, &bytes, &bytes);
-        let tag = self.tag(Kind::Superblock);
+        let tag = self.tag(PageKind::Superblock);
         page::address(&mut self.back, at, tag);
         match self.chip.program(at, &self.back).await {
             Ok(()) => {}

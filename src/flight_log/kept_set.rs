@@ -19,7 +19,7 @@
 
 use super::{
     FlightLog, LogError,
-    page::{self, Kind},
+    page::{self, PageKind},
     record::{RECORD_BYTES, RecordBytes},
 };
 use crate::{
@@ -137,7 +137,7 @@ impl<N: Nand> FlightLog<N> {
             let piece = page.checked_sub(count).unwrap_or(page);
             let bytes = encode(number, piece, content);
             page::compose(&mut self.page, &bytes, &bytes);
-            let tag = self.tag(Kind::Set);
+            let tag = self.tag(PageKind::Set);
             page::address(&mut self.page, at, tag);
             match self.program(at).await {
                 Ok(true) => {}

@@ -9,7 +9,7 @@ use embassy_futures::yield_now;
 
 use super::{
     FlightLog, LOG_START, LogError, State,
-    page::{self, Kind, Stamp},
+    page::{self, PageKind, Stamp},
     record,
     superblock::{self, Superblock, SuperblockError},
 };
@@ -140,7 +140,7 @@ impl<N: Nand> FlightLog<N> {
                     break;
                 }
                 let ours = matches!(page::stamp(page::spare(&self.back), at),
-                    Stamp::Ours(tag) if tag.kind == Kind::Superblock);
+                    Stamp::Ours(tag) if tag.kind == PageKind::Superblock);
                 let whole = self.corrected();
                 let mut readable = false;
                 for (half, whole) in whole.into_iter().enumerate() {
@@ -259,7 +259,7 @@ impl<N: Nand> FlightLog<N> {
                 foreign |= stamp == Stamp::Garbage;
             }
             if let Stamp::Ours(tag) = stamp
-                && tag.kind == Kind::Log
+                && tag.kind == PageKind::Log
                 && newest.is_none_or(|newest| newest <= (tag.epoch, block))
             {
                 newest = Some((tag.epoch, block));

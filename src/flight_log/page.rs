@@ -37,7 +37,7 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 /// What a page is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub enum Kind {
+pub enum PageKind {
     /// Records.
     Log = 1,
     /// The superblock.
@@ -51,7 +51,7 @@ pub enum Kind {
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Tag {
     /// What it is for.
-    pub kind: Kind,
+    pub kind: PageKind,
     /// The log's epoch.
     pub epoch: u16,
     /// The boot that wrote it, lower half.
@@ -118,7 +118,7 @@ pub fn stamp(spare: &SpareBytes, at: PageAddress) -> Stamp {
         };
         bytes = flipped(bytes, bit);
     }
-    let kind = [Kind::Log, Kind::Superblock, Kind::Set]
+    let kind = [PageKind::Log, PageKind::Superblock, PageKind::Set]
         .into_iter()
         .find(|kind| bytes[8] == version_and_kind(*kind));
     let Some(kind) = kind else {
@@ -168,7 +168,7 @@ pub fn record(page: &PageBytes, half: usize) -> &RecordBytes {
     halves.get(half).unwrap_or(&[0; RECORD_BYTES])
 }
 
-fn version_and_kind(kind: Kind) -> u8 {
+fn version_and_kind(kind: PageKind) -> u8 {
     FORMAT << 4 | kind as u8
 }
 
@@ -205,7 +205,7 @@ mod tests {
 
     const AT: PageAddress = PageAddress { block: 77, page: 9 };
     const TAG_OF_LOG: Tag = Tag {
-        kind: Kind::Log,
+        kind: PageKind::Log,
         epoch: 4,
         boot: 0xABCD,
     };
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn format_and_kind_stand_in_the_last_column() {
         assert_eq!(page()[527], 0x11);
-        for (kind, byte) in [(Kind::Superblock, 0x12), (Kind::Set, 0x13)] {
+        for (kind, byte) in [(PageKind::Superblock, 0x12), (PageKind::Set, 0x13)] {
             let mut page = page();
             address(&mut page, AT, Tag { kind, ..TAG_OF_LOG });
             assert_eq!(page[527], byte);

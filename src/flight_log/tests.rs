@@ -99,7 +99,7 @@ impl Chip {
 
     /// A page with these records of a log of this epoch, as a boot wrote it.
     fn write(&mut self, at: (u16, u8), (epoch, boot): (u16, u32), [a, b]: [&RecordBytes; 2]) {
-        let kind = Kind::Log;
+        let kind = PageKind::Log;
         let mut bytes = [0; PAGE_BYTES];
         page::compose(&mut bytes, a, b);
         let boot = boot as u16;
@@ -121,7 +121,7 @@ impl Chip {
             self.write((0, page), (superblock.epoch, superblock.boot), [&bytes, &bytes]);
             let at = PageAddress { block: 0, page };
             let tag = page::Tag {
-                kind: Kind::Superblock,
+                kind: PageKind::Superblock,
                 epoch: superblock.epoch,
                 boot: superblock.boot as u16,
             };

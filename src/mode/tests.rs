@@ -31,11 +31,11 @@ fn after(mut state: State, bytes: &[u8]) -> (State, bool, bool) {
     let (mut erased, mut calibrated) = (false, false);
     for (at, byte) in bytes.iter().enumerate() {
         if let Some(Heard::Command(command)) = parser.hear(*byte, 1000 * at as u64) {
-            let verdict = state.command(command, 1000 * at as u64);
-            erased |= verdict == Verdict::Done(Action::Erase);
-            let set = |command| verdict == Verdict::Done(Action::Calibration(command));
+            let reply = state.command(command, 1000 * at as u64);
+            erased |= reply == Reply::Done(Action::Erase);
+            let set = |command| reply == Reply::Done(Action::Calibration(command));
             calibrated |= set(Command::LoadSet) || set(Command::ForgetSet);
-            calibrated |= matches!(verdict, Verdict::Done(Action::Rail(_)));
+            calibrated |= matches!(reply, Reply::Done(Action::Rail(_)));
         }
     }
     (state, erased, calibrated)
@@ -138,19 +138,19 @@ fn no_two_bit_error_in_one_deed_erases() {
 #[test]
 fn a_mode_change_takes_the_word_twice_within_ten_seconds() {
     let mut state = WAITING;
-    assert_eq!(state.command(Command::Flight, 0), Verdict::Confirm(Command::Flight));
+    assert_eq!(state.command(Command::Flight, 0), Reply::Confirm(Command::Flight));
     assert_eq!(
         state.command(Command::Status, 1),
-        Verdict::Done(Action::Report(Command::Status))
+        Reply::Done(Action::Report(Command::Status))
     );
-    assert_eq!(state.command(Command::Flight, 2), Verdict::Confirm(Command::Flight));
+    assert_eq!(state.command(Command::Flight, 2), Reply::Confirm(Command::Flight));
     assert_eq!(
         state.command(Command::Flight, CONFIRM_WITHIN_US + 3),
-        Verdict::Confirm(Command::Flight)
+        Reply::Confirm(Command::Flight)
     );
     assert_eq!(
         state.command(Command::Flight, CONFIRM_WITHIN_US + 4),
-        Verdict::Done(Action::None)
+        Reply::Done(Action::None)
     );
     assert_eq!(state.mode, Mode::Flight);
 }
@@ -160,24 +160,18 @@ fn an_erase_takes_a_second_different_word_and_no_lift_off() {
     let mut state = WAITING;
     assert_eq!(
         state.command(Command::ConfirmErase, 0),
-        Verdict::Refused(Refusal::NothingToConfirm)
+        Reply::Refused(Refusal::NothingToConfirm)
     );
-    assert_eq!(
-        state.command(Command::Erase, 0),
-        Verdict::Confirm(Command::ConfirmErase)
-    );
-    assert_eq!(
-        state.command(Command::Erase, 1),
-        Verdict::Confirm(Command::ConfirmErase)
-    );
-    assert_eq!(state.command(Command::ConfirmErase, 2), Verdict::Done(Action::Erase));
+    assert_eq!(state.command(Command::Erase, 0), Reply::Confirm(Command::ConfirmErase));
+    assert_eq!(state.command(Command::Erase, 1), Reply::Confirm(Command::ConfirmErase));
+    assert_eq!(state.command(Command::ConfirmErase, 2), Reply::Done(Action::Erase));
     let mut flying = FLYING;
     assert_eq!(
         flying.command(Command::Erase, 0),
-        Verdict::Refused(Refusal::Mode(Mode::Wait))
+        Reply::Refused(Refusal::Mode(Mode::Wait))
     );
     state.lift_off = true;
-    assert_eq!(state.command(Command::Erase, 3), Verdict::Refused(Refusal::LiftOff));
+    assert_eq!(state.command(Command::Erase, 3), Reply::Refused(Refusal::LiftOff));
 }
 
 #[test]
@@ -185,7 +179,7 @@ fn a_task_of_the_other_mode_is_refused() {
     let mut state = WAITING;
     assert_eq!(
         state.command(Command::Record, 0),
-        Verdict::Refused(Refusal::Mode(Mode::Flight))
+        Reply::Refused(Refusal::Mode(Mode::Flight))
     );
     let mut flying = FLYING;
     let place = 0;
@@ -201,10 +195,10 @@ fn a_task_of_the_other_mode_is_refused() {
         Command::ReadSet,
         Command::Rail(Rail::default()),
     ] {
-        assert_eq!(flying.command(command, 0), Verdict::Refused(Refusal::Mode(Mode::Wait)));
+        assert_eq!(flying.command(command, 0), Reply::Refused(Refusal::Mode(Mode::Wait)));
     }
-    assert_eq!(flying.command(Command::Record, 0), Verdict::Confirm(Command::Record));
-    assert_eq!(flying.command(Command::Record, 1), Verdict::Done(Action::None));
+    assert_eq!(flying.command(Command::Record, 0), Reply::Confirm(Command::Record));
+    assert_eq!(flying.command(Command::Record, 1), Reply::Done(Action::None));
     assert!(flying.recording);
 }
 
@@ -230,9 +224,9 @@ fn recording_and_packets_take_their_word_twice_within_ten_seconds() {
             (Command::Wait, 1),
         ] {
             let mut state = before;
-            assert_eq!(state.command(command, 0), Verdict::Confirm(command));
-            let verdict = state.command(second, at_us);
-            assert_ne!(verdict, Verdict::Done(Action::None), "{command:?} {second:?}");
+            assert_eq!(state.command(command, 0), Reply::Confirm(command));
+            let reply = state.command(second, at_us);
+            assert_ne!(reply, Reply::Done(Action::None), "{command:?} {second:?}");
             assert_eq!(
                 (state.mode, state.task, state.recording),
                 (before.mode, before.task, before.recording)
@@ -240,7 +234,7 @@ fn recording_and_packets_take_their_word_twice_within_ten_seconds() {
         }
         let mut state = before;
         state.command(command, 0);
-        assert_eq!(state.command(command, CONFIRM_WITHIN_US), Verdict::Done(Action::None));
+        assert_eq!(state.command(command, CONFIRM_WITHIN_US), Reply::Done(Action::None));
         assert_ne!((state.task, state.recording), (before.task, before.recording));
     }
 }
@@ -259,35 +253,35 @@ fn lift_off_starts_flight_and_recording_once() {
 #[test]
 fn a_set_is_loaded_or_forgotten_by_a_second_different_word() {
     let mut state = WAITING;
-    let done = |command| Verdict::Done(Action::Calibration(command));
+    let done = |command| Reply::Done(Action::Calibration(command));
     assert_eq!(
         state.command(Command::ConfirmSet, 0),
-        Verdict::Refused(Refusal::NothingToConfirm)
+        Reply::Refused(Refusal::NothingToConfirm)
     );
     for armed in [Command::LoadSet, Command::ForgetSet] {
-        assert_eq!(state.command(armed, 0), Verdict::Confirm(Command::ConfirmSet));
-        assert_eq!(state.command(armed, 1), Verdict::Confirm(Command::ConfirmSet));
+        assert_eq!(state.command(armed, 0), Reply::Confirm(Command::ConfirmSet));
+        assert_eq!(state.command(armed, 1), Reply::Confirm(Command::ConfirmSet));
         assert_eq!(state.command(Command::ConfirmSet, 2), done(armed));
         assert_eq!(
             state.command(Command::ConfirmSet, 3),
-            Verdict::Refused(Refusal::NothingToConfirm)
+            Reply::Refused(Refusal::NothingToConfirm)
         );
     }
     // The confirmation of one thing is not that of another.
     state.command(Command::Erase, 4);
     assert_eq!(
         state.command(Command::ConfirmSet, 5),
-        Verdict::Refused(Refusal::NothingToConfirm)
+        Reply::Refused(Refusal::NothingToConfirm)
     );
     state.command(Command::LoadSet, 6);
     assert_eq!(
         state.command(Command::ConfirmErase, 7),
-        Verdict::Refused(Refusal::NothingToConfirm)
+        Reply::Refused(Refusal::NothingToConfirm)
     );
     state.command(Command::LoadSet, 8);
     assert_eq!(
         state.command(Command::ConfirmSet, CONFIRM_WITHIN_US + 9),
-        Verdict::Refused(Refusal::NothingToConfirm)
+        Reply::Refused(Refusal::NothingToConfirm)
     );
 }
 

@@ -37,7 +37,7 @@ impl Spin {
     /// Takes a cycle, its axes as `measured`. Whether it can go on.
     #[inline(never)]
     pub fn take(&mut self, set: &Set, sample: &Sample, measured: &Measured, increments: &Increments) -> bool {
-        let delays = self.place.delays;
+        let delays = self.surroundings.delays;
         let mut events: heapless::Vec<(u64, Event), EVENTS> = heapless::Vec::new();
         let mut note = |at_us: u64, late_s: f32, event: Event| {
             let at_us = at_us.saturating_sub((late_s * 1e6) as u64);

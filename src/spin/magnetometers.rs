@@ -33,7 +33,7 @@ impl Spin {
             return None;
         }
         let dcm = dcm_nb(&self.q_nb);
-        let field_b = dcm.tr_mul(&self.place.field_n_ut);
+        let field_b = dcm.tr_mul(&self.surroundings.field_n_ut);
         let mut residual_b = Vector3::zeros();
         let mut noise: f32 = 0.0;
         for k in first..first + 3 {
@@ -59,7 +59,7 @@ impl Spin {
         let mut all = true;
         for (axis_b, r) in axes.iter().zip([white + aged, white]) {
             // h . C_bn (m x a) = a . (C_nb h x m)
-            let seen = (dcm * axis_b).cross(&self.place.field_n_ut);
+            let seen = (dcm * axis_b).cross(&self.surroundings.field_n_ut);
             let row: [(usize, f32); 6] = [
                 (ATTITUDE, seen.x),
                 (ATTITUDE + 1, seen.y),

@@ -38,7 +38,7 @@ impl Spin {
         let across = [(y + half * y_up) * dt_s, (z + half * z_up) * dt_s];
         let spun = (self.spin + half * self.spin_up) * dt_s;
         let turned = from_rotation_vector(self.turning_b(across)) * from_rotation_vector(Vector3::new(spun, 0.0, 0.0));
-        let earth = from_rotation_vector(self.place.earth_rate_n * -dt_s);
+        let earth = from_rotation_vector(self.surroundings.earth_rate_n * -dt_s);
         (renormalised(earth * self.q_nb * turned), spun)
     }
 

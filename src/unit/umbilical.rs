@@ -20,7 +20,7 @@ use crate::{
     crash::{CrashCause, CrashRecord},
     derived,
     flight_log::{dump, record},
-    mode::{Action, Cause, Refusal, Task, Verdict},
+    mode::{Action, Cause, Refusal, Reply, Task},
 };
 
 /// Sends for ever.
@@ -144,31 +144,31 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
             Printable(word_of(command))
         ));
     }
-    let verdict = shared.change(Cause::Command, |state| state.command(command, now().as_micros()));
+    let reply = shared.change(Cause::Command, |state| state.command(command, now().as_micros()));
     let word = Printable(word_of(command));
-    if let (Verdict::Confirm(_), Command::LoadSet) = (verdict, command)
+    if let (Reply::Confirm(_), Command::LoadSet) = (reply, command)
         && let Err(why) = calibration::sent(shared, arriving)
     {
         return shared.say(format_args!("G_CL no: {why}"));
     }
-    if verdict == Verdict::Confirm(Command::ConfirmErase) {
+    if reply == Reply::Confirm(Command::ConfirmErase) {
         shared.note(Cause::EraseArmed);
     }
-    match verdict {
-        Verdict::Confirm(with) => shared.say(format_args!(
+    match reply {
+        Reply::Confirm(with) => shared.say(format_args!(
             "{word}{}: send {} within 10 s",
             Armed(command),
             Printable(word_of(with))
         )),
-        Verdict::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
-        Verdict::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
-        Verdict::Refused(Refusal::Number(why)) => shared.say(format_args!("{word} no: {why}")),
-        Verdict::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
-        Verdict::Done(Action::None) => {
+        Reply::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
+        Reply::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
+        Reply::Refused(Refusal::Number(why)) => shared.say(format_args!("{word} no: {why}")),
+        Reply::Refused(Refusal::LiftOff) => shared.say(format_args!("{word} no: lift-off line is asserted")),
+        Reply::Done(Action::None) => {
             let mode = shared.state.get().mode.name();
             shared.say(format_args!("{word} ok: {mode}"));
         }
-        Verdict::Done(Action::Erase) => {
+        Reply::Done(Action::Erase) => {
             shared.erase_ordered.set(true);
             shared.note(Cause::Erased);
             match shared.recorder_error.get() {
@@ -176,20 +176,20 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
                 Some(error) => shared.say(format_args!("{word} ok: erase ordered, but recorder: {error}")),
             }
         }
-        Verdict::Done(Action::SelfTest) => {
+        Reply::Done(Action::SelfTest) => {
             shared.self_test_ordered.signal(());
             shared.say(format_args!(
                 "{word} ok: sixteen sensors, about 5 s; keep the unit still"
             ));
         }
-        Verdict::Done(Action::Calibration(command)) => calibration::answer(shared, memory, arriving, command).await,
-        Verdict::Done(Action::Rail(rail)) => rail::set(shared, memory, rail),
-        Verdict::Done(Action::Report(Command::Help)) => help(shared).await,
-        Verdict::Done(Action::Report(Command::Version)) => {
+        Reply::Done(Action::Calibration(command)) => calibration::answer(shared, memory, arriving, command).await,
+        Reply::Done(Action::Rail(rail)) => rail::set(shared, memory, rail),
+        Reply::Done(Action::Report(Command::Help)) => help(shared).await,
+        Reply::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
         }
-        Verdict::Done(Action::Report(Command::Alignment)) => alignment(shared),
-        Verdict::Done(Action::Report(_)) => status(shared),
+        Reply::Done(Action::Report(Command::Alignment)) => alignment(shared),
+        Reply::Done(Action::Report(_)) => status(shared),
     }
 }
 

@@ -186,7 +186,7 @@ fn part_of(parts: &[String], channel: &str) -> String {
 
 /// The table the unit stood on.
 #[derive(Clone, Debug, clap::Args)]
-pub(crate) struct Place {
+pub(crate) struct TableArguments {
     /// How the unit sits on the table: axes at zero angles
     #[arg(long, value_enum, default_value = "emems")]
     mount: MountName,
@@ -219,7 +219,7 @@ enum MountName {
     Siqueira,
 }
 
-impl Place {
+impl TableArguments {
     pub(crate) fn mount(&self) -> Mount {
         match self.mount {
             MountName::Emems => Mount::EMEMS,

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::{
     consensus::{self, Claim, Consensus},
-    experiment::{Experiment, Kind},
+    experiment::{Excitation, Experiment},
     response::{Observation, Orders, Response, ResponseError},
     wiring::{Wiring, wirings},
 };
@@ -121,7 +121,7 @@ pub fn calibrate(experiment: &Experiment, options: &Options) -> Result<Calibrati
             Contradicted::Correct => *row = contradiction.reading.and_then(|reading| row.map(|x| reading.of(&x))),
         }
     }
-    let pairs = if experiment.kind == Kind::Rate {
+    let pairs = if experiment.kind == Excitation::Rate {
         antagonists(&excitation_b)
     } else {
         Vec::new()

@@ -15,7 +15,7 @@ pub mod command;
 use nalgebra::{Matrix4, Vector3};
 
 use crate::{
-    experiment::Kind,
+    experiment::Excitation,
     turntable::{Mount, Pose, Site, Turning},
 };
 
@@ -34,7 +34,7 @@ pub enum Wanted {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
     /// Gyros or accelerometers.
-    pub kind: Kind,
+    pub kind: Excitation,
     /// How the unit sits on the table.
     pub mount: Mount,
     /// Where the table stands.
@@ -104,7 +104,7 @@ pub fn plan(means: &Means, wanted: &[Wanted]) -> Result<Plan, TooShort> {
     let runs = (means.time_s / run_s) as usize;
     // Bounded, so that a year of table time does not take a year to plan.
     let choices = (runs / each).min(500);
-    let unit = if means.kind == Kind::Rate {
+    let unit = if means.kind == Excitation::Rate {
         means.rate_rad_s
     } else {
         means.site.gravity_m_s2
@@ -188,7 +188,7 @@ fn candidates(means: &Means) -> Vec<Vec<Run>> {
     let steps = (360.0 / means.step_deg.clamp(5.0, 90.0)).round() as usize;
     let angle = |k: usize| (360.0 * k as f64 / steps as f64).to_radians();
     match means.kind {
-        Kind::Force => (0..steps)
+        Excitation::Force => (0..steps)
             .flat_map(|a| (0..steps).map(move |b| (a, b)))
             .map(|(a, b)| Pose {
                 inner_rad: angle(a),
@@ -202,7 +202,7 @@ fn candidates(means: &Means) -> Vec<Vec<Run>> {
                 }]
             })
             .collect(),
-        Kind::Rate => {
+        Excitation::Rate => {
             let upright = [0, steps / 2].map(|b| {
                 (
                     Pose {
@@ -240,14 +240,14 @@ fn unobservable(means: &Means) -> Vec<String> {
         "temperature coefficients, unless the plan is repeated at other temperatures".to_string(),
     ];
     match means.kind {
-        Kind::Rate => {
+        Excitation::Rate => {
             list.push("non-linearity: all runs are at one rate".into());
             list.push("sensitivity to acceleration: gravity goes round in every run".into());
             if means.site.outer_azimuth_rad.is_none() {
                 list.push("bias below the Earth's rate: the azimuth of the outer axis is not known".into());
             }
         }
-        Kind::Force => {
+        Excitation::Force => {
             list.push("scale and non-linearity beyond 1 g".into());
             list.push("sensitivity to rate: nothing turns".into());
         }

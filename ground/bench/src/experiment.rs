@@ -23,19 +23,19 @@ use crate::{
 
 /// What excites the channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum Excitation {
     /// Gyros, excited by rate [rad/s].
     Rate,
     /// Accelerometers, excited by specific force [m/s2].
     Force,
 }
 
-impl Kind {
+impl Excitation {
     /// As a kind of number.
     pub fn magnitude(self) -> magnitude::Kind {
         match self {
-            Kind::Rate => magnitude::Kind::Rate,
-            Kind::Force => magnitude::Kind::Force,
+            Excitation::Rate => magnitude::Kind::Rate,
+            Excitation::Force => magnitude::Kind::Force,
         }
     }
 }
@@ -67,7 +67,7 @@ pub struct Experiment {
     /// Where it came from.
     pub file: PathBuf,
     /// What excites the channels.
-    pub kind: Kind,
+    pub kind: Excitation,
     /// Names of the channels.
     pub channels: Vec<String>,
     /// Its rows.
@@ -82,7 +82,7 @@ pub struct Experiment {
 #[derive(Clone)]
 pub struct Layout<'a> {
     /// What excites the channels.
-    pub kind: Kind,
+    pub kind: Excitation,
     /// How the unit sat on the table.
     pub mount: Mount,
     /// Where the table stands.
@@ -237,18 +237,18 @@ struct Source {
 type Excited = (Option<Vector3<f64>>, Option<(Pose, Option<Turning>)>, f64);
 
 impl Source {
-    fn of(table: &Table, kind: Kind, told: &Units) -> Result<Self, TableError> {
+    fn of(table: &Table, kind: Excitation, told: &Units) -> Result<Self, TableError> {
         let triple =
             |unit: &str, letter: char| ["x", "y", "z"].map(|axis| table.column(&format!("{letter}{axis}_{unit}")));
         let of = kind.magnitude();
         let units: Vec<(&str, magnitude::Unit)> = match kind {
-            Kind::Rate => vec!["rad_s", "deg_s"],
-            Kind::Force => vec!["m_s2", "g"],
+            Excitation::Rate => vec!["rad_s", "deg_s"],
+            Excitation::Force => vec!["m_s2", "g"],
         }
         .into_iter()
         .zip(of.units().iter().copied())
         .collect();
-        let letter = if kind == Kind::Rate { 'w' } else { 'f' };
+        let letter = if kind == Excitation::Rate { 'w' } else { 'f' };
         let missing = |why: String| TableError {
             file: table.file.clone(),
             line: 0,
@@ -276,16 +276,16 @@ impl Source {
         }
         let pair = |a: &str, b: &str| Some([table.column(a)?, table.column(b)?]);
         let (angles, run) = (pair("inner_deg", "outer_deg"), pair("turning", "rate_deg_s"));
-        if components.is_none() && (angles.is_none() || kind == Kind::Rate && run.is_none()) {
+        if components.is_none() && (angles.is_none() || kind == Excitation::Rate && run.is_none()) {
             let wanted = match kind {
-                Kind::Rate => "wx_rad_s, wy_rad_s, wz_rad_s or inner_deg, outer_deg, turning, rate_deg_s",
-                Kind::Force => "fx_m_s2, fy_m_s2, fz_m_s2 or inner_deg, outer_deg",
+                Excitation::Rate => "wx_rad_s, wy_rad_s, wz_rad_s or inner_deg, outer_deg, turning, rate_deg_s",
+                Excitation::Force => "fx_m_s2, fy_m_s2, fz_m_s2 or inner_deg, outer_deg",
             };
             return Err(missing(format!(
                 "does not say what the unit felt: it needs columns {wanted}"
             )));
         }
-        let angles = if kind == Kind::Rate && run.is_none() {
+        let angles = if kind == Excitation::Rate && run.is_none() {
             None
         } else {
             angles
@@ -293,7 +293,7 @@ impl Source {
         Ok(Source {
             components,
             angles,
-            run: if kind == Kind::Rate { run } else { None },
+            run: if kind == Excitation::Rate { run } else { None },
         })
     }
 
@@ -315,8 +315,8 @@ impl Source {
             norms.push(f64::sqrt(squares));
         }
         let (what, observed) = match layout.kind {
-            Kind::Rate => ("the largest rate", norms.into_iter().reduce(f64::max)),
-            Kind::Force => ("specific force at rest, the median,", magnitude::median(norms)),
+            Excitation::Rate => ("the largest rate", norms.into_iter().reduce(f64::max)),
+            Excitation::Force => ("specific force at rest, the median,", magnitude::median(norms)),
         };
         let Some(observed) = observed else { return Ok(()) };
         magnitude::judge(what, kind, unit, observed, kind.possible())

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::{
-    experiment::{Experiment, Kind},
+    experiment::{Excitation, Experiment},
     least_squares,
     turntable::{Mount, Site},
 };
@@ -32,7 +32,7 @@ pub struct Lean {
 
 /// Estimates the lean.
 pub fn lean(experiment: &Experiment, mount: &Mount, site: &Site) -> Option<Lean> {
-    if experiment.kind != Kind::Force || experiment.trials.iter().any(|trial| trial.pose.is_none()) {
+    if experiment.kind != Excitation::Force || experiment.trials.iter().any(|trial| trial.pose.is_none()) {
         return None;
     }
     let scatter: Vec<f64> = {
@@ -149,7 +149,7 @@ mod tests {
         };
         Experiment {
             file: "poses".into(),
-            kind: Kind::Force,
+            kind: Excitation::Force,
             channels: ["a1x", "a1y", "a1z"].map(String::from).to_vec(),
             trials: poses.iter().map(trial).collect(),
             declared: None,

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use twin::keys::meant;
 
-use crate::{controlled::Calibration, ellipsoid::Ellipsoid, experiment::Kind};
+use crate::{controlled::Calibration, ellipsoid::Ellipsoid, experiment::Excitation};
 
 /// What the first line of a set says.
 pub const FORMAT: &str = "calibration-set/1";
@@ -185,10 +185,10 @@ impl Set {
 
 impl Entry {
     /// Channels of a calibration with controlled inputs.
-    pub fn controlled(calibration: &Calibration, kind: Kind) -> Vec<Entry> {
+    pub fn controlled(calibration: &Calibration, kind: Excitation) -> Vec<Entry> {
         let (sensor, method) = match kind {
-            Kind::Rate => ("gyro", "rate-table"),
-            Kind::Force => ("accelerometer", "multi-position"),
+            Excitation::Rate => ("gyro", "rate-table"),
+            Excitation::Force => ("accelerometer", "multi-position"),
         };
         let entry = |channel: &crate::controlled::Channel| {
             let fit = &channel.response;

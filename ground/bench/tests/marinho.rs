@@ -5,7 +5,7 @@ mod seeds;
 
 use bench::{
     controlled::{Calibration, Options, calibrate},
-    experiment::{Experiment, Kind, Trial},
+    experiment::{Excitation, Experiment, Trial},
     turntable::{Mount, Pose, Site, Turning},
 };
 use nalgebra::{DMatrix, Matrix4, Matrix4x3, SMatrix, Vector3, Vector4};
@@ -47,7 +47,7 @@ fn trial(label: String, excitation_b: Vector3<f64>, values: &[f64]) -> Trial {
     }
 }
 
-fn experiment(kind: Kind, channels: &[&str], trials: Vec<Trial>) -> Experiment {
+fn experiment(kind: Excitation, channels: &[&str], trials: Vec<Trial>) -> Experiment {
     Experiment {
         file: "thesis".into(),
         kind,
@@ -64,7 +64,7 @@ fn runs() -> Experiment {
     let columns = ["pos", E[0], E[1], E[2], "g1_lsb", "g2_lsb", "g3_lsb", "g4_lsb"];
     let row = |row: &Vec<f64>| trial(format!("{}", row[0]), b_of_e(&row[1..4]), &row[4..]);
     let trials = seeds::numbers(&golden, &columns).iter().map(row).collect();
-    experiment(Kind::Rate, &["g1", "g2", "g3", "g4"], trials)
+    experiment(Excitation::Rate, &["g1", "g2", "g3", "g4"], trials)
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn positions() -> Experiment {
         ..trial((k + 1).to_string(), -b_of_e(&row[..3]), &row[3..])
     };
     let trials = seeds::numbers(&golden, &columns).iter().enumerate().map(row).collect();
-    experiment(Kind::Force, &ACCELEROMETERS, trials)
+    experiment(Excitation::Force, &ACCELEROMETERS, trials)
 }
 
 #[test]

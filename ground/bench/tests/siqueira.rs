@@ -5,7 +5,7 @@ mod seeds;
 
 use bench::{
     controlled::{Calibration, Contradicted, Options, calibrate},
-    experiment::{Experiment, Kind, Trial},
+    experiment::{Excitation, Experiment, Trial},
     least_squares::solve,
     turntable::{Mount, Pose, Turning},
     wiring::surely_inverted,
@@ -32,7 +32,7 @@ fn campaign() -> Experiment {
     };
     Experiment {
         file: "Table 7.4".into(),
-        kind: Kind::Rate,
+        kind: Excitation::Rate,
         channels: CHANNELS.map(String::from).to_vec(),
         trials: rates.iter().zip(&outputs).enumerate().map(trial).collect(),
         declared: None,

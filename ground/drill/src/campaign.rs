@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use emems::{
     command::{COMMANDS, Heard, Parser},
     derived::Health,
-    mode::{Action, State, Verdict as Deed},
+    mode::{Action, Reply, State},
 };
 use host_tests::{
     Flight, MS, S,
@@ -131,7 +131,7 @@ pub fn random_bytes(seed: u64, long: bool) -> Told {
         };
         if let Some(Heard::Command(command)) = parser.hear(byte, at_us) {
             words += 1;
-            erases += u64::from(state.command(command, at_us) == Deed::Done(Action::Erase));
+            erases += u64::from(state.command(command, at_us) == Reply::Done(Action::Erase));
         }
     }
     let said = format!("{bytes} bytes, {words} words by chance, {erases} erases");

@@ -5,7 +5,7 @@
 
 use emems::{
     command::{Heard, Parser},
-    mode::{Action, Mode, State, Verdict},
+    mode::{Action, Mode, Reply, State},
 };
 
 /// \[us\] what a step of the fuzzer's clock is worth: up to 12.75 s, longer than any confirmation waits.
@@ -27,7 +27,7 @@ pub fn commands(bytes: &[u8]) {
         };
         let said = &said[..=heard];
         let before = state.mode;
-        if state.command(command, now_us) == Verdict::Done(Action::Erase) {
+        if state.command(command, now_us) == Reply::Done(Action::Erase) {
             assert!(times(said, b"G_MA") >= 1 && times(said, b"G_CA") >= 1);
             assert_eq!(state.mode, Mode::Wait);
         }

@@ -5,7 +5,7 @@
 
 use emems::{
     flight_log::{
-        page::{self, Kind, Tag},
+        page::{self, PageKind, Tag},
         record::{RECORD_BYTES, RecordBytes},
     },
     nand::{PAGE_BYTES, PAGES_PER_BLOCK, PageAddress},
@@ -25,7 +25,7 @@ fn put_right(record: &RecordBytes) -> RecordBytes {
 fn image(records: &[u8]) -> Vec<u8> {
     let mut image = Vec::new();
     let tag = Tag {
-        kind: Kind::Log,
+        kind: PageKind::Log,
         epoch: 0,
         boot: 1,
     };

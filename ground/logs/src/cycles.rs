@@ -9,7 +9,7 @@
 use emems::{
     derived::Derived,
     geometry::rate_from_gyros,
-    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
+    increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     sample::{NOT_READ, Reading, SENSOR_COUNT, Sample},
     unit::Settings,
 };
@@ -131,16 +131,16 @@ impl Cycles {
 }
 
 /// A gyro between two samples; nothing where one was not read.
-fn channel(before: i16, now: i16, covered_us: u32) -> Channel {
+fn channel(before: i16, now: i16, covered_us: u32) -> GyroCycle {
     if before == NOT_READ || now == NOT_READ {
-        return Channel {
+        return GyroCycle {
             integral_counts_s: 0.0,
             least: NOT_READ,
             most: NOT_READ,
             count: 0,
         };
     }
-    Channel {
+    GyroCycle {
         integral_counts_s: (f32::from(before) + f32::from(now)) * 0.5e-6 * covered_us as f32,
         least: before.min(now),
         most: before.max(now),

@@ -204,7 +204,7 @@ mod tests {
         crash::CrashCause,
         derived::{Health, Start},
         estimate::Estimate,
-        increments::{Channel, Increments, SLICES, Slice},
+        increments::{GyroCycle, Increments, SLICES, Slice},
         mode::Mode,
         packet,
     };
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn rows_have_as_many_cells_as_their_header() {
-        let silent = Channel {
+        let silent = GyroCycle {
             integral_counts_s: 0.0,
             least: NOT_READ,
             most: NOT_READ,

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use emems::{
     flight_log::{
         dump::{self, DUMP_BYTES, DUMP_START},
-        page::{self, Kind, Stamp},
+        page::{self, PageKind, Stamp},
         record::{self, BootHeader, Content, Entry, Key, RecordBytes, RecordError},
         superblock,
     },
@@ -128,7 +128,7 @@ fn read_image(image: &[u8]) -> Result<Log, LogError> {
                 }
                 Err(superblock::SuperblockError::Newer(version)) => return Err(LogError::Newer(version)),
                 Err(superblock::SuperblockError::Damaged) => {
-                    let of_records = !matches!(stamp, Stamp::Ours(tag) if tag.kind != Kind::Log);
+                    let of_records = !matches!(stamp, Stamp::Ours(tag) if tag.kind != PageKind::Log);
                     log.damage.lost += u64::from(!log.take(bytes) && of_records);
                 }
             }

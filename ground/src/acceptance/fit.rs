@@ -30,7 +30,7 @@ pub struct AxisFit {
 
 /// Where a triad is, by what it feels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Seat {
     /// Plate it feels like, from 0.
     pub plate: usize,
     /// Axis of that plate that each of its own feels, and whether with the other sign.
@@ -43,7 +43,7 @@ pub struct TriadFit {
     /// x, y, z.
     pub axes: [AxisFit; 3],
     /// Where it is.
-    pub place: Place,
+    pub seat: Seat,
     /// \[deg\] the axis that is farthest from where it should be there.
     pub off_deg: f64,
 }
@@ -99,55 +99,55 @@ pub fn triad(plate: usize, felt_b: &[Vector3<f64>], read: &[Vector3<f64>]) -> Re
     if scale < 0.05 {
         return Err("it feels nothing of the poses");
     }
-    let (place, _) = place(plate, &(s_pb / scale));
+    let (seat, _) = seat(plate, &(s_pb / scale));
     let off = |axis: &usize| {
-        let expected_b = axis_b(place, *axis);
+        let expected_b = axis_b(seat, *axis);
         let found_b = axes[*axis].sensitivity_b;
         found_b.angle(&expected_b).to_degrees()
     };
     let off_deg = [0, 1, 2].iter().map(off).fold(0.0, f64::max);
-    Ok(TriadFit { axes, place, off_deg })
+    Ok(TriadFit { axes, seat, off_deg })
 }
 
 /// Direction in b that an axis of a triad in a place has.
-fn axis_b(place: Place, axis: usize) -> Vector3<f64> {
-    let (of_plate, inverted) = place.axes[axis];
-    let column = dcm_bp(place.plate).column(of_plate).into_owned();
+fn axis_b(seat: Seat, axis: usize) -> Vector3<f64> {
+    let (of_plate, inverted) = seat.axes[axis];
+    let column = dcm_bp(seat.plate).column(of_plate).into_owned();
     if inverted { -column } else { column }
 }
 
 /// The place that fits a triad of scale one best, and how badly.
-fn place(plate: usize, s_pb: &Matrix3<f64>) -> (Place, f64) {
-    let misfit = |place: &Place| {
-        let off = |axis: usize| (s_pb.row(axis).transpose() - axis_b(*place, axis)).norm_squared();
+fn seat(plate: usize, s_pb: &Matrix3<f64>) -> (Seat, f64) {
+    let misfit = |seat: &Seat| {
+        let off = |axis: usize| (s_pb.row(axis).transpose() - axis_b(*seat, axis)).norm_squared();
         (off(0) + off(1) + off(2)).sqrt()
     };
-    let drawn = Place {
+    let drawn = Seat {
         plate,
         axes: [(0, false), (1, false), (2, false)],
     };
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     let places = (0..4).flat_map(|plate| {
         orders.into_iter().flat_map(move |order| {
-            (0..8_u8).map(move |signs| Place {
+            (0..8_u8).map(move |signs| Seat {
                 plate,
                 axes: std::array::from_fn(|axis| (order[axis], signs >> axis & 1 == 1)),
             })
         })
     });
     let best = places
-        .map(|place| (place, misfit(&place)))
+        .map(|seat| (seat, misfit(&seat)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .unwrap_or((drawn, f64::INFINITY));
     let own = misfit(&drawn);
     if own <= CLEARLY * best.1 { (drawn, own) } else { best }
 }
 
-impl Place {
+impl Seat {
     /// Whether it is where the drawing has it.
     pub fn is_drawn(&self, plate: usize) -> bool {
         *self
-            == Place {
+            == Seat {
                 plate,
                 axes: [(0, false), (1, false), (2, false)],
             }
@@ -202,7 +202,7 @@ pub fn gyro(plate: usize, angles_b: &[Vector3<f64>], read: &[f64], bias: (f64, f
             gyro_axis_b(plate)
         }
     };
-    let off = |place: &(usize, bool)| sensitivity_b.angle(&axis(*place));
+    let off = |seat: &(usize, bool)| sensitivity_b.angle(&axis(*seat));
     let best = axes.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or((plate, false));
     let (plate, inverted) = if off(&(plate, false)) <= CLEARLY * off(&best) {
         (plate, false)
@@ -259,13 +259,13 @@ mod tests {
         for own in 0..4 {
             for other in 0..4 {
                 for (order, signs) in [([0, 1, 2], 0_u8), ([1, 0, 2], 1), ([0, 1, 2], 4), ([2, 0, 1], 7)] {
-                    let place = Place {
+                    let seat = Seat {
                         plate: other,
                         axes: std::array::from_fn(|axis| (order[axis], signs >> axis & 1 == 1)),
                     };
-                    let rows = [0, 1, 2].map(|axis| axis_b(place, axis).transpose());
+                    let rows = [0, 1, 2].map(|axis| axis_b(seat, axis).transpose());
                     let found = triad(own, &felt(), &read(Matrix3::from_rows(&rows) * 1.05)).expect("fitted");
-                    assert_eq!(found.place, place, "{own}");
+                    assert_eq!(found.seat, seat, "{own}");
                     assert!(found.off_deg < 0.01, "{}", found.off_deg);
                     assert!((found.axes[2].bias - 0.3).abs() < 1e-9);
                 }
@@ -277,7 +277,7 @@ mod tests {
     fn a_crooked_triad_stays_where_it_is_drawn() {
         let crooked = nalgebra::Rotation3::from_euler_angles(0.05, -0.08, 0.04).into_inner();
         let found = triad(1, &felt(), &read(crooked * dcm_bp(1).transpose())).expect("fitted");
-        assert!(found.place.is_drawn(1));
+        assert!(found.seat.is_drawn(1));
         assert!(found.off_deg > 4.0, "{}", found.off_deg);
     }
 

@@ -40,7 +40,7 @@ pub fn first(outcome: &Outcome, unit: &str) -> Set {
 }
 
 fn drawn(fit: &TriadFit, plate: usize) -> bool {
-    fit.place.is_drawn(plate)
+    fit.seat.is_drawn(plate)
 }
 
 fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {

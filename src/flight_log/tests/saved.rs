@@ -59,7 +59,7 @@ fn a_save_is_sure_with_nothing_torn(starts: u32) {
         // Of one the tag alone is whole.
         let mut tagged = saved();
         let tag = page::Tag {
-            kind: Kind::Superblock,
+            kind: PageKind::Superblock,
             epoch: 0,
             boot: 9,
         };

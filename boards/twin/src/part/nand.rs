@@ -13,7 +13,7 @@ pub mod latch;
 mod tear;
 
 use emems::flight_log::{
-    page::{self, Kind, Tag},
+    page::{self, PageKind, Tag},
     superblock::{self, Superblock},
 };
 use emems::nand::{BAD_MARK, MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, PageAddress, PageBytes};
@@ -153,7 +153,7 @@ impl Cells {
             ..Superblock::default()
         });
         let tag = Tag {
-            kind: Kind::Superblock,
+            kind: PageKind::Superblock,
             epoch: 0,
             boot: 0,
         };

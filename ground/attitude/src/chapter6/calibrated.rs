@@ -16,7 +16,7 @@
 use bench::{
     controlled::{self, CalibrationError, Options},
     ellipsoid::{Ellipsoid, EllipsoidError},
-    experiment::{Experiment, Kind as Excited, Trial},
+    experiment::{Excitation, Experiment, Trial},
     set::{
         Entry, Set as File,
         image::{self, ImageError},
@@ -199,9 +199,9 @@ fn experiment(kind: Kind, channels: usize, rows: impl Iterator<Item = (Vector3<f
     Experiment {
         file: "twin".into(),
         kind: if kind == Kind::Gyro {
-            Excited::Rate
+            Excitation::Rate
         } else {
-            Excited::Force
+            Excitation::Force
         },
         trials: rows.enumerate().map(trial).collect(),
         channels,

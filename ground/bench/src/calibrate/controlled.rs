@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use logs::units::Units;
 
-use super::{CalibrateError, Output, Place, checks, read_nominal};
+use super::{CalibrateError, Output, TableArguments, checks, read_nominal};
 use crate::{
     controlled::{self, Calibration, Contradicted, Options},
-    experiment::{Experiment, Kind, Layout},
+    experiment::{Excitation, Experiment, Layout},
     lean, log,
     nominal::{Nominal, NominalChannel},
     report::{self, Leftover, Report},
@@ -60,7 +60,7 @@ struct Common {
     #[arg(long, value_name = "FILE")]
     unit: Option<PathBuf>,
     #[command(flatten)]
-    place: Place,
+    table: TableArguments,
     /// Degree of the bias in temperature
     #[arg(long, default_value_t = 0)]
     bias_order: usize,
@@ -92,7 +92,9 @@ pub fn rate_table(arguments: &RateTable) -> Result<bool, CalibrateError> {
     let common = &arguments.common;
     let (bytes, nominal) = common.read()?;
     let table = Table::parse(&common.file, &bytes)?;
-    let experiment = common.layout(Kind::Rate, nominal.as_ref(), |layout| Experiment::read(&table, layout))?;
+    let experiment = common.layout(Excitation::Rate, nominal.as_ref(), |layout| {
+        Experiment::read(&table, layout)
+    })?;
     common.calibrate(&experiment, nominal.as_ref(), Vec::new(), &[(&common.file, &bytes)])
 }
 
@@ -103,7 +105,9 @@ pub fn multi_position(arguments: &MultiPosition) -> Result<bool, CalibrateError>
     let mut sources: Vec<(&Path, &[u8])> = vec![(&common.file, &bytes)];
     let logged;
     let experiment = match &arguments.log {
-        None => common.layout(Kind::Force, nominal.as_ref(), |layout| Experiment::read(&table, layout))?,
+        None => common.layout(Excitation::Force, nominal.as_ref(), |layout| {
+            Experiment::read(&table, layout)
+        })?,
         Some(path) => {
             let samples;
             (samples, logged) = log::samples(path, &common.channels)?;
@@ -114,12 +118,12 @@ pub fn multi_position(arguments: &MultiPosition) -> Result<bool, CalibrateError>
             }
             let mean = |number: usize, _: &table::Row| Ok(found[number].mean.iter().map(|mean| Some(*mean)).collect());
             let channels = common.channels.clone();
-            common.layout(Kind::Force, nominal.as_ref(), |layout| {
+            common.layout(Excitation::Force, nominal.as_ref(), |layout| {
                 Experiment::assemble(&table, layout, channels, &mean)
             })?
         }
     };
-    let (mount, site) = (common.place.mount(), common.place.site());
+    let (mount, site) = (common.table.mount(), common.table.site());
     match lean::lean(&experiment, &mount, &site) {
         Some(lean) => {
             let [a, b] = lean.lean_rad.map(f64::to_degrees);
@@ -158,14 +162,14 @@ impl Common {
         Ok((table::bytes(&self.file)?, nominal))
     }
 
-    fn layout<T>(&self, kind: Kind, nominal: Option<&Nominal>, read: impl FnOnce(&Layout) -> T) -> T {
+    fn layout<T>(&self, kind: Excitation, nominal: Option<&Nominal>, read: impl FnOnce(&Layout) -> T) -> T {
         let limit = |name: &str| {
             let channel = nominal.and_then(|nominal| nominal.channel(name));
             channel.map_or(f64::INFINITY, NominalChannel::limit_counts)
         };
         let sensor = match kind {
-            Kind::Rate => "gyro",
-            Kind::Force => "accelerometer",
+            Excitation::Rate => "gyro",
+            Excitation::Force => "accelerometer",
         };
         let has = |name: &str| {
             let channel = nominal.and_then(|nominal| nominal.channel(name));
@@ -173,8 +177,8 @@ impl Common {
         };
         read(&Layout {
             kind,
-            mount: self.place.mount(),
-            site: self.place.site(),
+            mount: self.table.mount(),
+            site: self.table.site(),
             channels: &self.channels,
             has: &has,
             units: self.units,
@@ -260,8 +264,8 @@ fn in_order<'a>(experiment: &Experiment, found: &'a Calibration) -> Vec<&'a str>
 
 fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradicted) -> Report {
     let (title, unit) = match experiment.kind {
-        Kind::Rate => ("Rate table", "rad/s"),
-        Kind::Force => ("Multi-position", "m/s²"),
+        Excitation::Rate => ("Rate table", "rad/s"),
+        Excitation::Force => ("Multi-position", "m/s²"),
     };
     let columns = [
         "channel",
@@ -344,7 +348,7 @@ fn describe(experiment: &Experiment, found: &Calibration, contradicted: Contradi
             label(earlier)
         ));
     }
-    if experiment.kind == Kind::Rate {
+    if experiment.kind == Excitation::Rate {
         let paired = 2 * found.pairs.len();
         let used = found.excitation_b.iter().flatten().count();
         if paired < used {

@@ -58,7 +58,7 @@ fn campaign(noise: &mut dyn FnMut() -> f64) -> Experiment {
     }
     Experiment {
         file: "campaign".into(),
-        kind: Kind::Rate,
+        kind: Excitation::Rate,
         channels: ["g1", "g2", "g3", "g4"].map(String::from).to_vec(),
         trials,
         declared: None,
@@ -151,7 +151,7 @@ fn intervals_of_multi_position_calibrations_cover_95_of_100() {
         };
         let experiment = Experiment {
             file: "positions".into(),
-            kind: Kind::Force,
+            kind: Excitation::Force,
             channels: vec!["a1x".into()],
             trials: force_b.iter().map(&mut position).collect(),
             declared: None,

@@ -6,9 +6,9 @@ use chart::{Block, Figure};
 
 use super::{Means, Plan, TooShort, Wanted, plan};
 use crate::{
-    calibrate::{CalibrateError, Place, read_nominal},
+    calibrate::{CalibrateError, TableArguments, read_nominal},
     coverage::Coverage,
-    experiment::Kind,
+    experiment::Excitation,
     report::Report,
     turntable::Turning,
 };
@@ -41,7 +41,7 @@ pub struct DesignArguments {
     #[arg(long, value_enum, value_delimiter = ',', default_value = "scale,axis,bias")]
     want: Vec<Wanted>,
     #[command(flatten)]
-    place: Place,
+    table: TableArguments,
     /// Write the plan to this table
     #[arg(long = "table", alias = "out", value_name = "FILE")]
     out: Option<PathBuf>,
@@ -99,8 +99,8 @@ pub fn run(arguments: &DesignArguments) -> Result<(), DesignError> {
 
 fn describe(plan: &Plan, means: &Means, arguments: &DesignArguments) -> Report {
     let (unit, command) = match means.kind {
-        Kind::Rate => ("rad/s", "rate-table"),
-        Kind::Force => ("m/s²", "multi-position"),
+        Excitation::Rate => ("rad/s", "rate-table"),
+        Excitation::Force => ("m/s²", "multi-position"),
     };
     let row = |what: &str, sigma: f64, unit: &str| vec![what.into(), format!("{sigma:.2e}"), unit.into()];
     let mut report = Report {
@@ -138,8 +138,8 @@ fn describe(plan: &Plan, means: &Means, arguments: &DesignArguments) -> Report {
 fn means(arguments: &DesignArguments) -> Result<Means, DesignError> {
     let nominal = read_nominal(&arguments.unit)?;
     let (kind, sensor) = match arguments.sensors {
-        Sensors::Gyros => (Kind::Rate, "gyro"),
-        Sensors::Accelerometers => (Kind::Force, "accelerometer"),
+        Sensors::Gyros => (Excitation::Rate, "gyro"),
+        Sensors::Accelerometers => (Excitation::Force, "accelerometer"),
     };
     let channels: Vec<_> = nominal
         .channels
@@ -171,8 +171,8 @@ fn means(arguments: &DesignArguments) -> Result<Means, DesignError> {
     let samples = (arguments.run / nominal.cycle_s.unwrap_or(0.2)).max(1.0);
     Ok(Means {
         kind,
-        mount: arguments.place.mount(),
-        site: arguments.place.site(),
+        mount: arguments.table.mount(),
+        site: arguments.table.site(),
         time_s: 60.0 * arguments.minutes,
         run_s: arguments.run,
         between_s: arguments.between,

@@ -1,6 +1,6 @@
 use super::*;
 
-fn means(kind: Kind, minutes: f64) -> Means {
+fn means(kind: Excitation, minutes: f64) -> Means {
     let (c, s, h) = (0.9_f64.sqrt(), 0.1_f64.sqrt(), 0.75_f64.sqrt());
     Means {
         kind,
@@ -29,7 +29,7 @@ fn means(kind: Kind, minutes: f64) -> Means {
 
 #[test]
 fn a_plan_beats_the_twelve_positions_of_the_thesis_in_the_same_time() {
-    let means = means(Kind::Rate, 36.0);
+    let means = means(Excitation::Rate, 36.0);
     let plan = plan(&means, &[Wanted::Scale, Wanted::Axis]).expect("plan");
     assert_eq!(plan.runs.len(), 24);
     // Twelve positions of Table 4.1 at both signs: Omega Omega' = diag(2, 5, 5) x 2 in e, so (z, y, x) in b.
@@ -47,7 +47,7 @@ fn a_plan_beats_the_twelve_positions_of_the_thesis_in_the_same_time() {
 
 #[test]
 fn gyro_runs_come_in_antagonist_pairs() {
-    let plan = plan(&means(Kind::Rate, 20.0), &[Wanted::Axis]).expect("plan");
+    let plan = plan(&means(Excitation::Rate, 20.0), &[Wanted::Axis]).expect("plan");
     for pair in plan.runs.chunks(2) {
         assert!((pair[0].excitation_b + pair[1].excitation_b).norm() < 1e-12);
     }
@@ -60,7 +60,7 @@ fn predicted_sigmas_are_those_a_simulation_shows() {
 
     use crate::response::{Observation, Orders, Response};
 
-    let means = means(Kind::Force, 30.0);
+    let means = means(Excitation::Force, 30.0);
     let plan = plan(&means, &[Wanted::Bias, Wanted::Scale, Wanted::Axis]).expect("plan");
     let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
     let normal = Normal::new(0.0, means.mean_sigma).expect("sigma");
@@ -97,17 +97,17 @@ fn predicted_sigmas_are_those_a_simulation_shows() {
 
 #[test]
 fn too_little_time_is_refused_with_the_least() {
-    let error = plan(&means(Kind::Rate, 4.0), &[Wanted::Scale]).expect_err("short");
+    let error = plan(&means(Excitation::Rate, 4.0), &[Wanted::Scale]).expect_err("short");
     assert_eq!((error.runs, error.least_s), (2, 540.0));
-    assert!(plan(&means(Kind::Rate, 9.0), &[Wanted::Scale]).is_ok());
-    assert!(plan(&means(Kind::Force, 1.0), &[Wanted::Scale]).is_err());
+    assert!(plan(&means(Excitation::Rate, 9.0), &[Wanted::Scale]).is_ok());
+    assert!(plan(&means(Excitation::Force, 1.0), &[Wanted::Scale]).is_err());
 }
 
 #[test]
 fn what_no_run_shows_is_said() {
-    let plan = plan(&means(Kind::Rate, 30.0), &[Wanted::Bias]).expect("plan");
+    let plan = plan(&means(Excitation::Rate, 30.0), &[Wanted::Bias]).expect("plan");
     assert!(plan.unobservable.iter().any(|line| line.contains("Earth's rate")));
-    let mut north = means(Kind::Rate, 30.0);
+    let mut north = means(Excitation::Rate, 30.0);
     north.site.outer_azimuth_rad = Some(0.0);
     let plan = super::plan(&north, &[Wanted::Bias]).expect("plan");
     assert!(!plan.unobservable.iter().any(|line| line.contains("Earth's rate")));

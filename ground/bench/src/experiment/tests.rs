@@ -8,12 +8,12 @@ const SITE: Site = Site {
     outer_azimuth_rad: None,
 };
 
-fn read(kind: Kind, text: &str) -> Result<Experiment, TableError> {
+fn read(kind: Excitation, text: &str) -> Result<Experiment, TableError> {
     read_of(&|_| false, kind, text)
 }
 
 /// Of a unit whose description has these channels.
-fn read_of(has: &dyn Fn(&str) -> bool, kind: Kind, text: &str) -> Result<Experiment, TableError> {
+fn read_of(has: &dyn Fn(&str) -> bool, kind: Excitation, text: &str) -> Result<Experiment, TableError> {
     let table = Table::parse(Path::new("run.csv"), text.as_bytes())?;
     let layout = Layout {
         kind,
@@ -30,7 +30,7 @@ fn read_of(has: &dyn Fn(&str) -> bool, kind: Kind, text: &str) -> Result<Experim
 #[test]
 fn degrees_and_radians_are_told_by_the_columns_name() {
     let degrees = read(
-        Kind::Rate,
+        Excitation::Rate,
         "seq;wx_deg_s;wy_deg_s;wz_deg_s;g1;g1_sigma\na;180;0;0;1;1\nb;0;0;90;2;1\n",
     )
     .expect("deg");
@@ -45,20 +45,23 @@ fn degrees_and_radians_are_told_by_the_columns_name() {
 fn without_sigmas_the_units_description_says_which_columns_are_channels() {
     let gyros = |name: &str| name.starts_with('g');
     let bare = "wx_rad_s,wy_rad_s,wz_rad_s,t1,g1\n1,2,3,25,5\n2,2,3,25,6\n";
-    let found = read_of(&gyros, Kind::Rate, bare).expect("one gyro");
+    let found = read_of(&gyros, Excitation::Rate, bare).expect("one gyro");
     assert_eq!(found.channels, ["g1"]);
     // Where some columns have a sigma, those are meant.
     let beside = bare
         .replace("t1,g1", "g2,g1,g1_sigma")
         .replace("25,5", "25,5,1")
         .replace("25,6", "25,6,1");
-    assert_eq!(read_of(&gyros, Kind::Rate, &beside).expect("one").channels, ["g1"]);
+    assert_eq!(
+        read_of(&gyros, Excitation::Rate, &beside).expect("one").channels,
+        ["g1"]
+    );
 }
 
 #[test]
 fn angles_give_the_excitation_and_claims_are_kept_beside_it() {
     let text = "inner_deg,outer_deg,turning,rate_deg_s,wx_deg_s,wy_deg_s,wz_deg_s,g1,g1_n\n0,180,inner,200,0,0,-200,5,9\n0,0,outer,200,0,200,0,6,9\n";
-    let found = read(Kind::Rate, text).expect("angles");
+    let found = read(Excitation::Rate, text).expect("angles");
     assert!((found.trials[0].excitation_b.z - 200_f64.to_radians()).abs() < 1e-12);
     assert!((found.trials[0].claimed_b.expect("claim").z + 200_f64.to_radians()).abs() < 1e-12);
 }
@@ -66,7 +69,7 @@ fn angles_give_the_excitation_and_claims_are_kept_beside_it() {
 #[test]
 fn saturated_and_empty_cells_are_left_out_and_said() {
     let found = read(
-        Kind::Force,
+        Excitation::Force,
         "inner_deg,outer_deg,a1x,a1x_n\n0,0,-300,9\n0,90,8191,9\n90,0,,9\n90,45,7,9\n",
     )
     .expect("read");
@@ -109,7 +112,7 @@ fn what_is_missing_is_named() {
             "names no axis",
         ),
     ] {
-        let error = read(Kind::Rate, text).expect_err("refused").to_string();
+        let error = read(Excitation::Rate, text).expect_err("refused").to_string();
         assert!(error.contains(why), "{error}");
     }
 }

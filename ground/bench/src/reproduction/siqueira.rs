@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{Line, Reproduced, ReproductionError, Sources};
 use crate::{
     controlled::{Calibration, Contradicted, Options, calibrate},
-    experiment::{Experiment, Kind, Trial},
+    experiment::{Excitation, Experiment, Trial},
     turntable::{Mount, Pose, Turning},
 };
 
@@ -53,7 +53,7 @@ pub fn campaign(sources: &Sources<'_>) -> Result<(Experiment, Calibration), Repr
     };
     let experiment = Experiment {
         file: "Table 7.4".into(),
-        kind: Kind::Rate,
+        kind: Excitation::Rate,
         channels: CHANNELS.map(String::from).to_vec(),
         trials: rates.iter().zip(&outputs).enumerate().map(trial).collect(),
         declared: None,

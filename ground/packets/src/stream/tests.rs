@@ -2,7 +2,7 @@
 
 use emems::{
     estimate::Estimate,
-    increments::{Channel, Force, Increments, SLICES, Slice, forces::READINGS},
+    increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::{Expected, encode},
     sample::NOT_READ,
@@ -146,7 +146,7 @@ fn console_text_between_packets_is_one_stretch_a_line_or_not() {
 }
 
 fn derived_frame() -> [u8; DERIVED_BYTES] {
-    let silent = Channel {
+    let silent = GyroCycle {
         integral_counts_s: 0.0,
         least: NOT_READ,
         most: NOT_READ,

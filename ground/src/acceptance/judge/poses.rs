@@ -115,7 +115,7 @@ fn field_of_table(fields: &[Vec<(usize, Vector3<f64>)>; 4], accelerometers: &[Fi
     };
     let drawn = as_plates(&|plate| plate);
     let found = if drawn.is_empty() {
-        as_plates(&|plate| accelerometers[plate].as_ref().map_or(plate, |fit| fit.place.plate))
+        as_plates(&|plate| accelerometers[plate].as_ref().map_or(plate, |fit| fit.seat.plate))
     } else {
         drawn
     };
@@ -138,7 +138,7 @@ fn plates(accelerometers: &[Fitted; 4], magnetometers: &[Fitted; 4], outcome: &m
     for plate in 0..4 {
         let feel: Vec<usize> = [&accelerometers[plate], &magnetometers[plate]]
             .into_iter()
-            .filter_map(|fit| fit.as_ref().ok().map(|fit| fit.place.plate))
+            .filter_map(|fit| fit.as_ref().ok().map(|fit| fit.seat.plate))
             .collect();
         let number = plate + 1;
         // One triad alone that feels like another plate is a wrong part; both are a wrong channel.
@@ -175,15 +175,15 @@ fn wiring(part: &str, plate: usize, fit: &Fitted, outcome: &mut Outcome) {
             false,
             "see its self-test; then do the poses again".to_owned(),
         ),
-        Ok(fit) if !fit.place.is_drawn(plate) => {
-            let check = match fit.place.plate == plate {
+        Ok(fit) if !fit.seat.is_drawn(plate) => {
+            let check = match fit.seat.plate == plate {
                 true => format!("{part} is soldered turned, or is another part with other axes"),
                 false => {
                     "the plate's channel of the multiplexer (above); if that is right, the part is soldered turned"
                         .into()
                 }
             };
-            (fit.place.words(plate), false, check)
+            (fit.seat.words(plate), false, check)
         }
         Ok(fit) => (
             format!("as drawn, {:.1} deg off", fit.off_deg),

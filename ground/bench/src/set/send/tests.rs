@@ -3,7 +3,7 @@ use std::collections::VecDeque;
 use emems::{
     calibration::{Ranges, Set, load::Arriving},
     command::{Heard, Parser},
-    mode::{Action, Mode, State, Verdict},
+    mode::{Action, Mode, Reply, State},
     unit::Settings,
 };
 
@@ -59,10 +59,10 @@ impl Unit {
 
     fn obey(&mut self, command: Command) {
         match self.state.command(command, 0) {
-            Verdict::Done(Action::Calibration(Command::SetWord { place, bytes })) => {
+            Reply::Done(Action::Calibration(Command::SetWord { place, bytes })) => {
                 self.arriving.take(place, bytes);
             }
-            Verdict::Done(Action::Calibration(Command::LoadSet)) => {
+            Reply::Done(Action::Calibration(Command::LoadSet)) => {
                 match self.arriving.set(ranges(), self.set.identity.unit) {
                     Ok(set) => {
                         self.set = set;
@@ -74,13 +74,13 @@ impl Unit {
                     Err(why) => self.say(&format!("G_CL no: {why}")),
                 }
             }
-            Verdict::Done(Action::Calibration(_)) => {
+            Reply::Done(Action::Calibration(_)) => {
                 for (line, bytes) in self.set.encode().chunks(32).enumerate() {
                     let hex: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
                     self.say(&format!("G_CR {:04X} {hex}", 8 * line));
                 }
             }
-            Verdict::Confirm(_) => match self.arriving.set(ranges(), self.set.identity.unit) {
+            Reply::Confirm(_) => match self.arriving.set(ranges(), self.set.identity.unit) {
                 Ok(_) => self.say("G_CL: send G_CK within 10 s"),
                 Err(why) => self.say(&format!("G_CL no: {why}")),
             },
