@@ -22,8 +22,6 @@
 //! Numbers of 8 digits are IEEE 754, but for `start`, `health` and `sensors`, which are bits. With the packet of the same counter
 //! a frame holds all that [`estimate`](crate::estimate) was given, so a stream of both from the start gives its result again.
 
-mod health;
-
 use core::fmt;
 
 use crc::{CRC_16_IBM_3740, Crc};
@@ -33,13 +31,12 @@ use crate::{
     crash::CrashCause,
     estimate::Estimate,
     faults::SensorHealth,
+    health::Health,
     increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::hex_value,
     sample::{NO_SLOT, SENSOR_COUNT},
 };
-
-pub use health::Health;
 
 /// First byte of a derived frame.
 pub const DERIVED_START: u8 = b'$';

@@ -1,6 +1,6 @@
 //! The e-MEMS attitude sensor unit: sixteen sensors to packets, console and telemetry.
 //!
-//! Data flows one way, and the modules are declared in that order:
+//! Data flows one way:
 //!
 //! ```text
 //! bytes --sensor--> counts --unit::acquire--> Sample --packet--> 156 bytes -> telemetry, umbilical, recorder
@@ -38,6 +38,7 @@ pub mod estimate;
 pub mod faults;
 pub mod flight_log;
 pub mod geometry;
+pub mod health;
 pub mod increments;
 pub mod kalman;
 pub mod mode;

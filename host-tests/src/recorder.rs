@@ -12,11 +12,11 @@ use std::{
 
 use embassy_futures::block_on;
 use emems::{
-    derived::Health,
     flight_log::{
         FlightLog, LOG_START, LogError, page,
         record::{self, BootHeader, Content, Entry, Key},
     },
+    health::Health,
     nand::{PAGES_PER_BLOCK, PageAddress},
     packet::PACKET_BYTES,
     sample::{NO_SLOT, SENSOR_COUNT},

@@ -1,7 +1,7 @@
 //! The read cycle: what a packet holds, when it comes, and what failures cost.
 
 use emems::{
-    derived::Health,
+    health::Health,
     sample::{NO_SLOT, NOT_READ, SENSOR_COUNT},
 };
 use host_tests::world;

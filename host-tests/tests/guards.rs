@@ -1,9 +1,6 @@
 //! Guards that no other test would miss: each test here fails without the one line that it names.
 
-use emems::{
-    derived::{Derived, Health},
-    sample::SENSOR_COUNT,
-};
+use emems::{derived::Derived, health::Health, sample::SENSOR_COUNT};
 use host_tests::{Flight, Flown, MS, S, changed, world};
 use twin::{host::timing::BOOT, run::Fault};
 

@@ -224,7 +224,7 @@ fn f15_a_dead_or_absent_chip_costs_neither_packets_nor_the_console() {
         flown
             .derived
             .iter()
-            .all(|frame| frame.health.contains(emems::derived::Health::RECORDER_REFUSED))
+            .all(|frame| frame.health.contains(emems::health::Health::RECORDER_REFUSED))
     );
     let absent = recording().fault(0, Fault::NandAbsent).say(3 * S, b"G_ST").fly(4 * S);
     assert!(
@@ -306,7 +306,7 @@ fn f16_a_full_recorder_says_so_and_packets_go_on() {
         flown
             .derived
             .iter()
-            .all(|frame| frame.health.contains(emems::derived::Health::RECORDER_REFUSED))
+            .all(|frame| frame.health.contains(emems::health::Health::RECORDER_REFUSED))
     );
     assert!(flown.periods().iter().all(|period| period.abs_diff(200 * MS) <= MS));
 }

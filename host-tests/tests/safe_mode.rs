@@ -1,7 +1,7 @@
 //! A unit that does not stay up: after three starts that ended within a minute each, the next one reads, sends and records,
 //! and leaves out what may be at fault.
 
-use emems::derived::{Derived, Health};
+use emems::{derived::Derived, health::Health};
 use host_tests::{Flight, Flown, S, world};
 use twin::{plant::Plant, run::Fault};
 

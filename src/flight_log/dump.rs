@@ -100,8 +100,8 @@ fn from_hex(digits: &[u8], bytes: &mut [u8]) -> Option<()> {
 mod tests {
     use super::*;
     use crate::{
-        derived::Health,
         flight_log::record::{BootHeader, Entry, Key, encode_entry, encode_header},
+        health::Health,
         sample::SENSOR_COUNT,
     };
 

@@ -12,7 +12,7 @@ use embassy_futures::block_on;
 
 use super::*;
 use crate::{
-    derived::Health,
+    health::Health,
     nand::{BAD_MARK, MAIN_BYTES, NandError, SPARE_BYTES, SpareBytes},
     packet::PACKET_BYTES,
     sample::{NO_SLOT, SENSOR_COUNT},

@@ -27,8 +27,8 @@ use super::{
 use crate::{
     board::{Board, ResetCause, Supply as _},
     budget::Budget,
-    derived::Health,
     geometry::PLATES,
+    health::Health,
     increments::forces::{self, READINGS},
     packet,
     resume::{Resume, Starts},

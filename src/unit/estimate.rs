@@ -26,8 +26,9 @@ use super::{
 };
 use crate::{
     board::{Board, Oscillator, Retained},
-    derived::{Derived, Health, Start},
+    derived::{Derived, Start},
     estimate::{Estimate, Estimator, KEPT_BYTES},
+    health::Health,
     mode::{Mode, State},
     resume::{self, POWER_CUT, Pulse},
     retained::ATTITUDE,

@@ -19,8 +19,8 @@ use super::{
 };
 use crate::{
     board::Board,
-    derived::Health,
     geometry::PLATES,
+    health::Health,
     increments::Fast,
     resume::Pulse,
     sample::NOT_READ,

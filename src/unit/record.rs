@@ -20,12 +20,12 @@ use super::{
 use crate::{
     board::{Board, Retained},
     calibration::ENCODED_BYTES,
-    derived::Health,
     estimate::Estimate,
     flight_log::{
         FlightLog, LogError, Resumed,
         record::{self, BootHeader, Content, Entry, Key, Name},
     },
+    health::Health,
     mode::{Cause, Mode, State, Task},
     nand::{Nand, NandError, k9f1208::K9f1208},
     retained::{CRASH, SET},

@@ -18,11 +18,12 @@ use crate::{
     board::{OptionBytes, Oscillator, ResetCause, StackUse},
     calibration::{Ranges, Set},
     crash::CrashRecord,
-    derived::{self, DERIVED_BYTES, Derived, Health},
+    derived::{self, DERIVED_BYTES, Derived},
     flight_log::{
         self, LogError,
         record::{self, Name, RecordBytes},
     },
+    health::Health,
     increments::{Force, Increments, Integrator},
     mode::{Cause, Change, Copies, State, Task},
     packet::PACKET_BYTES,

@@ -6,8 +6,9 @@ mod bench;
 use bench::{MS, Tape, image, world};
 use emems::{
     board::ResetCause,
-    derived::{self, Derived, Health},
+    derived::{self, Derived},
     estimate::Estimator,
+    health::Health,
     mode::Mode,
     sample::Sample,
     unit::Settings,

@@ -4,7 +4,7 @@
 mod bench;
 
 use bench::{MS, Tape, flown};
-use emems::{board::ResetCause, derived::Health};
+use emems::{board::ResetCause, health::Health};
 use emulated::Options;
 use twin::run::{Fault, Scheduled};
 

@@ -4,7 +4,7 @@
 mod bench;
 
 use bench::{MS, Tape, flown, image, world};
-use emems::{board::ResetCause, derived::Health, sample::Reading, unit::Settings};
+use emems::{board::ResetCause, health::Health, sample::Reading, unit::Settings};
 use emulated::{Covers, Error, Options, fly_with};
 use twin::{
     host,

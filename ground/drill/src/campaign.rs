@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use emems::{
     command::{COMMANDS, Heard, Parser},
-    derived::Health,
+    health::Health,
     mode::{Action, Reply, State},
 };
 use host_tests::{

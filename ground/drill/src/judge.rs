@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 
 use emems::{
     board::ResetCause,
-    derived::{Derived, Health},
+    derived::Derived,
+    health::Health,
     packet,
     sample::{NOT_READ, Reading},
 };

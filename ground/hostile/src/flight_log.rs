@@ -7,11 +7,11 @@ use std::sync::OnceLock;
 
 use embassy_futures::block_on;
 use emems::{
-    derived::Health,
     flight_log::{
         FlightLog,
         record::{BootHeader, Entry, RECORD_BYTES},
     },
+    health::Health,
     nand::{MAIN_BYTES, PAGE_BYTES, PAGES_PER_BLOCK, ecc},
     packet,
     sample::{Reading, SENSOR_COUNT},

@@ -151,7 +151,7 @@ fn channel(before: i16, now: i16, covered_us: u32) -> GyroCycle {
 #[cfg(test)]
 mod tests {
     use emems::{
-        derived::Health,
+        health::Health,
         increments::Integrator,
         sample::{Errors, NO_SLOT},
     };

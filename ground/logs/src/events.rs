@@ -279,8 +279,8 @@ fn force(reading: &Reading) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use emems::{
-        derived::Health,
         estimate::Estimate,
+        health::Health,
         increments::Integrator,
         sample::{Errors, NO_SLOT},
     };

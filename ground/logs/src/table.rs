@@ -202,8 +202,9 @@ mod tests {
     use emems::{
         board::ResetCause,
         crash::CrashCause,
-        derived::{Health, Start},
+        derived::Start,
         estimate::Estimate,
+        health::Health,
         increments::{GyroCycle, Increments, SLICES, Slice},
         mode::Mode,
         packet,

@@ -133,7 +133,7 @@ fn word(value: Value) -> Option<ByteArray> {
 #[cfg(test)]
 mod tests {
     use emems::{
-        derived::Health,
+        health::Health,
         packet,
         sample::{NO_SLOT, Reading, SENSOR_COUNT},
     };

@@ -146,7 +146,7 @@ pub fn row(key: Key, entry: &Entry, si: bool) -> String {
 
 #[cfg(test)]
 mod tests {
-    use emems::{derived::Health, faults::SensorHealth, flight_log::record::Estimate};
+    use emems::{faults::SensorHealth, flight_log::record::Estimate, health::Health};
 
     use super::*;
 

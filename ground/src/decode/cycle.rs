@@ -129,8 +129,9 @@ impl Cycle {
 #[cfg(test)]
 mod tests {
     use emems::{
-        derived::{Derived, Health},
+        derived::Derived,
         estimate::Estimate,
+        health::Health,
         increments::Integrator,
         mode::Mode,
         sample::{NO_SLOT, Reading, SENSOR_COUNT},

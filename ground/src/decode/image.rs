@@ -64,11 +64,11 @@ pub fn to_folder(log: &Log, name: &str, parent: &Path, json: bool) -> Result<(),
 mod tests {
     use embassy_futures::block_on;
     use emems::{
-        derived::Health,
         flight_log::{
             FlightLog, LOG_START,
             record::{self, BootHeader},
         },
+        health::Health,
         nand::PageAddress,
         packet::encode,
         sample::{NO_SLOT, Reading, SENSOR_COUNT},

@@ -2,6 +2,7 @@
 
 use emems::{
     estimate::Estimate,
+    health::Health,
     increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::{Expected, encode},
@@ -156,7 +157,7 @@ fn derived_frame() -> [u8; DERIVED_BYTES] {
         counter: 1,
         start_us: 200_000,
         mode: Mode::Flight,
-        health: derived::Health(0),
+        health: Health(0),
         start: None,
         cycle_us: 3_700,
         slots_us: std::array::from_fn(|slot| 225 * slot as u32),

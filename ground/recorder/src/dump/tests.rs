@@ -1,8 +1,8 @@
 use std::collections::VecDeque;
 
 use emems::{
-    derived::Health,
     flight_log::record::{Entry, Key, encode_entry},
+    health::Health,
     packet,
     sample::{Reading, SENSOR_COUNT},
 };

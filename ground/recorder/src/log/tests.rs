@@ -1,7 +1,7 @@
 use embassy_futures::block_on;
 use emems::{
-    derived::Health,
     flight_log::{FlightLog, LOG_START},
+    health::Health,
     packet,
     sample::{Reading, SENSOR_COUNT},
 };

@@ -1,7 +1,7 @@
 //! Packets as they arrive, and what the unit says of its buses.
 
 use emems::{
-    derived::Health,
+    health::Health,
     sample::{NO_SLOT, SENSORS},
 };
 use packets::stream::sequence::{Sequence, Step};

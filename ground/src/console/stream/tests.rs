@@ -3,6 +3,7 @@
 use emems::{
     derived::DERIVED_BYTES,
     estimate::Estimate,
+    health::Health,
     increments::Integrator,
     mode::Mode,
     packet::{Expected, PACKET_BYTES, encode},
@@ -25,7 +26,7 @@ fn derived() -> Derived {
         counter: 1,
         start_us: 200_000,
         mode: Mode::Flight,
-        health: derived::Health(0),
+        health: Health(0),
         start: None,
         cycle_us: 8000,
         slots_us: [NO_SLOT; SENSOR_COUNT],
