@@ -21,8 +21,8 @@
 
 mod boost;
 mod force;
+mod params;
 mod sampled;
-pub(crate) mod site;
 #[cfg(test)]
 mod tests;
 mod turn;
@@ -30,8 +30,6 @@ mod turn;
 use boost::Boost;
 use force::Averager;
 use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
-
-pub use site::{Launch, Site};
 
 use crate::{
     attitude::{self, dcm_bn},
@@ -44,6 +42,7 @@ use crate::{
     redundancy::Known,
     sample::{Kind, Sample},
     settings::Settings,
+    site::Site,
     spin, triad,
 };
 
@@ -454,7 +453,7 @@ impl Estimator {
 /// A filter that knows nothing yet but what the set says of the gyros.
 #[inline(never)]
 fn filter(set: &Set, site: &Site) -> Filter {
-    let mut filter = Filter::new(site.params(set));
+    let mut filter = Filter::new(params::params(site, set));
     let axes_b = set.gyro.map(|axis| axis.axis_b);
     let [_, _, gyro] = set.uncertainty;
     if let Some((least_squares, _)) = crate::redundancy::matrix(&axes_b, 0b1111) {

@@ -53,6 +53,7 @@ pub mod retained;
 mod root;
 pub mod sample;
 mod settings;
+pub mod site;
 pub mod spin;
 pub mod triad;
 pub mod unit;

@@ -4,8 +4,8 @@
 //! (the unit, the estimation, the calibration set) takes it from here.
 
 use crate::{
-    estimate::site::Site,
     sensor::{adis16265, hmc5883l, lis331hh},
+    site::Site,
 };
 
 /// What a laboratory may choose without touching the code.

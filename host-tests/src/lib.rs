@@ -13,9 +13,9 @@ pub use coasting::Coasting;
 
 use emems::{
     derived::{self, DERIVED_BYTES, DERIVED_START, Derived},
-    estimate::Site,
     packet,
     sample::Reading,
+    site::Site,
     unit::Settings,
 };
 use twin::{

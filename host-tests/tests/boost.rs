@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, sync::Arc};
 use emems::{
     calibration::{Ranges, Set},
     derived::Derived,
-    estimate::{Estimator, KEPT_BYTES, Site},
+    estimate::{Estimator, KEPT_BYTES},
     sample::{Reading, Sample},
+    site::Site,
     unit::Settings,
 };
 use host_tests::{Flight, MS, S};

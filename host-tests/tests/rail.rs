@@ -1,11 +1,7 @@
 //! A launch rail told over the umbilical: taken, contradicted, kept, and only where it may be.
 
 use emems::{
-    derived::Derived,
-    estimate::{Estimator, Site},
-    flight_log::record::Content,
-    mode::Cause,
-    rail::Rail,
+    derived::Derived, estimate::Estimator, flight_log::record::Content, mode::Cause, rail::Rail, site::Site,
     unit::Settings,
 };
 use host_tests::{Flight, Flown, MS, S, recorder::contents, replay, world};

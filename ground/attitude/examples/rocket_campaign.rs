@@ -20,7 +20,7 @@ use chart::{Axis, Block, Figure, Layer, Marks, Panel, html};
 use emems::{
     calibration::{Ranges, Set},
     derived::{self, DERIVED_BYTES, Derived},
-    estimate::{Launch, Site},
+    site::{Launch, Site},
     unit::Settings,
 };
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

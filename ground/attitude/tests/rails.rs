@@ -1,11 +1,7 @@
 //! A unit on the launch rail: with the rails of its flight log its attitude comes back bit for bit.
 
 use attitude::rails::{self, NoRails};
-use emems::{
-    estimate::{Estimator, Site},
-    sample::Sample,
-    unit::Settings,
-};
+use emems::{estimate::Estimator, sample::Sample, site::Site, unit::Settings};
 use host_tests::{Flight as Flown, MS, S, world};
 use logs::{
     cycles::Cycle,

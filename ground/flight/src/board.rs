@@ -5,7 +5,7 @@
 
 use std::error::Error;
 
-use emems::{estimate::Site, unit::Settings};
+use emems::{site::Site, unit::Settings};
 use twin::{
     host,
     part::Nanos,

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use emems::estimate::Site;
+use emems::site::Site;
 use logs::{
     digest::Digest,
     folder::{self, Folder, FolderError},

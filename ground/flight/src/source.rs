@@ -5,7 +5,7 @@
 
 use std::{borrow::Cow, path::Path, sync::Arc};
 
-use emems::estimate::Site;
+use emems::site::Site;
 use logs::{
     plausible::{self, Implausible},
     recording::Row,

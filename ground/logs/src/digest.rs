@@ -3,7 +3,7 @@
 //! In: bytes, and the instant they were complete where it is known. Out: [`Entry`]s as they are found, and at the end the
 //! [`Record`]. Memory does not grow with the stream, so a log of any size can be read.
 
-use emems::{derived::Derived, estimate::Site, sample::Reading, unit::Settings};
+use emems::{derived::Derived, sample::Reading, site::Site, unit::Settings};
 
 use packets::stream::{
     Bytes5To8, Decoder, Item, Reject,

@@ -7,7 +7,8 @@
 
 use emems::{
     calibration::{Ranges, Set},
-    estimate::{Estimator, Site},
+    estimate::Estimator,
+    site::Site,
     unit::Settings,
 };
 use packets::stream::Item;

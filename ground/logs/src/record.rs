@@ -4,7 +4,7 @@
 //! the flight.
 
 use crate::follow::Follow;
-use emems::{estimate::Site, unit::Settings};
+use emems::{site::Site, unit::Settings};
 use packets::stream::{Item, sequence::Step};
 
 use crate::{envelope::Envelope, events::Events, spectra::Spectra, summary::Summary};

@@ -18,7 +18,7 @@ mod tumble;
 
 use std::sync::Arc;
 
-use emems::estimate::{Launch, Site};
+use emems::site::{Launch, Site};
 use nalgebra::Vector3;
 
 pub use guided::Guided;
