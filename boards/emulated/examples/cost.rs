@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use emulated::{Options, fly_with, image};
+use emulated::{Options, fly_with, toolchain};
 use twin::{
     motion,
     part::Nanos,
@@ -83,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ],
         ..Options::default()
     };
-    let image = image::build_package("emems-cost")?;
+    let image = toolchain::build_package("emems-cost")?;
     let report = fly_with(
         &options,
         &image,

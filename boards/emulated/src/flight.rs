@@ -27,10 +27,11 @@ use twin::{
     fault::Struck,
     part::Nanos,
     plant::Plant,
-    run::{Bench, Flow, Scheduled},
+    run::{Bench, Scheduled},
 };
 
-use self::pilot::Pilot;
+pub use self::pilot::STEP;
+use self::pilot::{Heard, Pilot, Said, meeting_after};
 use crate::{
     chips::SharedPlant,
     covers::Covers,
@@ -39,8 +40,6 @@ use crate::{
     stand::Stand,
 };
 
-/// \[ns\] between two meetings of the core and the bench.
-pub const STEP: Nanos = 20_000_000;
 const MILLISECOND: Nanos = 1_000_000;
 
 /// How a run differs from the plain one.
@@ -197,27 +196,6 @@ pub fn fly_keeping(
         report.struck.extend(kept.lock().struck());
         (report, kept)
     })
-}
-
-/// The next meeting, on the grid of whole steps from power-on, whatever other stops there are.
-fn meeting_after(now: Nanos) -> Nanos {
-    (now / STEP + 1) * STEP
-}
-
-/// What the core has to tell at a meeting.
-#[derive(Default)]
-struct Heard {
-    now: Nanos,
-    telemetry: Vec<(Nanos, u8)>,
-    umbilical: Vec<(Nanos, u8)>,
-    log: Vec<u8>,
-    restarts: usize,
-}
-
-/// What the bench answers.
-struct Said {
-    commands: Vec<(Nanos, Vec<u8>)>,
-    flow: Flow,
 }
 
 /// The bench's side: until the core has ended.

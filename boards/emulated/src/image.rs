@@ -17,7 +17,6 @@ use object::{
 use rigless::symbols::Symbols;
 
 use crate::thumb;
-pub use crate::toolchain::{build, build_package};
 
 /// ELF32, little endian, `e_machine` EM_ARM (ELF specification, header; ELF for the Arm architecture 5.2).
 const ELF_MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];

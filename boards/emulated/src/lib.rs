@@ -1,7 +1,7 @@
 //! The unmodified firmware image on an emulated STM32F4, with the twin's parts on its buses.
 //!
 //! ```text
-//! cargo build --image::build--> ELF --flight::fly--> stand (STM32F427 + wires + chips + twin::plant) --> Bench, Report
+//! cargo build --toolchain::build--> ELF --flight::fly--> stand (STM32F427 + wires + chips + twin::plant) --> Bench, Report
 //! ```
 //!
 //! [rigless](https://docs.rs/rigless) executes the ELF's own instructions against register-level models of the
@@ -16,7 +16,7 @@ pub mod image;
 mod rtt;
 mod stand;
 mod thumb;
-mod toolchain;
+pub mod toolchain;
 mod wires;
 
 pub use chips::SharedPlant;

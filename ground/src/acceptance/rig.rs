@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use emulated::{Options, image};
+use emulated::{Options, toolchain};
 use twin::{
     environment::{Environment, World},
     fault::{Planned, schedule},
@@ -131,7 +131,7 @@ pub fn run(board: Board, wrong: &[Wrong], seed: u64, tell: &mut dyn FnMut(f64, &
                 no_crystal: wrong.contains(&Wrong::NoCrystal),
                 ..Options::default()
             };
-            let image = image::build()?;
+            let image = toolchain::build()?;
             emulated::fly_with(&options, &image, plant, &faults, LONGEST, &mut rig)?;
         }
     }

@@ -30,7 +30,7 @@ pub fn release(file: Option<&Path>) -> Result<Image, ImageError> {
     match file {
         Some(file) => Image::read(file),
         None if !WITHIN.is_empty() => Image::new(Path::new("the image in this program"), WITHIN.to_vec()),
-        None => emulated::image::build(),
+        None => emulated::toolchain::build(),
     }
 }
 

@@ -16,12 +16,14 @@ use twin::{
     run::{Fault, Flow, Scheduled},
 };
 
-use super::{Heard, Said, meeting_after};
 use crate::{
     chips::{Line, SharedPlant},
     rtt,
     stand::Stand,
 };
+
+/// \[ns\] between two meetings of the core and the bench.
+pub const STEP: Nanos = 20_000_000;
 
 /// The memory that firmware finds again after a reset, but not after a power cut (memory.x).
 const RETAINED: u64 = 0x2001_E000;
@@ -29,6 +31,27 @@ const RETAINED_BYTES: u64 = 8192;
 /// What the unit's state and stack live in (memory.x).
 const RAM: u64 = 0x2000_0000;
 const RAM_BYTES: u64 = 0x1_E000;
+
+/// The next meeting, on the grid of whole steps from power-on, whatever other stops there are.
+pub(super) fn meeting_after(now: Nanos) -> Nanos {
+    (now / STEP + 1) * STEP
+}
+
+/// What the core has to tell at a meeting.
+#[derive(Default)]
+pub(super) struct Heard {
+    pub(super) now: Nanos,
+    pub(super) telemetry: Vec<(Nanos, u8)>,
+    pub(super) umbilical: Vec<(Nanos, u8)>,
+    pub(super) log: Vec<u8>,
+    pub(super) restarts: usize,
+}
+
+/// What the bench answers.
+pub(super) struct Said {
+    pub(super) commands: Vec<(Nanos, Vec<u8>)>,
+    pub(super) flow: Flow,
+}
 
 /// Flips a bit of some memory, counted round it.
 fn flip(host: &mut dyn Host, from: u64, bytes: u64, bit: u32) {

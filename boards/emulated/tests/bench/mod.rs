@@ -7,7 +7,7 @@ use emems::{
     packet::{self, PACKET_BYTES},
     sample::Reading,
 };
-use emulated::{Image, Options, Report, fly_with, image};
+use emulated::{Image, Options, Report, fly_with, toolchain};
 use twin::{
     motion,
     part::Nanos,
@@ -100,7 +100,7 @@ pub fn world(name: &str) -> Arc<dyn TruthSource> {
 /// The image of the reference board, built once.
 pub fn image() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
-    IMAGE.get_or_init(|| image::build().unwrap_or_else(|error| panic!("{error}")))
+    IMAGE.get_or_init(|| toolchain::build().unwrap_or_else(|error| panic!("{error}")))
 }
 
 #[allow(dead_code, reason = "not every test file flies this way")]
