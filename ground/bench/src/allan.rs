@@ -33,7 +33,10 @@ use self::{
     phase::Input,
     record::{Selection, records},
 };
-use crate::table::{Table, TableError};
+use crate::{
+    report::five_digits,
+    table::{Table, TableError},
+};
 
 /// Measures the noise of records: Allan, modified, time and Hadamard deviations, and what they are made of
 #[derive(Clone, Debug, clap::Args)]
@@ -180,7 +183,7 @@ fn print(analysis: &Analysis, unit: &str) {
         "{}: {} samples every {} s, {gaps} gaps of {missing} samples, {} outliers removed",
         analysis.name,
         analysis.used,
-        report::digits(analysis.step_s),
+        five_digits(analysis.step_s),
         analysis.outliers.len()
     );
     for (name, value) in report::coefficients(analysis, unit) {

@@ -3,7 +3,6 @@
 //! In: files and flags. Out: a report on standard output, and where asked for a set (`--set`, merged into what is there),
 //! or a page (`--page`). The subcommands do the work; what they share is here.
 
-pub(crate) mod checks;
 mod controlled;
 mod ellipsoid;
 

@@ -3,6 +3,7 @@
 pub mod allan;
 pub mod calibrate;
 pub mod calibration;
+pub mod checks;
 pub mod consensus;
 pub mod controlled;
 pub mod coverage;

@@ -7,6 +7,24 @@ use std::{fmt::Write, path::Path};
 
 use chart::{Axis, Block, Figure, Layer, Marks, Panel};
 
+/// Five significant digits, as the thesis prints them.
+pub fn five_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if (-4..6).contains(&exponent) {
+        let text = format!("{value:.*}", usize::try_from(4 - exponent).unwrap_or(0));
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').into()
+        } else {
+            text
+        }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
 /// Findings of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
@@ -182,6 +200,19 @@ pub fn residuals(title: &str, unit: &str, channels: &[Leftover]) -> Result<Figur
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn digits_are_five() {
+        for (value, text) in [
+            (2.46661e-5, "2.4666e-5"),
+            (26_214.4, "26214"),
+            (0.05, "0.05"),
+            (0.0, "0"),
+            (1_234_567.0, "1.2346e6"),
+        ] {
+            assert_eq!(five_digits(value), text);
+        }
+    }
 
     fn report() -> Report {
         Report {

@@ -20,7 +20,7 @@ use std::{
 use chart::Block;
 
 use crate::{
-    allan::report::digits,
+    report::five_digits,
     table::{Table, TableError},
 };
 
@@ -145,7 +145,7 @@ impl Reproduced {
     fn blocks(&self) -> Vec<Block> {
         let mut blocks = vec![Block::Heading(self.table.into()), Block::Text(self.why.into())];
         // What is nothing beside the tolerance is rounding, and is shown as nothing.
-        let value = |value: f64, within: f64| digits(if value.abs() < 1e-3 * within { 0.0 } else { value });
+        let value = |value: f64, within: f64| five_digits(if value.abs() < 1e-3 * within { 0.0 } else { value });
         let values = |values: &[f64], within| {
             let cells: Vec<String> = values.iter().map(|one| value(*one, within)).collect();
             cells.join("  ")
@@ -156,7 +156,7 @@ impl Reproduced {
                 line.what.clone(),
                 values(&line.printed, line.within),
                 values(&line.ours, line.within),
-                digits(line.within),
+                five_digits(line.within),
                 said.into(),
             ]
         };

@@ -25,8 +25,8 @@ use self::{
 };
 use crate::{
     answer::Answer,
-    deal::{self, DealError, Ring},
-    deck::Hand,
+    deal::{self, DealError},
+    deck::{Hand, Ring},
     draw::Draw,
     injected::{Injected, recording::Recording},
     score::{self, Judged, Line, Verdict},

@@ -25,7 +25,7 @@ use twin::{
 use self::written::{About, attitudes, write};
 use crate::{
     answer::{Answer, Cause, Size},
-    deck::Card,
+    deck::{Card, Ring},
     disturbance::{self, Disturbance, novel},
     draw::Draw,
     flight,
@@ -33,7 +33,7 @@ use crate::{
     injected::recording::RecordingError,
     loose::Loose,
     motion::{Style, Wander},
-    scene::Scene,
+    scene::{DURATION_S, Scene},
     sensitivity::{
         self, Told,
         withheld::{self, Ratios},
@@ -41,8 +41,7 @@ use crate::{
     strength,
 };
 
-/// \[s\] of a case, and where its fit window ends and its hold window begins.
-pub(crate) const DURATION_S: f64 = 600.0;
+/// \[s\] where a case's fit window ends and its hold window begins.
 const FIT_S: f64 = 300.0;
 
 /// Marginal signal to noise ratios dealt, least and most.
@@ -63,27 +62,6 @@ const ROCKETS: f64 = 0.2;
 
 /// \[s\] a rocket waits on the pad.
 const PAD_S: f64 = 30.0;
-
-/// What is wrong with a case, by how much is wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Ring {
-    /// Nothing but calibration errors.
-    R0,
-    /// One effect that has a name.
-    R1,
-    /// A disturbance that has none.
-    R3,
-    /// Two effects that have names.
-    R4,
-    /// Three or four effects that have names.
-    R6,
-    /// One in a recording of a real unit.
-    R7,
-    /// Nothing but a description that is a little wrong.
-    R0m,
-    /// Nothing wrong or one effect that has a name, and nobody knows the motion.
-    R8,
-}
 
 /// A case was not dealt.
 #[derive(Debug, thiserror::Error)]

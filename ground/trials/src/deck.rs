@@ -3,10 +3,30 @@
 //! In: a [`Hand`], numbers as they are asked for. Out: [`Card`]s, each a case to fly.
 
 use crate::{
-    deal::Ring,
     disturbance::{self, Disturbance},
     draw::Draw,
 };
+
+/// What is wrong with a case, by how much is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Ring {
+    /// Nothing but calibration errors.
+    R0,
+    /// One effect that has a name.
+    R1,
+    /// A disturbance that has none.
+    R3,
+    /// Two effects that have names.
+    R4,
+    /// Three or four effects that have names.
+    R6,
+    /// One in a recording of a real unit.
+    R7,
+    /// Nothing but a description that is a little wrong.
+    R0m,
+    /// Nothing wrong or one effect that has a name, and nobody knows the motion.
+    R8,
+}
 
 /// How many cases of each ring.
 #[derive(Clone, Copy, Debug, Default)]

@@ -17,7 +17,10 @@ use twin::{
     truth::TruthSource,
 };
 
-use crate::{answer::Size, deal::DURATION_S, draw::Draw, followed::Followed, motion::Wander, unit::kind};
+use crate::{answer::Size, draw::Draw, followed::Followed, motion::Wander, unit::kind};
+
+/// \[s\] of a dealt case.
+pub(crate) const DURATION_S: f64 = 600.0;
 
 /// \[s\] step of the tables of slow filters.
 const STEP_S: f64 = 2e-3;

@@ -7,13 +7,14 @@
 use chart::{Axis, Block, ChartError, Figure, Layer, Marks, Panel};
 
 use super::{analysis::Analysis, deviation::Deviation, fit::Finding, terms::Term};
+use crate::report::five_digits;
 
 /// Names of the columns of appendix E.
 pub const COLUMNS: [&str; 7] = ["Tau", "ADEV", "ADEV_Min", "ADEV_Max", "MDEV", "TDEV", "HDEV"];
 
 /// The table of appendix E, five significant digits as there.
 pub fn table(analysis: &Analysis) -> Vec<Vec<String>> {
-    let cell = |value: Option<f64>| value.map_or_else(|| "-".into(), digits);
+    let cell = |value: Option<f64>| value.map_or_else(|| "-".into(), five_digits);
     let row = |row: &super::analysis::Row| {
         let of = |deviation: Deviation| row.deviations[deviation as usize];
         let adev = of(Deviation::Oadev);
@@ -27,7 +28,9 @@ pub fn table(analysis: &Analysis) -> Vec<Vec<String>> {
             value(Deviation::Tdev),
             value(Deviation::Hdev),
         ];
-        std::iter::once(digits(row.tau_s)).chain(values.map(cell)).collect()
+        std::iter::once(five_digits(row.tau_s))
+            .chain(values.map(cell))
+            .collect()
     };
     analysis.rows.iter().map(row).collect()
 }
@@ -65,10 +68,10 @@ pub fn coefficients(analysis: &Analysis, unit: &str) -> Vec<(String, String)> {
     findings
         .map(|(term, finding)| {
             let (factor, unit) = customary(*term, unit);
-            let of = |value: f64| digits(value * factor);
+            let of = |value: f64| five_digits(value * factor);
             let name = match term {
-                Term::Markov { time_s } => format!("{}, {} s", term.name(), digits(*time_s)),
-                Term::Sinusoid { frequency_hz } => format!("{}, {} Hz", term.name(), digits(*frequency_hz)),
+                Term::Markov { time_s } => format!("{}, {} s", term.name(), five_digits(*time_s)),
+                Term::Sinusoid { frequency_hz } => format!("{}, {} Hz", term.name(), five_digits(*frequency_hz)),
                 _ => term.name().into(),
             };
             let value = match *finding {
@@ -101,8 +104,8 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
         let at = |k: usize| {
             format!(
                 "{} at {} s",
-                digits(motion.levels[k]),
-                digits(motion.rows[k] as f64 * analysis.step_s)
+                five_digits(motion.levels[k]),
+                five_digits(motion.rows[k] as f64 * analysis.step_s)
             )
         };
         said.push(format!(
@@ -112,7 +115,7 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
             motion.rows[0] + 1,
             at(1),
             motion.rows[1] + 1,
-            digits(motion.sigmas)
+            five_digits(motion.sigmas)
         ));
     }
     let Some(fit) = &analysis.fit else {
@@ -130,7 +133,7 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
         .iter()
         .find(|(term, finding)| matches!(term, Term::Sinusoid { .. }) && finding.value() > 0.0)
     {
-        let frequency = digits(*frequency_hz);
+        let frequency = five_digits(*frequency_hz);
         said.push(format!(
             "wrong: a periodic disturbance at {frequency} Hz; next: look for a fan, pump or power line"
         ));
@@ -143,7 +146,7 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
         let floor = "neither bias instability nor rate random walk is seen";
         said.push(format!(
             "next: {floor} in {} h; record ten times as long to see or bound them",
-            digits(longest_s / 3_600.0)
+            five_digits(longest_s / 3_600.0)
         ));
     }
     if !said.iter().any(|line| line.starts_with("wrong")) {
@@ -159,16 +162,19 @@ pub fn verdict(analysis: &Analysis) -> Vec<String> {
 pub fn blocks(analysis: &Analysis, unit: &str) -> Result<Vec<Block>, ChartError> {
     let about = vec![
         ("samples used".into(), analysis.used.to_string()),
-        ("sampling interval".into(), format!("{} s", digits(analysis.step_s))),
+        (
+            "sampling interval".into(),
+            format!("{} s", five_digits(analysis.step_s)),
+        ),
         (
             "gaps".into(),
             format!("{} of {} samples in all", analysis.gaps.0, analysis.gaps.1),
         ),
         ("outliers removed".into(), analysis.outliers.len().to_string()),
-        ("mean".into(), format!("{} {unit}", digits(analysis.moments.0))),
+        ("mean".into(), format!("{} {unit}", five_digits(analysis.moments.0))),
         (
             "standard deviation".into(),
-            format!("{} {unit}", digits(analysis.moments.1)),
+            format!("{} {unit}", five_digits(analysis.moments.1)),
         ),
     ];
     Ok(vec![
@@ -260,24 +266,6 @@ fn decades(label: String, values: impl Iterator<Item = f64>) -> Axis {
         return axis;
     }
     axis.between(10_f64.powf(least.floor()), 10_f64.powf(most.floor() + 1.0))
-}
-
-/// Five significant digits, as the thesis prints them.
-pub fn digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".into();
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    if (-4..6).contains(&exponent) {
-        let text = format!("{value:.*}", usize::try_from(4 - exponent).unwrap_or(0));
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').into()
-        } else {
-            text
-        }
-    } else {
-        format!("{value:.4e}")
-    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@
 
 use std::path::Path;
 
-use super::{bounds::bounds, report::digits};
+use super::bounds::bounds;
 use crate::{
+    report::five_digits,
     reproduction::allan::{factor, flicker_angle, white_rate},
     table::Table,
 };
@@ -100,8 +101,8 @@ fn the_angle_random_walk_of_table_7_8_is_four_times_too_large() {
         let found = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
         println!(
             "{name}: {} V sqrt(s), {} as printed",
-            digits(found),
-            digits(4.0 * found)
+            five_digits(found),
+            five_digits(4.0 * found)
         );
         // A mean over a slope that is not quite -1/2 and a line drawn by hand: a quarter of the value.
         assert!((found / corrected - 1.0).abs() < 0.25, "{found}");

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use logs::units::Units;
 
-use super::{CalibrateError, Output, TableArguments, checks, read_nominal};
+use super::{CalibrateError, Output, TableArguments, read_nominal};
 use crate::{
+    checks,
     controlled::{self, Calibration, Contradicted, Options},
     experiment::{Excitation, Experiment, Layout},
     lean, log,

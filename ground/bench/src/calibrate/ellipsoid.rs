@@ -9,8 +9,9 @@ use packets::{
     magnitude::{self, Kind, Unit, digits},
 };
 
-use super::{CalibrateError, Output, checks, read_nominal};
+use super::{CalibrateError, Output, read_nominal};
 use crate::{
+    checks,
     coverage::{Coverage, ENOUGH},
     ellipsoid::{Convention, Ellipsoid},
     log,

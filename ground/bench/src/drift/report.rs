@@ -10,7 +10,7 @@ use super::{
     sensitivity::{NAMES, Sensitivity},
     stability::{Interval, Stability},
 };
-use crate::{allan::report::digits, calibrate::checks};
+use crate::{checks, report::five_digits};
 
 /// A residual this many times the root mean square of all is likelier a wrong position or a slip than noise.
 const SUSPICIOUS: f64 = 3.0;
@@ -74,11 +74,16 @@ fn row(name: &str, value: String) -> (String, String) {
 pub fn sensitivity(found: &Sensitivity, unidentifiable: &[String]) -> Result<Section, ChartError> {
     let named = NAMES.iter().zip(&found.coefficients);
     let mut rows: Vec<(String, String)> = named
-        .map(|(name, c)| row(name, format!("{} ± {}", digits(c.value), digits(c.half_width))))
+        .map(|(name, c)| {
+            row(
+                name,
+                format!("{} ± {}", five_digits(c.value), five_digits(c.half_width)),
+            )
+        })
         .collect();
     let rms = (found.residuals.iter().map(|left| left * left).sum::<f64>() / found.residuals.len() as f64).sqrt();
-    rows.push(row("residual, rms", format!("{} deg/h", digits(rms))));
-    rows.push(row("condition", digits(found.condition)));
+    rows.push(row("residual, rms", format!("{} deg/h", five_digits(rms))));
+    rows.push(row("condition", five_digits(found.condition)));
     rows.extend(unidentifiable.iter().map(|named| row("cannot be told", named.clone())));
     let wrong = found
         .residuals
@@ -114,15 +119,19 @@ pub fn scale(found: &Scale, points: &[(f64, f64)]) -> Result<Section, ChartError
     let rows = vec![
         row(
             "scale factor",
-            format!("{} ± {} output per rate", digits(found.factor), digits(found.factor_95)),
+            format!(
+                "{} ± {} output per rate",
+                five_digits(found.factor),
+                five_digits(found.factor_95)
+            ),
         ),
         row(
             "output at rest",
-            format!("{} ± {}", digits(found.bias), digits(found.bias_95)),
+            format!("{} ± {}", five_digits(found.bias), five_digits(found.bias_95)),
         ),
         row(
             "nonlinearity",
-            format!("{} % of full scale", digits(100.0 * found.nonlinearity)),
+            format!("{} % of full scale", five_digits(100.0 * found.nonlinearity)),
         ),
     ];
     let left = points
@@ -161,7 +170,7 @@ const FEW: usize = 8;
 /// The rows of the test in the order of the file, as the residuals of any calibration.
 fn rows_of(found: &Scale, points: &[(f64, f64)]) -> Vec<checks::Row> {
     let row = |(k, ((rate, _), residual)): (usize, (&(f64, f64), &f64))| checks::Row {
-        label: format!("row {} (rate {})", k + 1, digits(*rate)),
+        label: format!("row {} (rate {})", k + 1, five_digits(*rate)),
         along: found.factor * rate,
         residual: *residual,
         stated: None,
@@ -171,9 +180,9 @@ fn rows_of(found: &Scale, points: &[(f64, f64)]) -> Vec<checks::Row> {
 
 /// The scale stability test.
 pub fn steadiness(found: &Steadiness) -> Section {
-    let ppm = |share: f64| format!("{} ppm", digits(1e6 * share));
+    let ppm = |share: f64| format!("{} ppm", five_digits(1e6 * share));
     let rows = vec![
-        row("scale factor, mean", digits(found.mean)),
+        row("scale factor, mean", five_digits(found.mean)),
         row("standard deviation", ppm(found.relative_sigma)),
         row("largest minus smallest", ppm(found.relative_spread)),
         row("trend", format!("{} an hour", ppm(found.trend_per_h))),
@@ -188,11 +197,11 @@ pub fn steadiness(found: &Steadiness) -> Section {
 /// Turn-on repeatability.
 pub fn turn_on(found: &Spread) -> Section {
     let rows = vec![
-        row("mean", digits(found.mean)),
-        row("standard deviation", digits(found.sigma)),
+        row("mean", five_digits(found.mean)),
+        row("standard deviation", five_digits(found.sigma)),
         row(
             "repeatability",
-            format!("{} (largest minus smallest)", digits(found.range)),
+            format!("{} (largest minus smallest)", five_digits(found.range)),
         ),
     ];
     plain(
@@ -206,7 +215,7 @@ pub fn turn_on(found: &Spread) -> Section {
 pub fn decay(time_s: f64) -> Section {
     plain(
         "Decay",
-        vec![row("time constant", format!("{} s", digits(time_s)))],
+        vec![row("time constant", format!("{} s", five_digits(time_s)))],
         "good: the oscillation decays",
     )
 }
@@ -214,9 +223,9 @@ pub fn decay(time_s: f64) -> Section {
 /// Tuning speed and figure of merit.
 pub fn tuning(found: &Tuning) -> Section {
     let rows = vec![
-        row("tuning speed", format!("{} Hz", digits(found.speed_hz))),
-        row("figure of merit", digits(found.merit)),
-        row("residual, rms", format!("{} Hz", digits(found.residual_hz))),
+        row("tuning speed", format!("{} Hz", five_digits(found.speed_hz))),
+        row("figure of merit", five_digits(found.merit)),
+        row("residual, rms", format!("{} Hz", five_digits(found.residual_hz))),
     ];
     plain("Tuning", rows, "good: one straight line through all speeds")
 }
@@ -226,15 +235,15 @@ pub fn stability(found: &Stability) -> Section {
     let of = |interval: Interval| {
         format!(
             "{} ({} to {})",
-            digits(interval.value),
-            digits(interval.low),
-            digits(interval.high)
+            five_digits(interval.value),
+            five_digits(interval.low),
+            five_digits(interval.high)
         )
     };
     let walk = if found.is_walk_seen {
         of(found.walk_step)
     } else {
-        format!("not seen; below {}", digits(found.walk_step.high))
+        format!("not seen; below {}", five_digits(found.walk_step.high))
     };
     let rows = vec![
         row("white, a sample", of(found.white)),
@@ -242,15 +251,15 @@ pub fn stability(found: &Stability) -> Section {
         row("ramp, a second", of(found.ramp)),
         row(
             "angle random walk N",
-            format!("{} rate sqrt(s)", digits(found.angle_walk())),
+            format!("{} rate sqrt(s)", five_digits(found.angle_walk())),
         ),
         row(
             "rate random walk K",
-            format!("{} rate/sqrt(s)", digits(found.rate_walk())),
+            format!("{} rate/sqrt(s)", five_digits(found.rate_walk())),
         ),
         row(
             "s_r, held over a sample",
-            format!("{} rate/s", digits(found.held_walk())),
+            format!("{} rate/s", five_digits(found.held_walk())),
         ),
     ];
     let has_ramp = found.ramp.low * found.ramp.high > 0.0;

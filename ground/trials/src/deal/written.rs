@@ -9,12 +9,12 @@ use emems::packet;
 use flate2::{Compression, write::GzEncoder};
 use twin::environment::Environment;
 
-use super::{DURATION_S, DealError, FIT_S, Flown};
+use super::{DealError, FIT_S, Flown};
 use crate::{
     flight::{CYCLE_S, Instants},
     loose::Loose,
     motion::Style,
-    scene::Scene,
+    scene::{DURATION_S, Scene},
     unit,
 };
 

@@ -76,16 +76,3 @@ fn the_page_needs_nothing_else() {
     let page = chart::html("noise", "a record", &blocks(&analysis(), "deg/s").expect("drawn"));
     assert!(page.contains("g1 &lt;x&gt;") && page.contains("<svg") && !page.contains("href"));
 }
-
-#[test]
-fn digits_are_five() {
-    for (value, text) in [
-        (2.46661e-5, "2.4666e-5"),
-        (26_214.4, "26214"),
-        (0.05, "0.05"),
-        (0.0, "0"),
-        (1_234_567.0, "1.2346e6"),
-    ] {
-        assert_eq!(digits(value), text);
-    }
-}
