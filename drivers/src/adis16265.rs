@@ -47,8 +47,20 @@ pub const STALL_US: u32 = 30;
 /// \[ms\] from power-on or reset until the part answers (data sheet, specifications, start-up time).
 pub const START_UP_MS: u32 = 220;
 
-/// [degC/count]; 0 counts is 25 degC (data sheet, TEMP_OUT).
-pub const CELSIUS_PER_COUNT: f32 = 0.1453;
+/// [degC/count] with all its digits, for whoever computes in `f64` (data sheet, TEMP_OUT).
+pub const CELSIUS_PER_COUNT_F64: f64 = 0.1453;
+
+/// [degC/count]; 0 counts is [`ZERO_C`].
+pub const CELSIUS_PER_COUNT: f32 = CELSIUS_PER_COUNT_F64 as f32;
+
+/// \[degC\] at 0 counts (data sheet, TEMP_OUT).
+pub const ZERO_C: f32 = 25.0;
+
+/// \[counts\] at the end of each range: 320 deg/s of 0.07326 (data sheet, specifications). The part gives a little more.
+pub const RANGE_COUNTS: i16 = 4368;
+
+/// [deg/s/count] of the ranges, smallest first (data sheet, specifications, sensitivity).
+const DEG_S_PER_COUNT: [f64; 3] = [0.018_315, 0.036_63, 0.073_26];
 
 /// Power supply.
 pub const SUPPLY_OUT: Register = register("SUPPLY_OUT", 0x02);
@@ -82,12 +94,21 @@ pub enum Range {
 }
 
 impl Range {
-    /// [deg/s/count] sensitivity (data sheet, specifications).
+    /// [deg/s/count] sensitivity.
     pub const fn deg_s_per_count(self) -> f32 {
         match self {
-            Range::DegPerS80 => 0.018315,
-            Range::DegPerS160 => 0.03663,
-            Range::DegPerS320 => 0.07326,
+            Range::DegPerS80 => const { DEG_S_PER_COUNT[0] as f32 },
+            Range::DegPerS160 => const { DEG_S_PER_COUNT[1] as f32 },
+            Range::DegPerS320 => const { DEG_S_PER_COUNT[2] as f32 },
+        }
+    }
+
+    /// [deg/s/count] with all its digits, for whoever computes in `f64`.
+    pub const fn deg_s_per_count_f64(self) -> f64 {
+        match self {
+            Range::DegPerS80 => DEG_S_PER_COUNT[0],
+            Range::DegPerS160 => DEG_S_PER_COUNT[1],
+            Range::DegPerS320 => DEG_S_PER_COUNT[2],
         }
     }
 }
@@ -99,6 +120,13 @@ pub enum SampleRate {
     Hz2048 = 0x00,
     #[default]
     Hz256 = 0x07,
+}
+
+impl SampleRate {
+    /// \[Hz\]
+    pub const fn hz(self) -> u16 {
+        2048 / (self as u16 + 1)
+    }
 }
 
 /// Settings.

@@ -79,6 +79,9 @@ const fn register(name: &'static str, address: u8) -> Register {
     Register { part, name, address }
 }
 
+/// \[uT\] of one gauss.
+pub const GAUSS_UT: f32 = 100.0;
+
 /// Gain, by its counts a gauss (datasheet table 9, GN2 to GN0). The field that fits is the inverse: 0.88 to 8.1 gauss.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
@@ -95,7 +98,19 @@ pub enum Gain {
 }
 
 impl Gain {
-    /// [counts/gauss]; one gauss is 100 uT.
+    /// Every setting, in the order of its bits.
+    pub const ALL: [Gain; 8] = [
+        Gain::PerGauss1370,
+        Gain::PerGauss1090,
+        Gain::PerGauss820,
+        Gain::PerGauss660,
+        Gain::PerGauss440,
+        Gain::PerGauss390,
+        Gain::PerGauss330,
+        Gain::PerGauss230,
+    ];
+
+    /// [counts/gauss]; one gauss is [`GAUSS_UT`].
     pub const fn counts_per_gauss(self) -> u16 {
         [1370, 1090, 820, 660, 440, 390, 330, 230][self as usize]
     }
@@ -113,6 +128,13 @@ pub enum Rate {
     Hz30 = 5,
     #[default]
     Hz75 = 6,
+}
+
+impl Rate {
+    /// \[Hz\]
+    pub const fn hz(self) -> f32 {
+        [0.75, 1.5, 3.0, 7.5, 15.0, 30.0, 75.0][self as usize]
+    }
 }
 
 /// Measurements averaged into one set (datasheet table 4, MA1 MA0).

@@ -73,6 +73,15 @@ const OUT_X: Register = register("OUT_X", 0x28);
 const OUT_Y: Register = register("OUT_Y", 0x2A);
 const OUT_Z: Register = register("OUT_Z", 0x2C);
 
+/// \[counts\] what its 12 bits hold: the ends say that it was that much or more.
+pub const CODES: core::ops::RangeInclusive<i16> = -2048..=2047;
+
+/// [m/s2] of the data sheet's g, with all its digits, for whoever computes in `f64`.
+pub const STANDARD_GRAVITY_F64: f64 = 9.80665;
+
+/// [m/s2] of the data sheet's g.
+pub const STANDARD_GRAVITY: f32 = STANDARD_GRAVITY_F64 as f32;
+
 /// Full scale (datasheet, CTRL_REG4 description, FS1 FS0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
@@ -103,6 +112,18 @@ pub enum Rate {
     Hz100 = 0b01,
     Hz400 = 0b10,
     Hz1000 = 0b11,
+}
+
+impl Rate {
+    /// \[Hz\]
+    pub const fn hz(self) -> u16 {
+        match self {
+            Rate::Hz50 => 50,
+            Rate::Hz100 => 100,
+            Rate::Hz400 => 400,
+            Rate::Hz1000 => 1000,
+        }
+    }
 }
 
 /// Settings.

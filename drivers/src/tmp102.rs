@@ -59,6 +59,16 @@ pub enum Rate {
 }
 
 impl Rate {
+    /// \[Hz\]
+    pub const fn hz(self) -> f32 {
+        match self {
+            Rate::Hz0_25 => 0.25,
+            Rate::Hz1 => 1.0,
+            Rate::Hz4 => 4.0,
+            Rate::Hz8 => 8.0,
+        }
+    }
+
     /// Continuous conversion, 12 bits, alert unused.
     const fn configuration(self) -> u16 {
         FIXED | (self as u16) << 6

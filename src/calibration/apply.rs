@@ -7,7 +7,7 @@ use super::{Axis, Channels, Set, Temperatures};
 use crate::{
     geometry::{PLATES, TRIAD_AXES},
     sample::{Kind, Reading},
-    sensor::hmc5883l::OVERFLOW,
+    sensor::{adis16265::RANGE_COUNTS, hmc5883l::OVERFLOW, lis331hh},
 };
 
 /// \[counts\] what a part says at the ends of its range, and beyond it if it has a word for that.
@@ -19,9 +19,9 @@ struct Ends {
 
 /// \[counts\] ends of the LIS331HH's 12 bits.
 const ACC_ENDS: Ends = Ends {
-    least: -2048,
-    most: 2047,
-    overflow: -2048,
+    least: *lis331hh::CODES.start(),
+    most: *lis331hh::CODES.end(),
+    overflow: *lis331hh::CODES.start(),
 };
 /// \[counts\] just beyond the HMC5883L's 12 bits, where it says [`OVERFLOW`].
 const MAG_ENDS: Ends = Ends {
@@ -29,11 +29,11 @@ const MAG_ENDS: Ends = Ends {
     most: 2048,
     overflow: OVERFLOW,
 };
-/// \[counts\] where the ADIS16265 ends: 320 deg/s of 0.07326, and the same counts in its other ranges.
+/// \[counts\] where the ADIS16265 ends.
 const GYRO_ENDS: Ends = Ends {
-    least: -4368,
-    most: 4368,
-    overflow: -4368,
+    least: -RANGE_COUNTS,
+    most: RANGE_COUNTS,
+    overflow: -RANGE_COUNTS,
 };
 
 /// What each axis measured along itself in one cycle.

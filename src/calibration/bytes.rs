@@ -40,16 +40,6 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 const METHODS: [Method; 3] = [Method::Mt, Method::LmsEc, Method::MvSec];
 const FULL_SCALES: [FullScale; 3] = [FullScale::G6, FullScale::G12, FullScale::G24];
 const RANGES: [Range; 3] = [Range::DegPerS80, Range::DegPerS160, Range::DegPerS320];
-const GAINS: [Gain; 8] = [
-    Gain::PerGauss1370,
-    Gain::PerGauss1090,
-    Gain::PerGauss820,
-    Gain::PerGauss660,
-    Gain::PerGauss440,
-    Gain::PerGauss390,
-    Gain::PerGauss330,
-    Gain::PerGauss230,
-];
 
 pub(super) fn encode(set: &Set) -> [u8; ENCODED_BYTES] {
     let mut bytes = [0; ENCODED_BYTES];
@@ -128,7 +118,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Set, Refusal> {
         },
         ranges: Ranges {
             acceleration: code(bytes, 19, &FULL_SCALES)?,
-            field: code(bytes, 20, &GAINS)?,
+            field: code(bytes, 20, &Gain::ALL)?,
             rate: code(bytes, 21, &RANGES)?,
         },
         reference_c: number(),

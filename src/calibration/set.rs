@@ -6,14 +6,13 @@ use super::{Axis, CHANNELS, Channel, Refusal, Uncertainty, bytes, check, method}
 use crate::{
     geometry::{PLATES, TRIAD_AXES, accelerometer_place_b, gyro_axis_b, triad_axes_b},
     sample::Kind,
-    sensor::{adis16265::Range, hmc5883l::Gain, lis331hh::FullScale},
+    sensor::{
+        adis16265::Range,
+        hmc5883l::{GAUSS_UT, Gain},
+        lis331hh::{FullScale, STANDARD_GRAVITY},
+    },
     settings::Settings,
 };
-
-/// [m/s2] of one g in the datasheet's mg; Eq 3.30 is reproduced with it to its last digit.
-const STANDARD_GRAVITY: f32 = 9.80665;
-/// \[uT\] of one gauss.
-const GAUSS_UT: f32 = 100.0;
 
 /// Which method found the parameters of a kind of sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +57,7 @@ impl Ranges {
         }
     }
 
-    /// [unit/count] what the datasheets say of a kind.
+    /// [unit/count] what the datasheets say of a kind. Eq 3.30 is reproduced with their g to its last digit.
     pub fn nominal_scale(&self, kind: Kind) -> f32 {
         match kind {
             Kind::Accelerometer => self.acceleration.mg_per_count() * 1e-3 * STANDARD_GRAVITY,

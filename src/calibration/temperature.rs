@@ -14,8 +14,6 @@ use crate::{
 const JUMP_C: f32 = 5.0;
 /// Cycles; 5 s at the unit's 5 Hz.
 const JUMP_CYCLES: u8 = 25;
-/// \[degC\] of a gyro's temperature at 0 counts (data sheet, TEMP_OUT).
-const GYRO_ZERO_C: f32 = 25.0;
 
 /// One thermometer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -63,8 +61,8 @@ impl Temperatures {
         let read = |counts: i16| (counts != NOT_READ).then(|| f32::from(counts));
         for plate in 0..PLATES {
             let plate_c = read(reading.temperature[plate]).map(|counts| counts * tmp102::CELSIUS_PER_COUNT);
-            let gyro_c =
-                read(reading.gyro_temperature[plate]).map(|counts| GYRO_ZERO_C + counts * adis16265::CELSIUS_PER_COUNT);
+            let gyro_c = read(reading.gyro_temperature[plate])
+                .map(|counts| adis16265::ZERO_C + counts * adis16265::CELSIUS_PER_COUNT);
             self.plates[plate].note(plate_c);
             self.gyros[plate].note(gyro_c);
         }

@@ -23,10 +23,8 @@ use crate::{
     increments::{GyroCycle, Increments},
     redundancy::matrix,
     sample::Kind,
+    sensor::adis16265::RANGE_COUNTS,
 };
-
-/// \[counts\] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
-const RANGE_COUNTS: u16 = 4368;
 
 /// What b turned by in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +72,8 @@ pub(super) fn turn(
     };
     let seen = which(&|gyro| gyro.count > 0);
     let whole = which(&|gyro| gyro.count == samples) & seen & believed;
-    let clipped = which(&|gyro| gyro.least.unsigned_abs().max(gyro.most.unsigned_abs()) >= RANGE_COUNTS) & seen;
+    let clipped =
+        which(&|gyro| gyro.least.unsigned_abs().max(gyro.most.unsigned_abs()) >= RANGE_COUNTS.unsigned_abs()) & seen;
     let sound = seen & believed & !clipped;
     let saturated = clipped != 0 && (whole & !clipped).count_ones() < 3;
     let used = match (sound == seen, saturated) {

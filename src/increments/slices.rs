@@ -8,16 +8,13 @@
 //! for two intervals and fits 16 bits (4 x 4368).
 
 use super::{Fast, LONGEST_INTERVAL_S};
-use crate::{geometry::PLATES, sample::NOT_READ};
+use crate::{geometry::PLATES, sample::NOT_READ, sensor::adis16265::RANGE_COUNTS};
 
 /// Slices between two packets at most: at 5 Hz there are ten. Of a longer period the latest have no place.
 pub const SLICES: usize = 10;
 
 /// \[us\] a slice ends with the first fast sample that makes it as long: two intervals at 100 Hz.
 const SHORTEST_US: u64 = 15_000;
-
-/// \[counts\] a rate beyond the range (ADIS16265 data sheet, Table 1: 320 deg/s are 4368 counts).
-const RANGE_COUNTS: i16 = 4368;
 
 /// [counts/4] said of a gyro that touched the end of its range, with the sign of that end.
 pub const BEYOND: i16 = i16::MAX;

@@ -12,7 +12,11 @@ use super::{
     motion::SURPRISED_WALK,
     seconds_between, square,
 };
-use crate::{calibration::Set, geometry::PLATES};
+use crate::{
+    calibration::Set,
+    geometry::PLATES,
+    sensor::lis331hh::{CODES, STANDARD_GRAVITY},
+};
 
 /// \[s\] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
 const FORCE_AGE_S: f32 = 0.006;
@@ -22,10 +26,8 @@ const SURPRISED_S: f32 = 0.6;
 const SURPRISE: f32 = 4.0;
 /// Of how many readings the force equations' usual residual is the mean.
 const USUAL: f32 = 20.0;
-/// [m/s2] of the data sheet's g.
-const STANDARD_GRAVITY: f32 = 9.806_65;
 /// \[counts\] an accelerometer that has a value.
-const WITHIN: core::ops::Range<i16> = -2047..2047;
+const WITHIN: core::ops::Range<i16> = *CODES.start() + 1..*CODES.end();
 
 impl Spin {
     pub(super) fn take_force(&mut self, set: &Set, acc_p: &[[i16; 3]; PLATES]) {

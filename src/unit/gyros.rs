@@ -39,9 +39,6 @@ const TEST_POLL: Duration = Duration::from_millis(10);
 /// Pause between two frames of one part.
 const STALL: Duration = Duration::from_micros(STALL_US as u64);
 
-/// \[counts\] a rate beyond the range; 320 deg/s are 4368 counts (ADIS16265 data sheet, Table 1: initial range).
-const SATURATED_COUNTS: u16 = 4368;
-
 /// The gyros of plates 1 to 4.
 pub struct Gyros<'a, SPI> {
     parts: Mutex<NoopRawMutex, [Adis16265<SPI, &'a Clock>; 4]>,
@@ -139,7 +136,7 @@ impl<'a, SPI: SpiDevice<u16>> Gyros<'a, SPI> {
     }
 
     fn note(&self, rate: Output) {
-        let saturated = rate.counts.unsigned_abs() >= SATURATED_COUNTS;
+        let saturated = rate.counts.unsigned_abs() >= adis16265::RANGE_COUNTS.unsigned_abs();
         let health = self.health.get().with_if(Health::GYRO_ALARM, rate.alarm);
         self.health.set(health.with_if(Health::GYRO_SATURATED, saturated));
     }

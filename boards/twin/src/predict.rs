@@ -19,7 +19,7 @@ mod tests;
 use std::borrow::Cow;
 
 pub use calibration::{Accuracy, Column};
-pub use emems::{emems, thesis_slot_s};
+pub use emems::{conversion_s, emems, thesis_slot_s};
 pub use grid::{Grid, LowPass};
 pub use input::Memory;
 use input::{Filters, Look};

@@ -24,7 +24,7 @@ use trials::{
     scene::Scene,
     strike::Struck,
 };
-use twin::predict::{Kind, UnitDescription, emems};
+use twin::predict::{Kind, UnitDescription, conversion_s, emems};
 
 use self::{
     instrument::{Instrument, Scenery, Unseen},
@@ -37,13 +37,6 @@ pub const ANSWER: &str = "answer.toml";
 
 /// \[s\] that a reference records at most.
 pub const LONGEST_S: f64 = 3600.0;
-
-/// \[s\] between conversions of a part by its own clock (data sheets: LIS331HH at 50 Hz, HMC5883L at 75 Hz, ADIS16265 at 256 Hz).
-const PERIODS_S: [(Kind, f64); 3] = [
-    (Kind::Accelerometer, 1.0 / 50.0),
-    (Kind::Magnetometer, 1.0 / 75.0),
-    (Kind::Gyro, 1.0 / 256.0),
-];
 
 /// \[s\] that the record goes on beyond the log at either end: what filters look back on.
 const BEYOND_S: f64 = 0.3;
@@ -182,8 +175,8 @@ fn described(unit: Option<&UnitDescription>, instants: &Instants) -> UnitDescrip
     let mut unit = unit.cloned().unwrap_or_else(|| {
         let mut unit = emems(|_| 0.0);
         for channel in &mut unit.channels {
-            let period = PERIODS_S.iter().find(|(kind, _)| *kind == channel.sensor);
-            channel.instant_sigma_s = period.map(|(_, period_s)| to_microseconds(period_s / 12f64.sqrt()));
+            channel.instant_sigma_s = (channel.sensor != Kind::Thermometer)
+                .then(|| to_microseconds(conversion_s(channel.sensor) / 12f64.sqrt()));
         }
         unit
     });

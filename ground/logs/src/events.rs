@@ -16,6 +16,7 @@ use emems::{
 use nalgebra::Vector3;
 use packets::{
     channel::{Quantity, Reach},
+    magnitude::G,
     reach,
     stream::sequence::Step,
 };
@@ -33,9 +34,6 @@ const MODE: &str = "mode ";
 
 /// Packets in a row that are above or below a force.
 const IN_A_ROW: u32 = 3;
-
-/// [m/s2] standard gravity.
-const GRAVITY: f64 = 9.806_65;
 
 /// Events that are kept.
 const MOST: usize = 500;
@@ -254,13 +252,13 @@ impl Events {
     fn burn(&mut self, number: u64, reading: &Reading) {
         let Some(force) = force(reading) else { return };
         self.thrust = match self.thrust {
-            Thrust::Growing(count) if force > 2.0 * GRAVITY && count + 1 >= IN_A_ROW => Thrust::On(0),
-            Thrust::Growing(count) => Thrust::Growing(if force > 2.0 * GRAVITY { count + 1 } else { 0 }),
-            Thrust::On(count) if force < GRAVITY && count + 1 >= IN_A_ROW => {
+            Thrust::Growing(count) if force > 2.0 * G && count + 1 >= IN_A_ROW => Thrust::On(0),
+            Thrust::Growing(count) => Thrust::Growing(if force > 2.0 * G { count + 1 } else { 0 }),
+            Thrust::On(count) if force < G && count + 1 >= IN_A_ROW => {
                 self.instant(number.saturating_sub(u64::from(IN_A_ROW - 1)), "burn-out".into());
                 Thrust::Growing(0)
             }
-            Thrust::On(count) => Thrust::On(if force < GRAVITY { count + 1 } else { 0 }),
+            Thrust::On(count) => Thrust::On(if force < G { count + 1 } else { 0 }),
             other => other,
         };
     }

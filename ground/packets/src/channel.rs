@@ -11,30 +11,37 @@ use std::ops::RangeInclusive;
 
 use emems::{
     sample::{Kind, NOT_READ, Reading, SENSORS},
-    sensor::hmc5883l::OVERFLOW,
+    sensor::{
+        adis16265::{self, RANGE_COUNTS},
+        hmc5883l::{GAUSS_UT, Gain, OVERFLOW},
+        lis331hh::{CODES, FullScale},
+        tmp102,
+    },
 };
+
+use crate::magnitude::G;
 
 /// Values in a packet.
 pub const CHANNEL_COUNT: usize = 36;
 
-/// [m/s2 per count] LIS331HH at +-6 g, 12 bit: 3 mg a digit (datasheet, table 3), 1 g = 9.80665 m/s2.
-pub const ACC_LSB: f64 = 3e-3 * 9.80665;
+/// [m/s2 per count] LIS331HH at +-6 g, 12 bit.
+pub const ACC_LSB: f64 = FullScale::G6.mg_per_count() as f64 * 1e-3 * G;
 
-/// [uT per count] HMC5883L at gain 1 (+-1.3 Ga): 1090 counts a gauss of 100 uT (datasheet, table 9, whose 0.92 mG a digit is
+/// [uT per count] HMC5883L at gain 1 (+-1.3 Ga), by its counts a gauss (datasheet, table 9, whose 0.92 mG a digit is
 /// that rounded: 0.3 % too much, as much as a magnetometer's scale is known).
-pub const MAG_LSB_UT: f64 = 100.0 / 1090.0;
+pub const MAG_LSB_UT: f64 = GAUSS_UT as f64 / Gain::PerGauss1090.counts_per_gauss() as f64;
 
-/// [rad/s per count] ADIS16265 at +-320 deg/s: 0.07326 deg/s a digit (datasheet, table 1).
-pub const GYRO_LSB: f64 = 0.07326 * std::f64::consts::PI / 180.0;
+/// [rad/s per count] ADIS16265 at +-320 deg/s.
+pub const GYRO_LSB: f64 = adis16265::Range::DegPerS320.deg_s_per_count_f64() * std::f64::consts::PI / 180.0;
 
-/// [degC per count] ADIS16265 TEMP_OUT: 0.1453 degC a digit (datasheet, table 1).
-pub const GYRO_TEMPERATURE_LSB_C: f64 = 0.1453;
+/// [degC per count] ADIS16265 TEMP_OUT.
+pub const GYRO_TEMPERATURE_LSB_C: f64 = adis16265::CELSIUS_PER_COUNT_F64;
 
 /// \[degC\] ADIS16265 temperature at 0 counts.
-pub const GYRO_TEMPERATURE_ZERO_C: f64 = 25.0;
+pub const GYRO_TEMPERATURE_ZERO_C: f64 = adis16265::ZERO_C as f64;
 
-/// [degC per count] TMP102: 0.0625 degC a digit (datasheet, section 7.3.1).
-pub const TEMPERATURE_LSB_C: f64 = 0.0625;
+/// [degC per count] TMP102.
+pub const TEMPERATURE_LSB_C: f64 = tmp102::CELSIUS_PER_COUNT as f64;
 
 /// What a channel measures: a sensor's [`Kind`], but a gyro's own temperature is a quantity of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,12 +90,12 @@ impl Quantity {
         }
     }
 
-    /// Codes of a part that is within its range, and codes that it can give at all: 12 bits, of the gyro's rate 14, of
-    /// which +-4368 are its +-320 deg/s (LIS331HH, HMC5883L, ADIS16265, TMP102 datasheets).
+    /// Codes of a part that is within its range, and codes that it can give at all: 12 bits, of the gyro's rate 14
+    /// (LIS331HH, HMC5883L, ADIS16265, TMP102 datasheets).
     fn codes(self) -> (RangeInclusive<i16>, RangeInclusive<i16>) {
         match self {
-            Quantity::SpecificForce | Quantity::Field => (-2047..=2046, -2048..=2047),
-            Quantity::Rate => (-4367..=4367, -8192..=8191),
+            Quantity::SpecificForce | Quantity::Field => (*CODES.start() + 1..=*CODES.end() - 1, CODES),
+            Quantity::Rate => (1 - RANGE_COUNTS..=RANGE_COUNTS - 1, -8192..=8191),
             Quantity::GyroTemperature | Quantity::Temperature => (-2048..=2047, -2048..=2047),
         }
     }

@@ -13,7 +13,7 @@
 use std::{fmt, ops::RangeInclusive};
 
 /// [m/s2] a gram-force (3rd CGPM, 1901).
-pub const G: f64 = 9.806_65;
+pub const G: f64 = emems::sensor::lis331hh::STANDARD_GRAVITY_F64;
 
 /// A unit: its name on the command line and what one of it is in the base unit (s, rad/s, m/s2, uT).
 #[derive(Clone, Copy, Debug, PartialEq)]

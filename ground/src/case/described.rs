@@ -9,17 +9,9 @@ use std::fs;
 use bench::set::{Set, unit::refine};
 use gap::input::{case::Kind as LogKind, log::Column};
 use packets::stream::{Bytes5To8, Decoder, Item};
-use twin::predict::{Channel, Kind, UnitDescription, emems};
+use twin::predict::{Channel, Kind, UnitDescription, conversion_s, emems};
 
 use super::made::{MadeError, NewCaseArguments};
-
-/// \[s\] conversions of a part by its own clock; a reading is half of it old on the average.
-const PERIODS_S: [(Kind, f64); 4] = [
-    (Kind::Accelerometer, 1.0 / 50.0),
-    (Kind::Magnetometer, 1.0 / 75.0),
-    (Kind::Gyro, 1.0 / 256.0),
-    (Kind::Thermometer, 0.25),
-];
 
 /// Packets or CSV; the mean slots \[s\] of a log with derived frames.
 ///
@@ -74,10 +66,7 @@ pub fn unit(
     };
     if arguments.unit.is_none() {
         for channel in &mut unit.channels {
-            let period_s = PERIODS_S
-                .iter()
-                .find(|(kind, _)| *kind == channel.sensor)
-                .map_or(0.0, |(_, period_s)| *period_s);
+            let period_s = conversion_s(channel.sensor);
             channel.slot_s -= 0.5 * period_s;
             if channel.sensor != Kind::Thermometer {
                 channel.instant_sigma_s = Some(period_s / 12f64.sqrt());

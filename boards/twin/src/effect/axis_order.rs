@@ -1,5 +1,7 @@
 //! Axis order: the magnetometer's registers come as X, Z, Y, and its gain has eight settings; either is easily mistaken.
 
+use emems::sensor::hmc5883l::Gain;
+
 use super::{CorrectedAs, Effect, Nature, Page, Scope, Site};
 use crate::channel::{Chain, Kind};
 
@@ -10,9 +12,13 @@ pub struct AxisOrder;
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 /// Signed orders: six orders by eight signs. The variant is their number; the first is as described.
 const SIGNED: u32 = 48;
-/// [counts/G] by gain setting; variants from [`SIGNED`] on are gains instead of the nominal one.
-const GAINS: [f64; 8] = [1370.0, 1090.0, 820.0, 660.0, 440.0, 390.0, 330.0, 230.0];
-const NOMINAL_GAIN: f64 = 1090.0;
+/// Variants from [`SIGNED`] on are gains instead of the nominal one.
+const NOMINAL_GAIN: Gain = Gain::PerGauss1090;
+
+/// [counts/G]
+fn counts(gain: Gain) -> f64 {
+    f64::from(gain.counts_per_gauss())
+}
 
 const PAGE: Page = Page {
     name: "mag-axis-order",
@@ -38,8 +44,11 @@ impl Effect for AxisOrder {
     fn act<'a>(&self, _theta: &'a [f64], variant: f64, site: &Site<'a>, chain: &mut Chain<'a>) {
         let (number, chip) = (variant as u32, site.triad());
         if number >= SIGNED {
-            let gain = GAINS.get((number - SIGNED) as usize).copied().unwrap_or(NOMINAL_GAIN);
-            chain.aim.axis_b *= gain / NOMINAL_GAIN;
+            let gain = Gain::ALL
+                .get((number - SIGNED) as usize)
+                .copied()
+                .unwrap_or(NOMINAL_GAIN);
+            chain.aim.axis_b *= counts(gain) / counts(NOMINAL_GAIN);
             return;
         }
         let order = ORDERS[(number / 8) as usize];
@@ -57,7 +66,7 @@ impl Effect for AxisOrder {
     fn told(&self, variant: f64) -> Option<String> {
         let number = variant as u32;
         if number >= SIGNED {
-            let gain = GAINS.get((number - SIGNED) as usize)?;
+            let gain = Gain::ALL.get((number - SIGNED) as usize)?.counts_per_gauss();
             return Some(format!("the gain is that of {gain} counts per gauss"));
         }
         let (order, axes) = (ORDERS[(number / 8) as usize], ["x", "y", "z"]);
@@ -70,7 +79,7 @@ impl Effect for AxisOrder {
 
     /// All but the described order, then all but the nominal gain.
     fn variants(&self, _starts_s: &[f64]) -> Vec<f64> {
-        let gains = (0..GAINS.len()).filter(|&i| GAINS[i] != NOMINAL_GAIN);
+        let gains = (0..Gain::ALL.len()).filter(|&i| Gain::ALL[i] != NOMINAL_GAIN);
         (1..SIGNED)
             .map(f64::from)
             .chain(gains.map(|i| f64::from(SIGNED) + i as f64))

@@ -2,6 +2,9 @@
 //!
 //! Both boards drive them byte by byte: the emulated one as the STM32's peripherals clock them, the host one as it
 //! plays an `embedded-hal` transaction. Time is always an argument, in nanoseconds since power-on.
+//!
+//! Addresses, registers, scales and rates are written here once more, from the data sheets and not from the drivers: a number
+//! that a driver has wrong is otherwise wrong on both sides, and no test sees it.
 
 pub mod adis16265;
 pub mod hmc5883l;

@@ -5,7 +5,15 @@
 
 use core::f64::consts::PI;
 
-use emems::sample::{Kind as Part, SENSORS};
+use emems::{
+    sample::{Kind as Part, SENSORS},
+    sensor::{
+        adis16265::{self, Range, SampleRate},
+        hmc5883l::{self, GAUSS_UT, Gain},
+        lis331hh::{self, CODES, FullScale, STANDARD_GRAVITY_F64},
+        tmp102,
+    },
+};
 use nalgebra::Vector3;
 
 use crate::channel::{Channel, Kind, UnitDescription};
@@ -13,10 +21,8 @@ use crate::geometry;
 
 /// \[s\] between two reads: 118.8 ms over sixteen.
 const READ_S: f64 = 7.425e-3;
-/// [m/s2] of one count of the LIS331HH at 6 g: 3 mg.
-const DIGIT: f64 = 3e-3 * 9.80665;
-/// \[uT\] of one gauss; the HMC5883L gives 1090 counts for it.
-const GAUSS_UT: f64 = 100.0;
+/// [m/s2] of one count of the LIS331HH at 6 g.
+const DIGIT: f64 = FullScale::G6.mg_per_count() as f64 * 1e-3 * STANDARD_GRAVITY_F64;
 /// \[s\] a cycle.
 const CYCLE_S: f64 = 0.2;
 
@@ -71,8 +77,8 @@ pub fn emems(slot_s: impl Fn(usize) -> f64) -> UnitDescription {
         name: format!("t{}", gyro.name),
         group: gyro.group,
         slot_s: gyro.slot_s,
-        lsb: 0.1453,
-        bias: -25.0,
+        lsb: adis16265::CELSIUS_PER_COUNT_F64,
+        bias: -f64::from(adis16265::ZERO_C),
         noise_sigma: 0.12,
         bias_sigma: 0.06,
         scale_sigma: 1e-3,
@@ -88,6 +94,16 @@ pub fn emems(slot_s: impl Fn(usize) -> f64) -> UnitDescription {
     }
 }
 
+/// \[s\] between conversions of a part by its own clock, as the unit configures it. A reading is half of it old on the average.
+pub fn conversion_s(kind: Kind) -> f64 {
+    match kind {
+        Kind::Accelerometer => 1.0 / f64::from(lis331hh::Rate::Hz50.hz()),
+        Kind::Magnetometer => 1.0 / f64::from(hmc5883l::Rate::Hz75.hz()),
+        Kind::Gyro => 1.0 / f64::from(SampleRate::Hz256.hz()),
+        Kind::Thermometer => 1.0 / f64::from(tmp102::Rate::Hz8.hz()),
+    }
+}
+
 /// The slots of the thesis' read cycle.
 pub fn thesis_slot_s(slot: usize) -> f64 {
     slot as f64 * READ_S
@@ -99,7 +115,7 @@ fn thermometer() -> Channel {
         sensor: Kind::Thermometer,
         group: String::new(),
         axis_b: Vector3::zeros(),
-        lsb: 0.0625,
+        lsb: tmp102::CELSIUS_PER_COUNT.into(),
         bias: 0.0,
         noise_sigma: 0.05,
         drift_sigma: 0.0,
@@ -125,7 +141,7 @@ fn accelerometer(blank: &Channel) -> Channel {
         scale_sigma: 1e-3,
         axis_sigma_rad: 2e-3,
         // The data sheet says 6 g; the code goes a little further.
-        range: [-2048.0 * DIGIT, 2047.0 * DIGIT],
+        range: [f64::from(*CODES.start()) * DIGIT, f64::from(*CODES.end()) * DIGIT],
         bandwidth_hz: Some(25.0),
         ..blank.clone()
     }
@@ -134,7 +150,7 @@ fn accelerometer(blank: &Channel) -> Channel {
 fn magnetometer(blank: &Channel) -> Channel {
     Channel {
         sensor: Kind::Magnetometer,
-        lsb: GAUSS_UT / 1090.0,
+        lsb: f64::from(GAUSS_UT) / f64::from(Gain::PerGauss1090.counts_per_gauss()),
         noise_sigma: 0.2,
         drift_sigma: 5e-4,
         bias_sigma: 0.1,
@@ -148,7 +164,7 @@ fn magnetometer(blank: &Channel) -> Channel {
 fn gyro(blank: &Channel) -> Channel {
     Channel {
         sensor: Kind::Gyro,
-        lsb: 0.07326 * PI / 180.0,
+        lsb: Range::DegPerS320.deg_s_per_count_f64() * PI / 180.0,
         noise_sigma: 0.00344,
         drift_sigma: 1.5e-5,
         bias_sigma: 1.5e-3,

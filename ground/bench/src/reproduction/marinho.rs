@@ -2,7 +2,11 @@
 //!
 //! Components are in the thesis' left-handed frame e, `(x, y, z)_e = (z, y, x)_b`.
 
-use emems::sensor::{adis16265::Range, hmc5883l::Gain, lis331hh::FullScale};
+use emems::sensor::{
+    adis16265::Range,
+    hmc5883l::Gain,
+    lis331hh::{FullScale, STANDARD_GRAVITY_F64},
+};
 use nalgebra::{Rotation3, SMatrix, Vector3, Vector4};
 
 use super::{Line, Reproduced, ReproductionError, Sources};
@@ -10,9 +14,6 @@ use crate::{
     ellipsoid::{Convention, Ellipsoid},
     turntable::{Mount, Pose, Site, Turning},
 };
-
-/// [m/s2] in Table 4.7; 9.8 in Tables 6.2 and 6.4.
-const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Its tables.
 ///
@@ -44,7 +45,7 @@ fn scale_factors() -> Reproduced {
     let ours = [
         f64::from(FullScale::G6.mg_per_count()),
         1e3 / f64::from(Gain::PerGauss1090.counts_per_gauss()),
-        f64::from(Range::DegPerS320.deg_s_per_count()),
+        Range::DegPerS320.deg_s_per_count_f64(),
     ];
     let names = [
         ("accelerometer [mg/count]", 0.5),
@@ -205,7 +206,8 @@ fn accelerometer_raw(sources: &Sources<'_>) -> Result<Reproduced, ReproductionEr
         Line::new(
             format!("{} [counts]", ACCELEROMETERS[k]),
             &[mean],
-            &[x_e * STANDARD_GRAVITY + bias],
+            // 9.8 in Tables 6.2 and 6.4.
+            &[x_e * STANDARD_GRAVITY_F64 + bias],
             1.45,
         )
     };

@@ -1,7 +1,7 @@
 //! Six poses: where every accelerometer and magnetometer is, its offset and scale, and whether the plates agree.
 
 use nalgebra::{Matrix3, Vector3};
-use packets::channel::Quantity;
+use packets::{channel::Quantity, magnitude::G};
 use twin::geometry::dcm_bp;
 
 use super::{Finding, Outcome, Place};
@@ -17,7 +17,7 @@ use crate::acceptance::{
 const FIELD_MISFIT: f64 = 0.3;
 
 /// A standard gravity in milli-g, for offsets.
-const MG: f64 = 9.806_65e-3;
+const MG: f64 = 1e-3 * G;
 
 /// The readings of a triad in every pose that was taken: pose and mean, in nominal units.
 fn taken(evidence: &Evidence, quantity: Quantity, plate: usize) -> Vec<(usize, Vector3<f64>)> {
