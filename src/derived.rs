@@ -98,6 +98,23 @@ pub struct Derived {
     pub estimate: Estimate,
 }
 
+impl Derived {
+    /// A cycle in WAIT in which nothing was sampled and of which nothing is known: what tests of readers build theirs on, so that
+    /// a new field is none of their business.
+    pub const NONE: Derived = Derived {
+        counter: 0,
+        start_us: 0,
+        mode: Mode::Wait,
+        health: Health(0),
+        start: None,
+        cycle_us: 0,
+        slots_us: [NO_SLOT; SENSOR_COUNT],
+        increments: Increments::NONE,
+        estimate_us: 0,
+        estimate: Estimate::NOTHING,
+    };
+}
+
 /// Why bytes are not a derived frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]

@@ -60,19 +60,27 @@ pub struct GyroCycle {
     pub count: u8,
 }
 
-const EMPTY: Increments = Increments {
-    angle_b: [0.0; 3],
-    covered_us: 0,
-    end_us: 0,
-    gyro: [GyroCycle {
+impl GyroCycle {
+    /// No samples.
+    pub const NONE: GyroCycle = GyroCycle {
         integral_counts_s: 0.0,
         least: NOT_READ,
         most: NOT_READ,
         count: 0,
-    }; 4],
-    forces: [Force::NONE; forces::READINGS],
-    slices: [Slice::NONE; SLICES],
-};
+    };
+}
+
+impl Increments {
+    /// Nothing came.
+    pub const NONE: Increments = Increments {
+        angle_b: [0.0; 3],
+        covered_us: 0,
+        end_us: 0,
+        gyro: [GyroCycle::NONE; 4],
+        forces: [Force::NONE; forces::READINGS],
+        slices: [Slice::NONE; SLICES],
+    };
+}
 
 /// The running integration.
 #[derive(Clone, Debug)]
@@ -102,7 +110,7 @@ impl Integrator {
     pub fn new(rad_s_per_count: f32) -> Self {
         Integrator {
             rad_s_per_count,
-            sum: EMPTY,
+            sum: Increments::NONE,
             coning_b: Vector3::zeros(),
             last_angle_b: Vector3::zeros(),
             last: None,
@@ -170,7 +178,13 @@ impl Integrator {
     /// What came since it was last asked; the next interval begins where this one ended.
     pub fn take(&mut self) -> Increments {
         let end_us = self.sum.end_us;
-        let mut taken = core::mem::replace(&mut self.sum, Increments { end_us, ..EMPTY });
+        let mut taken = core::mem::replace(
+            &mut self.sum,
+            Increments {
+                end_us,
+                ..Increments::NONE
+            },
+        );
         taken.angle_b = (Vector3::from(taken.angle_b) + core::mem::take(&mut self.coning_b)).into();
         taken.slices = self.slicer.take(end_us);
         taken

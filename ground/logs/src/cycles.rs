@@ -150,11 +150,7 @@ fn channel(before: i16, now: i16, covered_us: u32) -> GyroCycle {
 
 #[cfg(test)]
 mod tests {
-    use emems::{
-        health::Health,
-        increments::Integrator,
-        sample::{Errors, NO_SLOT},
-    };
+    use emems::sample::{Errors, NO_SLOT};
 
     use super::*;
 
@@ -209,17 +205,11 @@ mod tests {
         let derived = Derived {
             counter,
             start_us: 1_000_000 + 200_000 * u64::from(counter),
-            mode: emems::mode::Mode::Wait,
-            health: Health::default(),
-            start: None,
-            cycle_us: 5_000,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
             increments: Increments {
                 covered_us: 190_000,
-                ..Integrator::new(1.0).take()
+                ..Increments::NONE
             },
-            estimate: emems::estimate::Estimate::NOTHING,
-            estimate_us: 0,
+            ..Derived::NONE
         };
         Item::Derived {
             offset: 0,

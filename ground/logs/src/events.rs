@@ -276,12 +276,7 @@ fn force(reading: &Reading) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use emems::{
-        estimate::Estimate,
-        health::Health,
-        increments::Integrator,
-        sample::{Errors, NO_SLOT},
-    };
+    use emems::sample::Errors;
 
     use super::*;
 
@@ -366,15 +361,8 @@ mod tests {
         let said = "mode FLIGHT: lift-off";
         let frame = |mode| Derived {
             counter: 7,
-            start_us: 0,
             mode,
-            health: Health::default(),
-            start: None,
-            cycle_us: 0,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
-            increments: Integrator::new(1.0).take(),
-            estimate_us: 0,
-            estimate: Estimate::NOTHING,
+            ..Derived::NONE
         };
         for line_first in [false, true] {
             let mut events = Events::default();

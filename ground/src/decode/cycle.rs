@@ -128,14 +128,7 @@ impl Cycle {
 
 #[cfg(test)]
 mod tests {
-    use emems::{
-        derived::Derived,
-        estimate::Estimate,
-        health::Health,
-        increments::Integrator,
-        mode::Mode,
-        sample::{NO_SLOT, Reading, SENSOR_COUNT},
-    };
+    use emems::{derived::Derived, sample::Reading};
     use packets::stream::sequence::Step;
 
     use super::*;
@@ -153,14 +146,7 @@ mod tests {
         Entry::Derived(Box::new(Derived {
             counter,
             start_us,
-            mode: Mode::Wait,
-            health: Health::default(),
-            start: None,
-            cycle_us: 5_000,
-            slots_us: [NO_SLOT; SENSOR_COUNT],
-            increments: Integrator::new(1.0).take(),
-            estimate: Estimate::NOTHING,
-            estimate_us: 0,
+            ..Derived::NONE
         }))
     }
 

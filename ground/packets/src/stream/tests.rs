@@ -1,12 +1,8 @@
 //! What the stream reader finds, literal damage first, then any damage.
 
 use emems::{
-    estimate::Estimate,
-    health::Health,
-    increments::{Force, GyroCycle, Increments, SLICES, Slice, forces::READINGS},
     mode::Mode,
     packet::{Expected, encode},
-    sample::NOT_READ,
 };
 use proptest::prelude::*;
 
@@ -147,30 +143,13 @@ fn console_text_between_packets_is_one_stretch_a_line_or_not() {
 }
 
 fn derived_frame() -> [u8; DERIVED_BYTES] {
-    let silent = GyroCycle {
-        integral_counts_s: 0.0,
-        least: NOT_READ,
-        most: NOT_READ,
-        count: 0,
-    };
     derived::encode(&Derived {
         counter: 1,
         start_us: 200_000,
         mode: Mode::Flight,
-        health: Health(0),
-        start: None,
         cycle_us: 3_700,
         slots_us: std::array::from_fn(|slot| 225 * slot as u32),
-        increments: Increments {
-            angle_b: [0.0; 3],
-            covered_us: 0,
-            end_us: 0,
-            gyro: [silent; 4],
-            forces: [Force::NONE; READINGS],
-            slices: [Slice::NONE; SLICES],
-        },
-        estimate_us: 0,
-        estimate: Estimate::NOTHING,
+        ..Derived::NONE
     })
 }
 

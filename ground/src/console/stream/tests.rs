@@ -2,12 +2,8 @@
 
 use emems::{
     derived::DERIVED_BYTES,
-    estimate::Estimate,
-    health::Health,
-    increments::Integrator,
     mode::Mode,
     packet::{Expected, PACKET_BYTES, encode},
-    sample::{NO_SLOT, SENSOR_COUNT},
 };
 use proptest::prelude::*;
 
@@ -26,13 +22,8 @@ fn derived() -> Derived {
         counter: 1,
         start_us: 200_000,
         mode: Mode::Flight,
-        health: Health(0),
-        start: None,
         cycle_us: 8000,
-        slots_us: [NO_SLOT; SENSOR_COUNT],
-        increments: Integrator::new(1.0).take(),
-        estimate_us: 0,
-        estimate: Estimate::NOTHING,
+        ..Derived::NONE
     }
 }
 
