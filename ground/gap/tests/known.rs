@@ -191,11 +191,17 @@ fn a_track_of_another_flight_is_not_used_and_said_so() {
 fn a_track_whose_sigmas_are_too_small_is_not_used() {
     let (folder, motion) = flown(1, TRACK);
     tracked(folder.path(), &motion, 2.0 * SIGMA_M);
-    let (found, _) = told(&folder).track.expect("is known");
+    let told = told(&folder);
+    let (found, _) = told.track.expect("is known");
     assert!(
         matches!(found, Use::Misfit(fit) if (1.8..2.2).contains(&fit.gap)),
         "{found:?}"
     );
+    // The page shows how it lies all the same.
+    let squares: f64 = told.beside_track.iter().map(|own| own.off_n.norm_squared() / 3.0).sum();
+    let size = (squares / told.beside_track.len() as f64).sqrt();
+    assert!((1.7..2.2).contains(&size), "{size}");
+    assert!(told.track_figure().expect("is drawn").is_some());
 }
 
 /// A trajectory as it was simulated before the flight, its heading off by some degrees, beside a case.
@@ -295,6 +301,7 @@ fn the_screen_and_the_verdict_say_what_became_of_what_is_known() {
     // A healthy unit is given no name, with or without a track.
     assert!(verdict["causes"].as_array().expect("a list").is_empty(), "{verdict}");
     assert!(text("index.html").contains("NOMINAL"));
+    assert!(text("index.html").contains("The track beside the motion that it holds"));
 }
 
 #[test]

@@ -277,6 +277,7 @@ fn an_attitude_that_does_not_settle_is_said_and_not_written() {
         rests: Vec::new(),
         turns: vec![0.4, 0.3],
         track: None,
+        beside_track: Vec::new(),
         belief: None,
         kept: None,
         lost: Vec::new(),

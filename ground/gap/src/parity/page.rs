@@ -28,6 +28,7 @@ pub fn html(flight: &Flight, findings: &Findings, told: &Told) -> Result<String,
         Block::Figure(channels(findings)?),
     ];
     blocks.extend(told.figure()?.map(Block::Figure));
+    blocks.extend(told.track_figure()?.map(Block::Figure));
     let title = format!("Gap without a reference: {}", flight.opened.text.name);
     Ok(chart::html(&title, &flight.opened.text.about, &blocks))
 }

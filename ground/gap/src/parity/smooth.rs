@@ -48,6 +48,7 @@ use crate::{
             instants::Kept,
             simulated::Belief,
             ties::{Ties, Use},
+            track::Beside,
         },
         smooth::{
             basis::Knots,
@@ -139,6 +140,8 @@ pub struct Smoothed {
     pub ties: Ties,
     /// What became of the track; none where there is none.
     pub track: Option<Use>,
+    /// Its fixes beside the motion, used or not; empty where they never met.
+    pub beside_track: Vec<Beside>,
     /// What became of the simulated trajectory.
     pub belief: Option<Belief>,
     /// What became of attitudes at instants; none where none are told.
@@ -175,6 +178,7 @@ impl Smoothed {
             turns: Vec::new(),
             ties: Ties::default(),
             track: None,
+            beside_track: Vec::new(),
             belief: None,
             attitudes: None,
             gain: f64::INFINITY,

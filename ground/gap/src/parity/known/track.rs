@@ -197,6 +197,15 @@ impl<'a> Displacement<'a> {
     }
 }
 
+/// A fix beside a motion.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside {
+    /// \[s\] on the log's clock.
+    pub t_s: f64,
+    /// In its sigmas, along each axis of n.
+    pub off_n: Vector3<f64>,
+}
+
 /// A track along a motion.
 pub struct Aligned {
     /// \[s\] `t_log = t_track + offset`.
@@ -253,6 +262,15 @@ impl Aligned {
             by_offset: slope(offset_s),
             begun,
         }
+    }
+
+    /// Each of its fixes.
+    pub fn beside(&self, fixes: &[Fix]) -> Vec<Beside> {
+        let own = |(fix, off): (&Fix, &[f64])| Beside {
+            t_s: fix.t_s + self.offset_s,
+            off_n: Vector3::from_column_slice(off),
+        };
+        fixes.iter().zip(self.off.as_slice().chunks_exact(3)).map(own).collect()
     }
 
     /// Direction of the rows along which an offset moves them; none where an offset as long as the log moves them by less than a

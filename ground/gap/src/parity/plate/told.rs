@@ -78,6 +78,7 @@ pub fn attitude(findings: &Findings) -> Told {
         rests: rests(&findings.field),
         turns: Vec::new(),
         track: None,
+        beside_track: Vec::new(),
         belief: None,
         kept: None,
         lost: Vec::new(),

@@ -103,15 +103,15 @@ impl Smoothed {
             ..self.ties.clone()
         };
         let is_settled = self.settles_again(about, progress)?;
-        let found = match self.ties.aligned(&self.trajectory) {
-            Some(aligned) if is_settled => Use::of(&aligned),
-            _ => Use::Unsettled,
+        let (found, beside) = match self.ties.aligned(&self.trajectory) {
+            Some(aligned) if is_settled => (Use::of(&aligned), aligned.beside(&self.ties.fixes)),
+            _ => (Use::Unsettled, Vec::new()),
         };
         match found {
             Use::Used(fit) => self.ties.offset_s = fit.offset_s,
             _ => *self = alone,
         }
-        self.track = Some(found);
+        (self.track, self.beside_track) = (Some(found), beside);
         Ok(())
     }
 

@@ -21,6 +21,7 @@ use crate::{
             instants::{self, Kept},
             simulated::Belief,
             ties::Use,
+            track::Beside,
         },
     },
     parity::{smooth::covariances, space::Space},
@@ -53,6 +54,8 @@ pub struct Told {
     pub turns: Vec<f64>,
     /// What became of the track, and \[s\] one sigma of its clock's offset; none where there is none.
     pub track: Option<(Use, Option<f64>)>,
+    /// Its fixes beside the motion.
+    pub beside_track: Vec<Beside>,
     /// What became of the simulated trajectory; none where there is none.
     pub belief: Option<Belief>,
     /// What became of attitudes at instants; none where none are told.
@@ -82,6 +85,7 @@ impl Told {
             rests: smoothed.rests.clone(),
             turns: smoothed.turns.clone(),
             track: smoothed.track.map(|own| (own, None)),
+            beside_track: smoothed.beside_track.clone(),
             belief: smoothed.belief,
             kept: smoothed.attitudes.clone(),
             lost: Vec::new(),
@@ -257,5 +261,30 @@ impl Told {
             panel("three sigma about x, y, z [deg]", known.collect()),
         ];
         Figure::of("Attitude, smoothed over the whole log", 1, &panels).map(Some)
+    }
+
+    /// What each fix of the track is off by; none where there is no track, or it never met the motion. A track that was refused is
+    /// shown as well: where it parts from the motion says why.
+    ///
+    /// # Errors
+    /// When a plot cannot be drawn.
+    pub fn track_figure(&self) -> Result<Option<Figure>, ChartError> {
+        let Some((found, _)) = self.track.filter(|_| !self.beside_track.is_empty()) else {
+            return Ok(None);
+        };
+        let names = ["north", "east", "down"];
+        let points =
+            |axis: usize| Marks::Dots(self.beside_track.iter().map(|own| (own.t_s, own.off_n[axis])).collect());
+        let panel = Panel {
+            x: Axis::linear("time [s]"),
+            y: Axis::linear("off [sigma]"),
+            layers: (0..3).map(|axis| Layer::new(names[axis], axis, points(axis))).collect(),
+            ..Panel::default()
+        };
+        let title = match found {
+            Use::Used(_) => "The track beside the motion that it holds",
+            _ => "The track beside the motion: not used",
+        };
+        Figure::of(title, 1, &[panel]).map(Some)
     }
 }
