@@ -6,7 +6,7 @@
 //! | step | file | gives |
 //! |---|---|---|
 //! | 1 | [`flight`] (by [`phases`], [`turning`]) | the fit windows of the log, and the unit in its environment; what it did when |
-//! | 2 | [`codes`] | samples sent twice, lost bits: no model is needed for these |
+//! | 2 | [`codes`], [`garbled`], [`wired`] | samples sent twice, lost, stuck and reversed bits; plates and axes that are exchanged |
 //! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
@@ -37,6 +37,7 @@ pub mod course;
 pub mod findings;
 pub mod flight;
 pub mod followed;
+pub mod garbled;
 pub mod known;
 pub mod name;
 pub mod nulls;
@@ -53,6 +54,7 @@ pub mod text;
 pub mod turning;
 pub mod verdict;
 pub mod visible;
+pub mod wired;
 
 use std::path::Path;
 
@@ -99,7 +101,7 @@ pub fn analysed(
     if let Some(sensors) = Sensors::of(&flight.unit) {
         return of_plate(&flight, sensors, withheld, progress);
     }
-    let coded = Findings::coded(&flight, withheld);
+    let coded = Findings::coded(&flight, withheld)?;
     let followed = Followed::of(&flight, &flight.log, &coded);
     let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
     let told = Told::along(&followed, &|share| progress("attitude", share))?;

@@ -1,4 +1,4 @@
-//! What the codes say without any model: samples sent twice, bits that are lost, channels that stand still.
+//! What the codes say without any model: samples sent twice, bits that are lost or stuck, channels that stand still.
 //!
 //! In: a log and its unit. Out: [`Finding`]s, each an effect of the library with its channels. Nothing is predicted for these, so
 //! they hold whatever the motion was.
@@ -8,13 +8,22 @@
 //!   ([`REPEATS_CHANCE`]) are old samples.
 //! - **Lost bits.** All codes of a channel lie a multiple of `n` apart. By chance all differences of `k` codes are even with
 //!   probability `2^(1 - k)`.
-//! - **Stuck.** All codes are one, where the described noise would change them.
+//! - **A stuck bit** ([`bits`]). One bit is the same in all codes, however often those above it change.
+//! - **Stuck.** From some instant on all codes are one, where the described noise would change them, and where it changes those of
+//!   the other channels of its kind.
 
-use statrs::distribution::{DiscreteCDF, Poisson};
+mod bits;
+
+use nalgebra::Vector3;
+use statrs::{
+    distribution::{DiscreteCDF, Poisson},
+    function::erf::erf,
+};
 use twin::predict::{Channel, Kind, UnitDescription};
 
 use crate::{
     input::log::{Log, Series},
+    parity::garbled,
     thresholds::REPEATS_CHANCE,
 };
 
@@ -23,10 +32,6 @@ const LEAST: usize = 64;
 
 /// Axes of a part that are taken together: one repeats too often by chance.
 const AXES: usize = 3;
-
-/// Noise over a code \[1\] from which a channel cannot stand still by chance: one code then holds at most 0.90 of the samples,
-/// [`LEAST`] of them in a row with probability 0.002.
-const RESTLESS: f64 = 0.3;
 
 /// What was found in codes.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +44,19 @@ pub struct Finding {
     pub what: String,
     /// \[counts\] step of the codes that are there, for lost bits.
     pub step: Option<i64>,
+    /// Where channels look, of those that look elsewhere than described.
+    pub looks: Vec<Look>,
+}
+
+/// Where a channel looks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Which.
+    pub channel: usize,
+    /// Along what.
+    pub axis_b: Vector3<f64>,
+    /// \[m\] from where.
+    pub lever_m: Vector3<f64>,
 }
 
 /// Looks at all channels.
@@ -46,13 +64,28 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
     let steps = lost_bits(log, unit);
     let mut found = stale(log, unit, &steps);
     found.extend(of_parts(unit, &steps));
+    found.extend(bits::stuck(log, unit, &steps));
     found.extend(stuck(log, unit));
     found
 }
 
-/// The log without what was found: old samples and stuck channels are left out, lost bits are rounding.
+/// The log without what was found: old samples, faulty channels and the time in which one is stuck are left out, lost bits are rounding;
+/// channels look where they do.
 pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
-    for finding in found {
+    if found.iter().any(|finding| finding.effect == "packet-corruption") {
+        for (channel, spoilt) in garbled::spoilt(log, unit) {
+            let series = &mut log.channels[channel];
+            *series = series.only(|row| row as u32 != spoilt);
+        }
+    }
+    for look in found.iter().flat_map(|finding| &finding.looks) {
+        let own = &mut unit.channels[look.channel];
+        (own.axis_b, own.lever_m) = (look.axis_b, look.lever_m);
+    }
+    for finding in found
+        .iter()
+        .filter(|finding| finding.looks.is_empty() && finding.effect != "packet-corruption")
+    {
         let repeats = repeats(log, &finding.channels);
         for channel in finding.channels.iter().copied() {
             let own = &mut unit.channels[channel];
@@ -65,6 +98,11 @@ pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
                     own.bias_sigma = own.bias_sigma.hypot(0.5 * coarse);
                 }
                 ("stale-sample", _) => *series = series.only(|row| repeats.binary_search(&(row as u32)).is_err()),
+                ("stuck-channel", _) => {
+                    let last = series.rows.len() - alike_at_end(series);
+                    series.rows.truncate(last);
+                    series.values.truncate(last);
+                }
                 _ => *series = Series::default(),
             }
         }
@@ -75,7 +113,8 @@ fn code(channel: &Channel, value: f64) -> i64 {
     (value / channel.lsb).round() as i64
 }
 
-fn sends_codes(channel: &Channel) -> bool {
+/// Whether a channel rounds to codes.
+pub fn sends_codes(channel: &Channel) -> bool {
     channel.bits.is_some() && channel.lsb > 0.0
 }
 
@@ -126,6 +165,7 @@ fn stale(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Findin
                         rate * samples as f64
                     ),
                     step: None,
+                    looks: Vec::new(),
                 });
             }
         }
@@ -177,25 +217,60 @@ fn of_parts(unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Finding> {
                 channels: vec![index],
                 what: format!("all codes are a multiple of {step} apart"),
                 step: Some(step),
+                looks: Vec::new(),
             }),
         }
     }
     found
 }
 
+/// Samples at the end that are all one.
+fn alike_at_end(series: &Series) -> usize {
+    let Some(end) = series.values.last() else { return 0 };
+    series.values.iter().rev().take_while(|value| *value == end).count()
+}
+
+/// Probability that noise leaves a code as it is: of a normal law at most what lies within half a code of its middle.
+fn left_by_noise(channel: &Channel) -> f64 {
+    erf(0.5 * channel.lsb / (2f64.sqrt() * channel.noise_sigma))
+}
+
+/// Share of the samples from a row on that repeat the one before.
+fn repeated_since(series: &Series, row: u32) -> f64 {
+    let since = &series.values[series.rows.partition_point(|own| *own < row)..];
+    let same = since.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    same as f64 / since.len().saturating_sub(1).max(1) as f64
+}
+
+/// Stuck channels. A unit that is quieter than described stands still in all channels of a kind, and is not stuck.
 fn stuck(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
-    let is_stuck = |(channel, series): (&Channel, &Series)| {
-        let is_one = series.values.windows(2).all(|pair| pair[0] == pair[1]);
-        sends_codes(channel) && series.values.len() >= LEAST && is_one && channel.noise_sigma > RESTLESS * channel.lsb
+    let since = |index: usize, channel: &Channel, series: &Series| {
+        let alike = alike_at_end(series);
+        let from = series.rows.len() - alike;
+        if !sends_codes(channel) || alike < LEAST {
+            return None;
+        }
+        let others = unit.channels.iter().zip(&log.channels).enumerate();
+        let others = others.filter(|(other, (own, _))| *other != index && own.sensor == channel.sensor);
+        let quiet = others.map(|(_, (_, own))| repeated_since(own, series.rows[from]));
+        let chance = quiet.fold(left_by_noise(channel), f64::max).powf(alike as f64);
+        (chance * (unit.channels.len() as f64) < REPEATS_CHANCE).then_some(from)
     };
     let channels = unit.channels.iter().zip(&log.channels).enumerate();
-    let stuck = channels.filter(|(_, pair)| is_stuck(*pair));
+    let stuck = channels.filter_map(|(index, (channel, series))| Some((index, since(index, channel, series)?)));
     stuck
-        .map(|(index, _)| Finding {
+        .map(|(index, from)| Finding {
             effect: "stuck-channel",
             channels: vec![index],
-            what: "one code throughout".to_owned(),
+            what: match from {
+                0 => "one code throughout".to_owned(),
+                _ => {
+                    let row = log.channels[index].rows[from];
+                    format!("one code from {:.1} s on", log.start_s[row as usize])
+                }
+            },
             step: None,
+            looks: Vec::new(),
         })
         .collect()
 }
@@ -276,6 +351,31 @@ mod tests {
             [("coarse-quantisation", vec![3, 4, 5]), ("stuck-channel", vec![9])]
         );
         assert_eq!(coarse[0].step, Some(4));
+    }
+
+    #[test]
+    fn a_channel_that_stands_from_an_instant_on_is_left_out_from_there() {
+        let stands = |index: usize, row: usize, value: f64, before: f64| {
+            let is_since = |from: usize| row > from;
+            match index {
+                5 if is_since(400) => before,
+                // Shorter than chance excludes.
+                7 if is_since(599 - LEAST / 2) => before,
+                _ => value,
+            }
+        };
+        let (mut log, mut unit) = logged(stands);
+        let found = look(&log, &unit);
+        assert_eq!(told(&found), [("stuck-channel", vec![5])]);
+        assert_eq!(found[0].what, "one code from 80.0 s on");
+        taken_out(&mut log, &mut unit, &found);
+        assert_eq!([log.channels[5].rows.len(), log.channels[7].rows.len()], [400, 600]);
+    }
+
+    #[test]
+    fn a_unit_that_is_quieter_than_described_is_not_stuck_where_it_rests() {
+        let rests = |_: usize, row: usize, value: f64, before: f64| if row > 400 { before } else { value };
+        assert_eq!(found(rests), []);
     }
 
     #[test]

@@ -27,6 +27,7 @@ use crate::{
         codes::{self, Finding},
         flight::Flight,
         followed::Followed,
+        garbled,
         name::{By, Name},
         nulls,
         packet::Motion,
@@ -35,6 +36,7 @@ use crate::{
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
+        wired,
     },
     probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
@@ -96,17 +98,25 @@ impl Findings {
     /// # Errors
     /// When the unit has no redundancy, or its description names an effect there is not.
     pub fn of(flight: &Flight, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Result<Self, CaseError> {
-        let coded = Self::coded(flight, withheld);
+        let coded = Self::coded(flight, withheld)?;
         let followed = Followed::of(flight, &flight.log, &coded);
         Self::along(flight, withheld, &coded, &followed, progress)
     }
 
-    /// What the codes of a flight say.
-    pub fn coded(flight: &Flight, withheld: &[String]) -> Vec<Finding> {
-        let coded = codes::look(&flight.log, &flight.unit).into_iter();
-        coded
-            .filter(|finding| withheld.iter().all(|name| name != finding.effect))
-            .collect()
+    /// What is told before anything is followed: by the codes of a flight, and by where its sensors look.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn coded(flight: &Flight, withheld: &[String]) -> Result<Vec<Finding>, CaseError> {
+        let mut coded = codes::look(&flight.log, &flight.unit);
+        coded.retain(|finding| withheld.iter().all(|name| name != finding.effect));
+        let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
+        codes::taken_out(&mut log, &mut unit, &coded);
+        coded.extend(garbled::look(&log, &unit));
+        coded.retain(|finding| withheld.iter().all(|name| name != finding.effect));
+        let wired = wired::look(flight, &coded, withheld)?;
+        coded.extend(wired);
+        Ok(coded)
     }
 
     /// Of a flight whose motion is followed, and of whose codes this is known.
@@ -266,7 +276,7 @@ fn is_shown(promise: Promise) -> bool {
 pub fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 {
     let of = |promise: Option<Promise>| promise.map(|promise| promise.confidence());
     match by {
-        By::Codes => 1.0,
+        By::Codes | By::Axes => 1.0,
         By::Parity => of(held).unwrap_or(1.0),
         By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0),
     }

@@ -20,6 +20,8 @@ const BY_CODES: f64 = 0.99;
 pub enum By {
     /// Codes, without a model.
     Codes,
+    /// The readings as a whole: with other axes nothing is left.
+    Axes,
     /// Each packet by itself.
     Parity,
     /// All packets, about the smoothed motion.
@@ -75,7 +77,10 @@ impl Name {
         let page = by_name(finding.effect).map(|effect| effect.page());
         Self {
             effect: finding.effect,
-            by: By::Codes,
+            by: match finding.looks.is_empty() {
+                true => By::Codes,
+                false => By::Axes,
+            },
             locality: String::new(),
             or_at: Vec::new(),
             channels: finding.channels.clone(),

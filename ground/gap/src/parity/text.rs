@@ -188,7 +188,7 @@ fn evidence(name: &Name) -> String {
         (Some(gain), Some([usual, found])) => {
             let by = match name.by {
                 By::Smoothing => ", about the smoothed motion",
-                By::Codes | By::Parity => "",
+                By::Codes | By::Axes | By::Parity => "",
             };
             let held = name.promise.map_or(String::new(), |promise| {
                 format!(
@@ -200,6 +200,7 @@ fn evidence(name: &Name) -> String {
                 ", {gain:.1} nats{by}, signal-to-noise ratio {found:.1} at this size and {usual:.1} at the usual{held}"
             )
         }
+        _ if name.by == By::Axes => ", by what each packet reads as a whole".to_owned(),
         _ => ", by the codes alone".to_owned(),
     }
 }

@@ -110,6 +110,7 @@ impl Verdict {
             probability: rounded(name.probability),
             by: match name.by {
                 By::Codes => "codes",
+                By::Axes => "axes",
                 By::Parity => "evidence",
                 By::Smoothing => "smoothing",
             },

@@ -94,7 +94,7 @@ impl Logged {
         let name = opened.text.name.clone();
         let known = if is_blind || opened.is_without_motion() {
             let flight = Flight::open(case)?;
-            let coded = Findings::coded(&flight, withheld);
+            let coded = Findings::coded(&flight, withheld)?;
             let followed = Followed::of(&flight, &flight.log, &coded);
             Known::Nothing(Box::new(followed), Box::new(flight), coded)
         } else {

@@ -13,7 +13,7 @@ use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::Problem,
     parity::{
-        codes::{self, Finding},
+        findings::Findings,
         flight::Flight,
         followed::Followed,
         known::{
@@ -70,7 +70,7 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn of(flight: &Flight, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
-        let coded: Vec<Finding> = codes::look(&flight.log, &flight.unit);
+        let coded = Findings::coded(flight, &[])?;
         Self::along(&Followed::of(flight, &flight.log, &coded), progress)
     }
 
