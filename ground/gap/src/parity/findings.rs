@@ -36,7 +36,7 @@ use crate::{
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
-        wired,
+        walk, wired,
     },
     probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
@@ -137,7 +137,8 @@ impl Findings {
         if free[..3].iter().sum::<f64>() < PARITY_FREE {
             return Err(empty(flight, free));
         }
-        let library = Library::new(&problem, withheld, &|share| progress("effects", share));
+        let mut library = Library::new(&problem, withheld, &|share| progress("effects", share));
+        walk::offer(&problem, &mut library, withheld);
         let offered = Offered::of(&problem, &library);
         let nulls = nulls::columns(&problem, &library);
         let (space, opened) = Space::among(&problem, &motion, nulls, &offered.columns());

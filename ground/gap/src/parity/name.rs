@@ -8,7 +8,7 @@ use crate::{
     holdout::strength::Promise,
     library::hypotheses::{Hypothesis, Library},
     null::problem::Problem,
-    parity::{codes::Finding, phases::shown::Alone, search::Chosen, smoothed::Fitted},
+    parity::{codes::Finding, phases::shown::Alone, search::Chosen, smoothed::Fitted, walk},
     probability::cause::Sized,
 };
 
@@ -100,10 +100,14 @@ impl Name {
     pub fn of(problem: &Problem, library: &Library, chosen: &Chosen, by: By) -> (Self, Fitted) {
         let hypothesis = &library.hypotheses[chosen.hypothesis];
         let page = hypothesis.cause.effect.page();
+        let (theta, covariance) = match walk::is_law(hypothesis) {
+            true => walk::in_parameters(library, hypothesis, &chosen.theta, &chosen.covariance),
+            false => (chosen.theta.clone(), chosen.covariance.clone()),
+        };
         let sized = |(index, parameter): (usize, &Parameter)| Sized {
             parameter: parameter.clone(),
-            value: chosen.theta[index],
-            sigma: chosen.covariance[(index, index)].max(0.0).sqrt(),
+            value: theta[index],
+            sigma: covariance[(index, index)].max(0.0).sqrt(),
         };
         let name = Self {
             effect: hypothesis.effect(),
@@ -121,6 +125,6 @@ impl Name {
             physics: page.physics,
             confirm_by: page.confirm_by,
         };
-        (name, (hypothesis.component(&chosen.theta), chosen.covariance.clone()))
+        (name, (hypothesis.component(&theta), covariance))
     }
 }

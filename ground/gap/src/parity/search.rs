@@ -23,6 +23,7 @@ use crate::{
     parity::{
         space::{Opened, Projected, Space, dot},
         visible::may_be_named,
+        walk,
     },
     search::odds::{itself, oversize},
     thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, SAID, TEMPERATURE},
@@ -238,8 +239,13 @@ impl First {
         let unit = space.problem.twin.unit();
         let slopes = |(at, component): (usize, &Component)| {
             let cause = &component.active.cause;
-            if cause.effect.page().nature == Nature::Discrete {
-                return Taken::of(space, Vec::new(), Vec::new());
+            match cause.effect.page().nature {
+                Nature::Discrete => return Taken::of(space, Vec::new(), Vec::new()),
+                Nature::Spread => {
+                    let (columns, sigmas) = walk::columns(space.problem, cause).into_iter().unzip();
+                    return Taken::of(space, columns, sigmas);
+                }
+                Nature::Smooth => {}
             }
             let sigmas = cause.parameters(unit).iter().map(|own| own.prior_sigma).collect();
             Taken::of(space, space.problem.slopes(model, at), sigmas)
@@ -456,7 +462,11 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
         .map_or(0.0, |(_, sum)| *sum);
     by_effect.retain(|(name, _)| *name != hypothesis.effect());
     by_effect.sort_by(|one, other| other.1.total_cmp(&one.1));
-    let excess = oversize(hypothesis.cause.effect.page(), &fit.theta, &hypothesis.parameters);
+    let sizes = match walk::is_law(hypothesis) {
+        true => walk::in_parameters(library, hypothesis, &fit.theta, &fit.covariance).0,
+        false => fit.theta.clone(),
+    };
+    let excess = oversize(hypothesis.cause.effect.page(), &sizes, &hypothesis.parameters);
     let doubt = 1.0 / (1.0 + ((DOUBTED - fit.gain) / DOUBT_STEP).exp());
     let is_as_good = |(at, other): &&(usize, Fit)| {
         let is_same = library.hypotheses[*at].effect() == hypothesis.effect();
