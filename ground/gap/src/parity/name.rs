@@ -120,7 +120,11 @@ impl Name {
             snr: Some([chosen.snr, chosen.found_snr]),
             promise: None,
             alone: None,
-            parameters: hypothesis.parameters.iter().enumerate().map(sized).collect(),
+            parameters: match walk::is_law(hypothesis) {
+                // Terms that the log hardly shows are as large as was supposed, and its strength with them.
+                true => Vec::new(),
+                false => hypothesis.parameters.iter().enumerate().map(sized).collect(),
+            },
             which: hypothesis.cause.effect.told(hypothesis.cause.variant),
             physics: page.physics,
             confirm_by: page.confirm_by,

@@ -26,7 +26,7 @@ use crate::{
         walk,
     },
     search::odds::{itself, oversize},
-    thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, SAID, TEMPERATURE},
+    thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, MOST_CAUSES, SAID, TEMPERATURE, UNTOLD},
 };
 
 /// A hypothesis in this log.
@@ -267,7 +267,11 @@ pub fn choose(
     progress: &dyn Fn(f64),
 ) -> Vec<Chosen> {
     let eligible: Vec<&Seen> = (seen.iter())
-        .filter(|one| may_be_named(&library.hypotheses[one.hypothesis], one.snr))
+        .filter(|one| {
+            let hypothesis = &library.hypotheses[one.hypothesis];
+            // A law that is too small to be named is there all the same, and what has a shape must not be named in its place.
+            may_be_named(hypothesis, one.snr) || walk::is_law(hypothesis)
+        })
         .collect();
     let rest = space.rest(residual);
     let mut chosen: Vec<Chosen> = Vec::new();
@@ -473,19 +477,18 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
         let is_elsewhere = library.hypotheses[*at].cause.locality != hypothesis.cause.locality;
         is_same && is_elsewhere && other.gain > fit.gain - EFFECT_MARGIN
     };
+    let snr = (seen.iter().find(|one| one.hypothesis == *best)).map_or(0.0, |one| one.snr);
+    let is_shown = may_be_named(hypothesis, snr);
     Some(Chosen {
         hypothesis: *best,
         elsewhere: fits.iter().filter(is_as_good).map(|(at, _)| *at).collect(),
         theta: fit.theta.clone(),
         covariance: fit.covariance.clone(),
         gain: fit.gain,
-        snr: seen
-            .iter()
-            .find(|one| one.hypothesis == *best)
-            .map_or(0.0, |one| one.snr),
+        snr,
         found_snr: fit.energy.max(0.0).sqrt(),
         // Beyond its largest size it stands for something else, as in the search with a reference.
-        probability: own * doubt * itself(excess),
+        probability: own * doubt * itself(excess) * if is_shown { 1.0 } else { UNTOLD },
         rivals: by_effect,
     })
 }
