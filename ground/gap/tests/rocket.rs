@@ -109,6 +109,10 @@ mod long {
         let gap = verdict["gap"]["before"].as_f64().expect("a gap");
         assert!((0.97..1.03).contains(&gap), "{gap}");
         assert!(screen.contains("LEFT OUT"), "{screen}");
+        assert!(
+            screen.contains("of the packets that were LEFT OUT nothing is said"),
+            "{screen}"
+        );
         let left_out = verdict["left_out"].as_u64().expect("packets");
         assert!((150..300).contains(&left_out), "{left_out}");
         let attitude = attitude.expect("has settled");

@@ -16,7 +16,7 @@ pub fn html(flight: &Flight, findings: &Findings, told: &Told) -> Result<String,
         .iter()
         .map(|null| vec![null.what.to_owned(), null.settled_by.to_owned()]);
     let mut blocks = vec![
-        Block::Lead(sentence(findings)),
+        Block::Lead(sentence(flight, findings)),
         Block::Terminal(text::screen(flight, findings, told)),
         Block::Heading("What parity shows of each effect".to_owned()),
         Block::Terminal(text::visibility(findings)),
@@ -34,7 +34,7 @@ pub fn html(flight: &Flight, findings: &Findings, told: &Told) -> Result<String,
 }
 
 /// What it comes to.
-fn sentence(findings: &Findings) -> String {
+fn sentence(flight: &Flight, findings: &Findings) -> String {
     let named = || {
         let each: Vec<String> = findings
             .names
@@ -57,8 +57,12 @@ fn sentence(findings: &Findings) -> String {
                 .to_owned()
         }
     };
+    let left_out = match flight.unturned {
+        0 => String::new(),
+        rows => format!(" Of {rows} packets that were left out nothing is said."),
+    };
     format!(
-        "{said}: {:.2} sigma, where 1 is noise and calibration alone. Without a reference, what all sensors share cannot be seen.",
+        "{said}: {:.2} sigma, where 1 is noise and calibration alone. Without a reference, what all sensors share cannot be seen.{left_out}",
         findings.gap[0]
     )
 }

@@ -166,9 +166,14 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
         let _ = writeln!(out, "OR      {}", told.collect::<Vec<_>>().join(", "));
     }
     let left = match findings.outcome {
-        Outcome::Clean => {
-            "NO EFFECT is needed for what parity shows; what it cannot show is listed under UNSEEN".to_owned()
-        }
+        Outcome::Clean => format!(
+            "NO EFFECT is needed for what parity shows; what it cannot show is listed under UNSEEN{}",
+            match flight.unturned {
+                0 => "",
+                // An effect that shows nowhere else was not looked for.
+                _ => ", and of the packets that were LEFT OUT nothing is said",
+            }
+        ),
         Outcome::Undecided => {
             "UNDECIDED  the first under OR would explain this log about the smoothed motion, but no held-out window shows it".to_owned()
         }
