@@ -187,7 +187,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     // small errors of its own, and a name is none the worse for them. What makes readings scatter is whatever is not understood, so it has to
     // be one of few.
     let is_inexact = subject.slow.attitude_sigma_rad > 0.0;
-    let is_doubtful = !shrink.supports_the_effect() || explanation.is_patchwork();
+    let is_doubtful = match explanation.is_followed() {
+        // A walk that is followed says between the fitted windows where it is.
+        true => shrink.beyond_recalibration[0] <= 0.0,
+        false => !shrink.supports_the_effect() || explanation.is_patchwork(),
+    };
     let mut withdrawn = Vec::new();
     if shrink.refutes_the_effect() || is_doubtful && !is_inexact {
         withdrawn = explanation.withdraw(&library);
@@ -239,6 +243,15 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         &left,
         &floor,
     );
+    progress("remainder", 0.0);
+    let left_beneath = |causes: &[Cause]| {
+        let said = said(&explanation, causes);
+        remains(subject, &explanation, causes, &said, events.is_some())
+    };
+    let remainder = match is_inexact {
+        true => believed.held_against(left_beneath),
+        false => left_beneath(&believed.causes),
+    };
     // What rows say of themselves says nothing of the others.
     believed
         .causes
@@ -249,10 +262,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         // What is not likely enough to be said may be there, or something else.
         (left, shrink) = all_there_was();
     }
-    progress("remainder", 0.0);
     let said = said(&explanation, &believed.causes);
-    let remainder = remains(subject, &explanation, &believed.causes, &said, events.is_some());
-    if !is_named && subject.slow.attitude_sigma_rad > 0.0 {
+    if !is_named && is_inexact {
         // Of a log in which nothing matters they are what every real recording has.
         alternatives
             .iter_mut()

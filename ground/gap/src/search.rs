@@ -18,3 +18,4 @@ pub mod periodic;
 pub mod readings;
 pub mod recalibrated;
 pub mod scatter;
+pub mod walked;

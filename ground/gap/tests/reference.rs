@@ -11,7 +11,9 @@ use gap::{
     search::readings::Chosen,
     unknown::{fast::within_stretches, recognised::recognised, remainder::Setting},
 };
-use gyros::{diagnosed_in, erring, rate};
+use gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
 
 /// gz reads `error` [rad/s] of the time \[s\] too much.
@@ -96,4 +98,50 @@ fn what_neither_matters_nor_is_certain_has_no_name() {
     assert_eq!(names(0.04), (vec!["gyro-nonlinearity"], true));
     assert_eq!(names(0.0125), (vec!["gyro-nonlinearity"], true));
     assert_eq!(names(0.009), (Vec::new(), true));
+}
+
+/// \[rad/s\] a zero that walks by so much in the square root of a second, at every row.
+fn walk(seed: u64, size: f64) -> impl Fn(f64) -> f64 {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut zero = 0.0;
+    let steps = (0..=SECONDS * RATE_HZ).map(|_| {
+        let step: f64 = StandardNormal.sample(&mut random);
+        zero += size * step / (RATE_HZ as f64).sqrt();
+        zero
+    });
+    let zeros: Vec<f64> = steps.collect();
+    move |t_s| zeros[(t_s * RATE_HZ as f64).round() as usize]
+}
+
+/// Names where windows that are fitted and windows that judge take turns.
+fn named_in_turns(error: impl Fn(f64) -> f64) -> Vec<&'static str> {
+    let folder = beside_reference(error);
+    let file = folder.path().join("case.toml");
+    let case = fs::read_to_string(&file).expect("a file");
+    let every = |first: usize| {
+        let windows = (first..SECONDS)
+            .step_by(20)
+            .map(|from| format!("[{from}.0, {}.0]", from + 10));
+        windows.collect::<Vec<_>>().join(", ")
+    };
+    let turns = case
+        .replace("fit = [[0.0, 120.0]]", &format!("fit = [{}]", every(0)))
+        .replace("hold = [[120.0, 240.0]]", &format!("hold = [{}]", every(10)));
+    assert_ne!(case, turns);
+    fs::write(&file, turns).expect("a file");
+    let (_, diagnosis) = diagnosed_in(&folder, &[]);
+    diagnosis.causes.iter().map(|cause| cause.effect).collect()
+}
+
+/// A walk is a course that nobody knows, but one with the spectrum of a walk, and it says where the zero is between the windows. Not every walk
+/// moves far, and one that moves far resembles a supply that sags now and then; neither may have another name.
+#[test]
+fn a_zero_that_walks_is_named_and_a_slow_wave_is_no_walk() {
+    let named: Vec<_> = (1..=5).flat_map(|seed| named_in_turns(walk(seed, 0.001))).collect();
+    assert!(
+        named.len() >= 3 && named.iter().all(|name| *name == "gyro-bias-walk"),
+        "{named:?}"
+    );
+    assert!(!named_in_turns(|t_s| 0.02 * (TAU * t_s / 55.0).sin()).contains(&"gyro-bias-walk"));
+    assert_eq!(named_in_turns(walk(5, 0.00002)), Vec::<&str>::new());
 }

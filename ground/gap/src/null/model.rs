@@ -1,14 +1,18 @@
 //! A finished model: effects, calibration and reference fitted together, and what it predicts for every row of the log.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::null::{
     joint::{Fitted, Joint},
+    normal::widen,
     problem::{Component, Problem},
 };
 
 /// Square root of an energy, in units of noise, that no test of what is left sees.
 const AT_BEST: f64 = 0.5;
+
+/// What a fit may follow of some channels besides their calibration: columns at every row, in physical units for one prior sigma.
+pub type Courses = Vec<(usize, DMatrix<f64>)>;
 
 /// Effects with everything else refitted around them.
 #[derive(Clone)]
@@ -28,23 +32,23 @@ impl Model {
     /// calibration can take the place of a part of an effect a little more noise in one channel moves both far, and what is
     /// predicted must have both from one fit.
     pub fn around(problem: &Problem, components: Vec<Component>) -> Self {
-        let near = Model::linear(problem, components, false);
+        let near = Model::linear(problem, components, false, &Courses::new());
         let off = near.off(problem);
         if off < AT_BEST {
             return near;
         }
-        let moved = Model::linear(problem, near.at_best(problem), false);
+        let moved = Model::linear(problem, near.at_best(problem), false, &Courses::new());
         if moved.off(problem) < off { moved } else { near }
     }
 
     /// Refits calibration and reference around effects whose parameters stay what they are: found in the colour of what is left
-    /// ([`crate::null::tint`]), beside whose slow errors the problem's white noise would move them far.
-    pub fn beside(problem: &Problem, components: Vec<Component>) -> Self {
-        Model::linear(problem, components, true)
+    /// ([`crate::null::tint`]), beside whose slow errors the problem's white noise would move them far. Some courses are followed.
+    pub fn beside(problem: &Problem, components: Vec<Component>, followed: &Courses) -> Self {
+        Model::linear(problem, components, true, followed)
     }
 
     /// Everything fitted with the effects' slopes about their parameters, which are held or not; predicted with these.
-    fn linear(problem: &Problem, components: Vec<Component>, are_held: bool) -> Self {
+    fn linear(problem: &Problem, components: Vec<Component>, are_held: bool, followed: &Courses) -> Self {
         let mut slopes = problem.reference_columns();
         let mut sigmas: Vec<f64> = problem.reference.iter().map(|column| column.sigma).collect();
         let mut values = vec![0.0; slopes.len()];
@@ -57,7 +61,17 @@ impl Model {
             sigmas.extend(parameters.iter().map(|parameter| parameter.prior_sigma));
             values.extend(&component.active.theta);
         }
-        let columns = problem.columns(&slopes);
+        let mut columns = problem.columns(&slopes);
+        for (channel, courses) in followed {
+            let frame = &problem.frames[*channel];
+            let rows: Vec<usize> = frame.series.rows.iter().map(|row| *row as usize).collect();
+            let fitted = courses.select_rows(&rows);
+            let white: Vec<DVector<f64>> = fitted
+                .column_iter()
+                .map(|course| frame.white(course.into_owned()))
+                .collect();
+            widen(&mut columns[*channel].nuisance, &DMatrix::from_columns(&white));
+        }
         let of_effect = |(at, value): (usize, &f64)| (are_held && at >= problem.reference.len()).then_some(*value);
         let held: Vec<Option<f64>> = values.iter().enumerate().map(of_effect).collect();
         let values = DVector::from_vec(values);
@@ -70,7 +84,12 @@ impl Model {
         let fitted = joint.fit_beside(&about_zero, &held);
         let predicted = problem.predictions(&components).into_iter().enumerate();
         let predicted = predicted.map(|(channel, readings)| finished(problem, readings, &fitted, channel));
-        let predicted = predicted.collect();
+        let mut predicted: Vec<Vec<f64>> = predicted.collect();
+        for (channel, courses) in followed {
+            let found = &fitted.nuisance[*channel];
+            let added = courses * found.rows(found.len() - courses.ncols(), courses.ncols());
+            (predicted[*channel].iter_mut().zip(added.iter())).for_each(|(reading, added)| *reading += added);
+        }
         Model {
             components,
             joint,

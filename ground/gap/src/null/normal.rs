@@ -15,6 +15,14 @@ pub fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
 }
 
+/// Puts further columns beside those of a matrix.
+pub fn widen(matrix: &mut DMatrix<f64>, columns: &DMatrix<f64>) {
+    let before = matrix.ncols();
+    let mut wider = std::mem::replace(matrix, DMatrix::zeros(0, 0)).resize_horizontally(before + columns.ncols(), 0.0);
+    wider.columns_mut(before, columns.ncols()).copy_from(columns);
+    *matrix = wider;
+}
+
 /// Normal equations of the effects with the nuisances marginalised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normal {

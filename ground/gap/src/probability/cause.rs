@@ -47,6 +47,8 @@ pub struct Cause {
     pub of_any: f64,
     /// \[nats\] over the model without it.
     pub gain: f64,
+    /// Energy that it explains, in squares of noise, against which what is left is held.
+    pub explained: f64,
     /// Its parameters.
     pub parameters: Vec<Sized>,
     /// Its share of the excess that the causes explain.
@@ -104,6 +106,7 @@ pub fn causes_of(problem: &Problem, library: &Library, found: &Attribution) -> V
             probability: probability(library, chosen),
             of_any: probability(library, chosen) / probability_of_any(library, chosen).max(f64::MIN_POSITIVE),
             gain: chosen.gain,
+            explained: 2.0 * chosen.gain,
             is_suspicious: oversize(page, &chosen.theta, &hypothesis.parameters) > SUSPICIOUS,
             parameters,
             share: total,
@@ -151,6 +154,7 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
         probability: named(gain, excess),
         of_any: 1.0,
         gain: scatter.gain,
+        explained: 2.0 * scatter.gain,
         parameters,
         share: 2.0 * scatter.gain,
         when: "throughout".to_owned(),
@@ -173,6 +177,7 @@ pub fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
         probability: named(repeats.nats / TEMPERATURE, excess),
         of_any: 1.0,
         gain: repeats.nats,
+        explained: 2.0 * repeats.nats,
         parameters: vec![Sized {
             parameter: Parameter {
                 name: symbol.name.to_owned(),

@@ -83,7 +83,7 @@ impl<'a> Belief<'a> {
         let (kept, broken) = self.kept(channels);
         let unknown = 1.0 - (1.0 - left.unknown(UNKNOWN_PRIOR)) * kept;
         let energy = left.energy().max(loud) + broken;
-        1.0 - unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+        1.0 - unknown * against(energy, explained)
     }
 
     /// The same of an effect on readings where the reference is not exact. Everything is significant there, for no real recording is
@@ -98,7 +98,7 @@ impl<'a> Belief<'a> {
         let doubt = |matters: f64, nats: f64| {
             let unknown = 1.0 - (1.0 - matters) * kept;
             let energy = 2.0 * nats.max(0.0) + broken;
-            unknown * energy / (energy + UNLIKE * explained).max(f64::MIN_POSITIVE)
+            unknown * against(energy, explained)
         };
         let doubts = importance
             .courses
@@ -108,17 +108,17 @@ impl<'a> Belief<'a> {
         of_both * (1.0 - doubts.fold(doubt(0.0, 0.0), f64::max))
     }
 
-    /// Weighs the probabilities of causes; `explained` is the energy of each, in squares of noise, and the first `on_readings` of them are
-    /// effects on readings.
-    pub fn weigh(&self, causes: &mut [Cause], explained: &[f64], on_readings: usize) {
+    /// Weighs the probabilities of causes, of which the first `beside_reference` are effects on readings, or a walk that is followed as such.
+    pub fn weigh(&self, causes: &mut [Cause], beside_reference: usize) {
         let strongest = causes.iter().map(|cause| cause.gain).fold(0.0, f64::max);
         let everywhere: Vec<usize> = (0..self.loud.len()).collect();
-        for (index, (cause, explained)) in causes.iter_mut().zip(explained).enumerate() {
-            let trust = match self.importance.filter(|_| index < on_readings) {
-                Some(importance) => self.trust_beside_reference(importance, &cause.channels, *explained),
+        for (index, cause) in causes.iter_mut().enumerate() {
+            let explained = cause.explained;
+            let trust = match self.importance.filter(|_| index < beside_reference) {
+                Some(importance) => self.trust_beside_reference(importance, &cause.channels, explained),
                 // What shakes some sensors shakes the unit, and answers for all of it.
-                None if is_line(cause) => self.trust(Some(cause.effect), &everywhere, *explained),
-                None => self.trust(Some(cause.effect), &cause.channels, *explained),
+                None if is_line(cause) => self.trust(Some(cause.effect), &everywhere, explained),
+                None => self.trust(Some(cause.effect), &cause.channels, explained),
             };
             let is_no_chance = above_doubt(cause.gain);
             let is_no_remainder = if cause.gain < strongest {
@@ -156,6 +156,12 @@ pub fn beyond_reference(
         nats
     });
     weighed.collect()
+}
+
+/// How far energy that is left speaks against an effect that explains so much, 0 to 1: the odds of a stand-in to a law that is a little off.
+pub fn against(left: f64, explained: f64) -> f64 {
+    let left = left.max(0.0);
+    left / (left + UNLIKE * explained).max(f64::MIN_POSITIVE)
 }
 
 /// Whether a cause is something that shakes.
@@ -333,6 +339,7 @@ mod tests {
                 }],
                 fast: vec![fast, 0.0],
                 effects: Vec::new(),
+                is_walk_seen: false,
             };
             Belief::of(&surely, Some(&importance), &[0.0; 2], &[]).trust_beside_reference(&importance, &[0], 100.0)
         };

@@ -45,6 +45,8 @@ pub struct Weight {
     pub grows: bool,
     /// \[nats\] that it is worth.
     pub worth: f64,
+    /// \[nats\] that the best of the other effects in its channels is worth.
+    pub beside: f64,
     /// Part of its energy that the other effects do not take back.
     pub kept: f64,
     /// \[nats\] by which it is likelier than a free course in its channels would be in its place, its parameters paid for.
@@ -53,12 +55,13 @@ pub struct Weight {
 
 impl Weight {
     /// How far it may have a name, 0 to 1: the gap grows without it or it is certain, and no free course says what it says, and more. A law
-    /// that is a little off leaves such a course a few parts in a hundred ([`UNLIKE`]). What other effects take back it does not explain.
+    /// that is a little off leaves such a course a few parts in a hundred ([`UNLIKE`]), and as much to an effect that is small beside it. What
+    /// other effects take back it does not explain.
     pub fn counts(&self) -> f64 {
         let no_course = self.over_course + UNLIKE * self.worth;
         let is_there = match self.grows {
             true => 1.0,
-            false => 1.0 / (1.0 + ((CERTAIN - self.worth) / DOUBT_STEP).exp()),
+            false => 1.0 / (1.0 + ((CERTAIN + UNLIKE * self.beside.max(0.0) - self.worth) / DOUBT_STEP).exp()),
         };
         is_there * self.kept / (1.0 + (-no_course).exp())
     }
@@ -72,6 +75,8 @@ pub struct Importance {
     pub fast: Vec<f64>,
     /// Of each effect of the model.
     pub effects: Vec<Weight>,
+    /// Whether a walk that the model follows is more than the user's bar. It is a free course itself, so nothing else speaks for it.
+    pub is_walk_seen: bool,
 }
 
 impl Importance {
@@ -79,15 +84,21 @@ impl Importance {
     /// what is there.
     pub fn of(subject: &Subject, problem: &Problem, explanation: &Explanation, floor: &[Vec<f64>]) -> Option<Self> {
         let model = &explanation.model;
-        if subject.slow.attitude_sigma_rad <= 0.0 || model.components.is_empty() {
+        if subject.slow.attitude_sigma_rad <= 0.0 || model.components.is_empty() && !explanation.is_followed() {
             return None;
         }
         let setting = setting(subject, explanation);
         let beside = Beside::of(problem, model, &setting, None)?;
         let left = courses(problem, &beside, &setting, None);
+        let channels_of = |effect: usize| -> Vec<usize> {
+            let added = problem.contribution(&model.components, &problem.parts(&model.components, effect));
+            added.into_iter().map(|(channel, _)| channel).collect()
+        };
+        let channels: Vec<Vec<usize>> = (0..model.components.len()).map(channels_of).collect();
+        let worths: Vec<f64> = (0..channels.len()).map(|effect| beside.worth(effect)).collect();
         let weight = |effect: usize| {
-            let channels = problem.contribution(&model.components, &problem.parts(&model.components, effect));
-            let is_its = |slow: &&Slow| channels.iter().any(|(channel, _)| slow.channels.contains(channel));
+            let is_there = |places: &[usize]| places.iter().any(|channel| channels[effect].contains(channel));
+            let is_its = |slow: &&Slow| is_there(&slow.channels);
             let without = courses(problem, &beside, &setting, Some(effect));
             // The best of several, which share even odds with nothing.
             let best = |slow: &[Slow]| {
@@ -95,11 +106,14 @@ impl Importance {
                 let nats = slow.iter().filter(is_its).map(|slow| slow.posterior.log_bayes_factor);
                 nats.fold(several, f64::max) - several
             };
-            let worth = beside.worth(effect);
+            let parts = problem.parts(&model.components, effect);
+            let others = (0..worths.len()).filter(|other| !parts.contains(other) && is_there(&channels[*other]));
+            let worth = worths[effect];
             Weight {
                 grows: grows(problem, model, effect, &setting),
                 kept: kept(problem, model, effect),
                 worth,
+                beside: others.map(|other| worths[other]).fold(0.0, f64::max),
                 over_course: worth - beside.price(effect) + best(&left) - best(&without),
             }
         };
@@ -112,6 +126,7 @@ impl Importance {
             courses: left.iter().map(course).collect(),
             fast: within_stretches(problem, model, floor, &setting),
             effects: (0..model.components.len()).map(weight).collect(),
+            is_walk_seen: is_seen(problem, &setting, explanation.walk(problem)),
         })
     }
 }
@@ -148,7 +163,6 @@ fn kept(problem: &Problem, model: &Model, effect: usize) -> f64 {
 /// Whether the gap of some channel would grow by more than the user's bar without an effect, or the attitude be off by more than that, once the
 /// calibration and the other effects are fitted: two that take each other back are nothing.
 fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> bool {
-    let bar = (1.0 + setting.bars.gap_sigma).powi(2) - 1.0;
     let components = &model.components;
     let parts = problem.parts(components, effect);
     let open_of = |other: usize| {
@@ -161,22 +175,35 @@ fn grows(problem: &Problem, model: &Model, effect: usize, setting: &Setting) -> 
     };
     let others = (0..components.len()).filter(|at| !parts.contains(at));
     let open: Vec<(usize, DVector<f64>)> = others.flat_map(open_of).collect();
-    let mut slow: Vec<(usize, f64)> = Vec::new();
-    let mut is_seen = false;
-    for (channel, added) in problem.contribution(components, &parts) {
+    let left = |(channel, added): (usize, DVector<f64>)| {
         let mut frame = problem.frames[channel].clone();
         let of_channel = open.iter().filter(|(own, _)| *own == channel);
         let columns: Vec<DVector<f64>> = of_channel.map(|(_, column)| column.clone()).collect();
         if !columns.is_empty() {
             frame.widen(&DMatrix::from_columns(&columns));
         }
-        let left = frame.left(&added);
-        let physical = left.component_mul(&frame.weights);
+        (channel, frame.left(&added))
+    };
+    is_seen(
+        problem,
+        setting,
+        problem.contribution(components, &parts).into_iter().map(left),
+    )
+}
+
+/// Whether what is added to some channels, in units of noise at the fitted samples, is more than the user's bar: of the gap of one of them, or of
+/// the attitude.
+fn is_seen(problem: &Problem, setting: &Setting, added: impl IntoIterator<Item = (usize, DVector<f64>)>) -> bool {
+    let bar = (1.0 + setting.bars.gap_sigma).powi(2) - 1.0;
+    let mut slow: Vec<(usize, f64)> = Vec::new();
+    let mut grows = false;
+    for (channel, added) in added {
+        let physical = added.component_mul(&problem.frames[channel].weights);
         let energy = Binned::along(problem, channel, 1.0).energy(physical.as_slice());
-        slow.push((channel, (energy / left.len() as f64).sqrt()));
-        is_seen |= problem.in_sigmas(channel, &left).norm_squared() > bar * left.len() as f64;
+        slow.push((channel, (energy / added.len() as f64).sqrt()));
+        grows |= problem.in_sigmas(channel, &added).norm_squared() > bar * added.len() as f64;
     }
-    is_seen || attitude_deg(problem, &slow) > setting.bars.attitude_deg
+    grows || attitude_deg(problem, &slow) > setting.bars.attitude_deg
 }
 
 #[cfg(test)]
@@ -188,6 +215,7 @@ mod tests {
             grows,
             kept: 1.0,
             worth,
+            beside: 0.0,
             over_course,
         }
     }
@@ -200,6 +228,17 @@ mod tests {
             ..weight(true, 33.8, 23.6)
         };
         assert!(weight.counts() < 0.1);
+    }
+
+    /// Beside a soft iron of 1,267 nats, on a recording that is healthy otherwise, eddy currents had 44 and were not there.
+    #[test]
+    fn a_few_parts_in_a_hundred_of_another_effect_that_do_not_matter_have_no_name() {
+        let eddy = Weight {
+            beside: 1267.0,
+            ..weight(false, 43.9, 13.0)
+        };
+        assert!(eddy.counts() < 0.01, "{}", eddy.counts());
+        assert!(Weight { grows: true, ..eddy }.counts() > 0.9);
     }
 
     /// What is certain beside the reference's errors is there, however small; a stand-in for what every recording leaves is worth little there.

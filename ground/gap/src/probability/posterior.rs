@@ -4,7 +4,7 @@
 //! windows and what is left over, in this order ([`crate::probability::doubt`]).
 
 use nalgebra::DVector;
-use twin::effect::Texture;
+use twin::effect::{Nature, Texture};
 
 use crate::{
     holdout::{cross_validation::Key, events::Events},
@@ -14,12 +14,12 @@ use crate::{
     probability::{
         cause::{Cause, cause_of_scatter, causes_of},
         contribution,
-        doubt::{Belief, Promised, beyond_reference, promises, second_keys},
+        doubt::{Belief, Promised, against, beyond_reference, promises, second_keys},
         importance::Importance,
     },
     search::{explanation::Explanation, odds::alternatives},
     thresholds::{NOISE_TAILS, SAID},
-    unknown::{adequacy::Leftover, octaves},
+    unknown::{adequacy::Leftover, octaves, remainder::Remainder},
 };
 
 /// An explanation with its probabilities.
@@ -53,7 +53,8 @@ impl Believed {
         contribution::settle(problem, library, &explanation.found, &mut causes);
         let mut imitated = contribution::imitated(problem, &explanation.model);
         imitated.truncate(causes.len());
-        let importance = (!causes.is_empty()).then(|| Importance::of(subject, problem, explanation, floor));
+        let is_any = !causes.is_empty() || explanation.is_followed();
+        let importance = is_any.then(|| Importance::of(subject, problem, explanation, floor));
         let importance = importance.flatten();
         let beyond = beyond_reference(problem, &subject.slow, explanation, importance.as_ref(), &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
@@ -64,22 +65,33 @@ impl Believed {
                 .for_each(|(cause, weight)| cause.probability *= weight.counts());
         }
         let belief = Belief::of(left, importance.as_ref(), &loud, &promises);
-        let on_readings = causes.len();
+        let (of_effects, of_walk) = explanation.share_with_walk();
+        (causes.iter_mut().zip(of_effects)).for_each(|(cause, share)| cause.probability *= share);
         let scatter = explanation.scatter.as_ref();
+        // A walk that is followed is a course, like an effect on readings.
+        let beside_reference = causes.len() + usize::from(explanation.is_followed());
         causes.extend(scatter.map(|scatter| {
             let sigmas = scatter.sigmas(problem, &explanation.beneath);
             cause_of_scatter(subject, scatter, &sigmas)
         }));
+        if let (true, Some(walk)) = (explanation.is_followed(), causes.last_mut()) {
+            let grows = importance.as_ref().is_some_and(|importance| importance.is_walk_seen);
+            walk.probability *= if grows { of_walk } else { 0.0 };
+        }
         // Of an effect on the scatter that takes in whatever is there its own gain is no sign of its law.
         let whole = explanation.energy(quiet);
         // What the effects on readings explain is no sign of another's either.
         let of_readings: f64 = causes.iter().take(imitated.len()).map(|cause| 2.0 * cause.gain).sum();
-        let of_scatter = scatter.map(|_| (whole - of_readings).max(0.0));
+        let of_scatter = scatter.map(|scatter| match explanation.is_followed() {
+            true => 2.0 * scatter.gain,
+            false => (whole - of_readings).max(0.0),
+        });
         let worth = beyond.into_iter().chain(std::iter::repeat(0.0));
         let explained = imitated.into_iter().zip(&causes).zip(worth);
         let explained = explained.map(|((whole, cause), nats)| whole.max(2.0 * cause.gain).max(2.0 * nats));
         let explained: Vec<f64> = explained.chain(of_scatter).collect();
-        belief.weigh(&mut causes, &explained, on_readings);
+        (causes.iter_mut().zip(&explained)).for_each(|(cause, explained)| cause.explained = *explained);
+        belief.weigh(&mut causes, beside_reference);
         one_name(&mut causes);
         // One of a set that cannot be told apart is a cause with its own probability: that one of them is there is likelier
         // than not.
@@ -94,6 +106,32 @@ impl Believed {
             keys,
             promises,
             trust,
+        }
+    }
+
+    /// Holds the slow course that is left beneath the names alone, `left_beneath` them, against those in whose channels it is: effects that are
+    /// too unlikely to be said took their part of it when the names were weighed, as the energy of any course was. A name that falls leaves
+    /// more beneath the others, so until none does. Returns what is left then.
+    pub fn held_against(&mut self, left_beneath: impl Fn(&[Cause]) -> Remainder) -> Remainder {
+        let first: Vec<f64> = self.causes.iter().map(|cause| cause.probability).collect();
+        let mut weighed: Vec<(Cause, f64)> = std::mem::take(&mut self.causes).into_iter().zip(first).collect();
+        loop {
+            let said: Vec<Cause> = weighed.iter().map(|(cause, _)| cause.clone()).collect();
+            let left = left_beneath(&said);
+            let on_readings = weighed.iter_mut().filter(|(cause, _)| !is_on_scatter(cause));
+            for (cause, first) in on_readings {
+                if left.is_slow && cause.channels.iter().any(|channel| left.channels.contains(channel)) {
+                    let doubt = left.matters * against(2.0 * left.log_bayes_factor, cause.explained);
+                    cause.probability = cause.probability.min(*first * (1.0 - doubt));
+                }
+            }
+            let (kept, fallen): (Vec<_>, Vec<_>) = weighed.into_iter().partition(|(cause, _)| cause.any() >= SAID);
+            weighed = kept;
+            if fallen.is_empty() {
+                self.causes = weighed.into_iter().map(|(cause, _)| cause).collect();
+                return left;
+            }
+            self.unnamed.extend(fallen.into_iter().map(|(cause, _)| cause));
         }
     }
 
@@ -114,6 +152,11 @@ impl Believed {
         all.dedup_by_key(|(name, _)| *name);
         all
     }
+}
+
+/// Whether a cause is no course that could be in the place of another.
+fn is_on_scatter(cause: &Cause) -> bool {
+    twin::effect::by_name(cause.effect).is_some_and(|effect| effect.page().nature == Nature::Spread)
 }
 
 /// Parts of one effect at several places with channels in common, such as what all plates share and what each has of its own, are
@@ -165,6 +208,7 @@ mod tests {
             probability,
             of_any: 1.0,
             gain: 0.0,
+            explained: 0.0,
             parameters: Vec::new(),
             share: 0.0,
             when: String::new(),

@@ -1,7 +1,7 @@
 //! A walk of gyros' zeros, found beside effects on readings, with what it leaves of these.
 //!
-//! In: the problem and effects. Out: the [`Walk`] that makes the log likeliest beside them, and frames in which it is open, so
-//! that a search finds what is there besides. A calibration that is fitted first has taken up half of a walk, and effects of
+//! In: the problem and effects. Out: the [`Walk`] that makes the log likeliest beside them, frames in which it is open, so
+//! that a search finds what is there besides, and its [`Courses`] at every row, so that a fit follows it. A calibration that is fitted first has taken up half of a walk, and effects of
 //! time and temperature the rest piece by piece; here calibration and walk are marginalised together.
 //!
 //! A walk of `s` per sqrt(s) over T seconds is its first Karhunen-Loeve terms, `sqrt 2 sin(x_k t/T)` of variance `s^2 T/x_k^2`
@@ -19,6 +19,7 @@ use twin::{
 
 use crate::{
     null::{
+        model::Courses,
         normal::log_determinant,
         problem::{Component, Frame, Problem},
     },
@@ -68,7 +69,7 @@ impl Walk {
             if samples < WALK_FEWEST {
                 continue;
             }
-            let shapes = shapes(problem, *channel);
+            let shapes = shapes(problem, *channel, frame);
             let residual = problem.residual(*channel, components);
             let normal = frame.normal(&shapes, &residual);
             let typical = effect
@@ -101,7 +102,8 @@ impl Walk {
         let mut whites = Vec::new();
         for (channel, size) in &self.channels {
             let residual = problem.residual(*channel, components);
-            let normal = problem.frames[*channel].normal(&shapes(problem, *channel), &residual);
+            let frame = &problem.frames[*channel];
+            let normal = frame.normal(&shapes(problem, *channel, frame), &residual);
             match white(&normal.information, &normal.score, *size) {
                 Some(white) => whites.push(white),
                 None => return false,
@@ -124,20 +126,33 @@ impl Walk {
         off.iter().map(|off| off * off).sum::<f64>() < WALK_OFF
     }
 
-    /// The problem's frames with it open.
+    /// Frames of the problem with it open.
     pub fn open(&self, problem: &Problem, mut frames: Vec<Frame>) -> Vec<Frame> {
         for (channel, size) in &self.channels {
-            let mut shapes = shapes(problem, *channel);
-            let before = &problem.frames[*channel].weights;
-            // In units of the noise that the frame has now.
-            let ratio = before.component_div(&frames[*channel].weights);
-            for (mut shape, sigma) in shapes.column_iter_mut().zip(sigmas(*size)) {
-                shape.component_mul_assign(&ratio);
-                shape *= sigma;
-            }
+            let mut shapes = shapes(problem, *channel, &frames[*channel]);
+            let scaled = shapes.column_iter_mut().zip(sigmas(*size));
+            scaled.for_each(|(mut shape, sigma)| shape *= sigma);
             frames[*channel].widen(&shapes);
         }
         frames
+    }
+
+    /// Its courses at every row, for a fit that follows it. Between the fitted samples they are what these make likeliest, and beyond them
+    /// they stay where they were.
+    pub fn courses(&self, problem: &Problem) -> Courses {
+        let of = |(channel, size): &(usize, f64)| {
+            let (frame, t_s) = (&problem.frames[*channel], problem.twin.instants_s(*channel));
+            let (first, span_s) = span_s(frame, &t_s);
+            let sigmas: Vec<f64> = sigmas(*size).collect();
+            let course = |row: usize, term: usize| sigmas[term] * shape(term, (t_s[row] - first) / span_s, span_s);
+            (*channel, DMatrix::from_fn(t_s.len(), TERMS, course))
+        };
+        self.channels.iter().map(of).collect()
+    }
+
+    /// Its channels.
+    pub fn places(&self) -> Vec<usize> {
+        self.channels.iter().map(|(channel, _)| *channel).collect()
     }
 
     /// Whether it is in the same channels as another, and much as large.
@@ -152,7 +167,7 @@ impl Walk {
         Scatter {
             effect: self.effect,
             variant: 0.0,
-            channels: self.channels.iter().map(|(channel, _)| *channel).collect(),
+            channels: self.places(),
             thetas: self.channels.iter().map(|(_, size)| vec![*size]).collect(),
             gain: self.gain,
             beneath: Vec::new(),
@@ -160,16 +175,30 @@ impl Walk {
     }
 }
 
-/// `T^1/2 sqrt 2 sin(x_k t/T)` at the fitted samples of a channel, in units of noise for one unit of `s/x_k`.
-fn shapes(problem: &Problem, channel: usize) -> DMatrix<f64> {
-    let (frame, t_s) = (&problem.frames[channel], problem.twin.instants_s(channel));
-    let t_s: Vec<f64> = frame.series.rows.iter().map(|row| t_s[*row as usize]).collect();
-    let (first, last) = (t_s.first().copied().unwrap_or(0.0), t_s.last().copied().unwrap_or(0.0));
-    let span_s = (last - first).max(f64::MIN_POSITIVE);
-    DMatrix::from_fn(t_s.len(), TERMS, |sample, term| {
-        let phase = place(term) * (t_s[sample] - first) / span_s;
-        span_s.sqrt() * SQRT_2 * phase.sin() / frame.weights[sample]
-    })
+/// `T^1/2 sqrt 2 sin(x_k t/T)` at the fitted samples of a channel, in units of this frame's white noise for one unit of `s/x_k`.
+fn shapes(problem: &Problem, channel: usize, frame: &Frame) -> DMatrix<f64> {
+    let t_s = problem.twin.instants_s(channel);
+    let (first, span_s) = span_s(frame, &t_s);
+    let parts: Vec<f64> = (frame.series.rows.iter())
+        .map(|row| (t_s[*row as usize] - first) / span_s)
+        .collect();
+    let column = |term: usize| {
+        let course = parts.iter().map(|part| shape(term, *part, span_s));
+        frame.white(DVector::from_iterator(parts.len(), course))
+    };
+    DMatrix::from_columns(&(0..TERMS).map(column).collect::<Vec<_>>())
+}
+
+/// \[s\] the first fitted sample of a channel, and from there to the last.
+fn span_s(frame: &Frame, t_s: &[f64]) -> (f64, f64) {
+    let at = |row: Option<&u32>| row.map_or(0.0, |row| t_s[*row as usize]);
+    let (first, last) = (at(frame.series.rows.first()), at(frame.series.rows.last()));
+    (first, (last - first).max(f64::MIN_POSITIVE))
+}
+
+/// The shape of a term, this part of the seconds after the first sample; beyond the last as there.
+fn shape(term: usize, part: f64, span_s: f64) -> f64 {
+    span_s.sqrt() * SQRT_2 * (place(term) * part.clamp(0.0, 1.0)).sin()
 }
 
 /// `x_k` of the term at an index.

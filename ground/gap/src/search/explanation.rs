@@ -6,11 +6,11 @@
 //! An effect on the scatter is judged on what the others leave. With the noise as found, everything else is searched anew;
 //! a misfit that looks like noise is taken for noise in that search, and for a misfit again when what is left is judged. Where the reference
 //! is not exact the noise has a colour ([`crate::search::in_colour`]). Beside
-//! a gyro's walk everything else is searched with the walk open, until both stay what they are.
+//! a gyro's walk everything else is searched with the walk open, until both stay what they are ([`crate::search::walked`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use twin::{effect::Texture, part::signal::Noise};
 
 use crate::{
@@ -18,22 +18,19 @@ use crate::{
     library::hypotheses::Library,
     null::{
         misfit,
-        model::Model,
+        model::{Courses, Model},
         problem::{Component, Frame, Problem},
     },
     search::{
-        bias_walk::Walk,
         gauss_newton::refine,
         in_colour::{attribute_in_colour, reframe},
         odds::probability_of_any,
         readings::{Attribution, Chosen, attribute},
         scatter::{Scatter, scatters},
+        walked::{Contest, walked, walked_in_colour},
     },
     thresholds::{COUNTED_PART, EFFECT_MARGIN, MOST_CAUSES, REMAINDER, SAID, WALK_FEWEST},
 };
-
-/// Searches beside a walk until it stays what it is.
-const WALKS: usize = 4;
 
 /// The effects that a log speaks for.
 pub struct Explanation {
@@ -53,6 +50,10 @@ pub struct Explanation {
     company: usize,
     /// Whether those that were refused explain more than those that were kept.
     is_refused: bool,
+    /// What a walk that is the effect on the scatter does, where the reference is not exact: the model follows it.
+    followed: Courses,
+    /// A walk and effects that it would take the place of, where the reference is not exact.
+    contest: Option<Contest>,
 }
 
 impl Explanation {
@@ -74,37 +75,49 @@ impl Explanation {
         let explained = gains(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
-        let beside = walked(problem, library, &first, withheld, progress)
-            .filter(|(walk, found, _)| walk.gain + gains(&found.chosen) > explained + EFFECT_MARGIN);
+        let is_inexact = errors.attitude_sigma_rad > 0.0;
+        // Beside errors of the reference a walk is judged in their colour.
+        let beside = (!is_inexact)
+            .then(|| walked(problem, library, &first, withheld, progress))
+            .flatten();
+        let beside = beside.filter(|walked| walked.gain() > explained + EFFECT_MARGIN);
+        let alone = alone.filter(|alone| !(is_inexact && is_walk(alone)));
         let is_alone = alone.is_some();
-        let mut wanders = alone
-            .as_ref()
-            .is_some_and(|alone| alone.effect.page().texture == Texture::Walk);
+        let mut wanders = alone.as_ref().is_some_and(is_walk);
         if is_alone {
             found.chosen.clear();
             scatter = alone;
         }
         let mut first = if is_alone { quiet.clone() } else { first };
-        if let Some((walk, besides, own)) = beside {
+        if let Some(beside) = beside {
             // Searched with the walk open, which is not to be done again with louder white noise in its place.
-            (found, *library, wanders) = (besides, own, true);
+            (found, *library, wanders) = (beside.found, beside.library, true);
             first = Model::around(problem, found.model(library));
-            scatter = Some(walk.scatter());
+            scatter = Some(beside.walk.scatter());
         }
         let first = &first;
-        let louder = scatter.as_ref().map_or_else(
+        let mut louder = scatter.as_ref().map_or_else(
             || vec![1.0; problem.frames.len()],
             |scatter| louder(problem, first, scatter),
         );
         let described = problem.frames.clone();
         let both = factors(&first.fitted.rest, &louder, scatter.as_ref());
         let beneath = scatter.as_ref().map(|scatter| scatter.uncovered(problem));
-        let is_inexact = errors.attitude_sigma_rad > 0.0;
+        let (mut followed, mut contest) = (Courses::new(), None);
         if is_inexact || scatter.is_some() || both.iter().any(|factor| *factor != 1.0) {
             let frames = beneath.unwrap_or_else(|| described.clone());
             reframe(problem, library, weighed(frames, &both));
-            if is_inexact && !wanders {
+            if is_inexact {
                 found = attribute_in_colour(problem, library, errors, found, progress);
+                let beside = walked_in_colour(problem, library, errors, &found, scatter.as_ref(), withheld, progress);
+                if let Some((walked, odds)) = beside {
+                    if odds.odds > 0.0 {
+                        (scatter, followed) = (Some(walked.walk.scatter()), walked.walk.courses(problem));
+                        (found, *library, wanders) = (walked.found, walked.library, true);
+                        louder.fill(1.0);
+                    }
+                    contest = Some(odds);
+                }
             } else if !wanders {
                 found = attribute(problem, library, progress);
             }
@@ -117,9 +130,9 @@ impl Explanation {
         found.chosen = kept;
         let loud = weighed(described.clone(), &louder);
         reframe(problem, library, described);
-        let fitted = match is_inexact {
-            true => Model::beside,
-            false => Model::around,
+        let fitted = |problem: &Problem, components: Vec<Component>| match is_inexact {
+            true => Model::beside(problem, components, &followed),
+            false => Model::around(problem, components),
         };
         let first = fitted(problem, found.model(library));
         if scatter.is_some() && !wanders {
@@ -149,6 +162,8 @@ impl Explanation {
             louder,
             company,
             is_refused,
+            followed,
+            contest,
         }
     }
 
@@ -163,10 +178,36 @@ impl Explanation {
         self.is_refused || self.company > MOST_CAUSES
     }
 
+    /// Whether its effect on the scatter is a walk that the model follows.
+    pub fn is_followed(&self) -> bool {
+        !self.followed.is_empty()
+    }
+
+    /// What the model follows of a walk, in units of noise at the fitted samples.
+    pub fn walk(&self, problem: &Problem) -> Vec<(usize, DVector<f64>)> {
+        let of = |(channel, courses): &(usize, DMatrix<f64>)| {
+            let (frame, found) = (&problem.frames[*channel], &self.model.fitted.nuisance[*channel]);
+            let course = courses * found.rows(found.len() - courses.ncols(), courses.ncols());
+            let fitted = frame.series.rows.iter().map(|row| course[*row as usize]);
+            (
+                *channel,
+                frame.white(DVector::from_iterator(frame.series.rows.len(), fitted)),
+            )
+        };
+        self.followed.iter().map(of).collect()
+    }
+
+    /// Part of the probability that effects on readings, in their order, have beside a walk, and what that has.
+    pub fn share_with_walk(&self) -> (Vec<f64>, f64) {
+        let share = |chosen: &Chosen| (self.contest.as_ref()).map_or(1.0, |contest| contest.share(chosen.hypothesis));
+        let walk = self.contest.as_ref().map_or(1.0, Contest::walk);
+        (self.found.chosen.iter().map(share).collect(), walk)
+    }
+
     /// What its effect on the scatter makes of noise, given as residuals in units of noise. Louder white noise is in those
-    /// units already.
+    /// units already, and a walk that is followed in no residual.
     pub fn disturb<'a>(&'a self, problem: &'a Problem) -> Option<impl Fn(&mut [DVector<f64>], u64) + 'a> {
-        let scatter = self.scatter.as_ref()?;
+        let scatter = self.scatter.as_ref().filter(|_| !self.is_followed())?;
         (scatter.effect.page().texture != Texture::Louder).then_some(
             move |residuals: &mut [DVector<f64>], seed: u64| {
                 (residuals.iter_mut().zip(&self.louder)).for_each(|(residual, louder)| *residual /= *louder);
@@ -206,7 +247,7 @@ impl Explanation {
         if let (Some(added), Some(theta)) = (self.found.chosen.last_mut(), refined.thetas.into_iter().next_back()) {
             added.theta = theta;
         }
-        self.model = Model::beside(problem, self.found.model(library));
+        self.model = Model::beside(problem, self.found.model(library), &self.followed);
         self.beneath.clone_from(&self.model.predicted);
         match &self.scatter {
             Some(scatter) => {
@@ -225,6 +266,7 @@ impl Explanation {
             .map(|chosen| library.hypotheses[chosen.hypothesis].effect())
             .collect();
         names.extend(self.scatter.take().map(|scatter| scatter.effect.page().name));
+        self.followed.clear();
         self.refused.append(&mut self.found.chosen);
         names
     }
@@ -236,7 +278,8 @@ impl Explanation {
         let described = weighed(problem.frames.clone(), &quieter);
         reframe(problem, library, described);
         self.louder.fill(1.0);
-        self.model = Model::beside(problem, self.found.model(library));
+        self.followed.clear();
+        self.model = Model::beside(problem, self.found.model(library), &self.followed);
         self.beneath.clone_from(&self.model.predicted);
         Some(name)
     }
@@ -253,7 +296,7 @@ impl Explanation {
     }
 }
 
-fn gains(chosen: &[Chosen]) -> f64 {
+pub(super) fn gains(chosen: &[Chosen]) -> f64 {
     chosen.iter().map(|chosen| chosen.gain).sum()
 }
 
@@ -284,7 +327,7 @@ fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Opt
 }
 
 /// Frames whose noise is so many times what it was, one factor a channel.
-fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
+pub(super) fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
     for (frame, factor) in frames.iter_mut().zip(factors).filter(|(_, factor)| **factor != 1.0) {
         frame.reweigh(&frame.weights.map(|_| *factor));
     }
@@ -315,8 +358,12 @@ fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option
 /// everything.
 fn is_whole(problem: &Problem, scatter: &Scatter) -> bool {
     let steps = |channel: &usize| problem.frames[*channel].series.rows.len();
-    let is_walk = scatter.effect.page().texture == Texture::Walk;
-    !scatter.beneath.is_empty() || is_walk && scatter.channels.iter().map(steps).all(|steps| steps >= WALK_FEWEST)
+    !scatter.beneath.is_empty()
+        || is_walk(scatter) && scatter.channels.iter().map(steps).all(|steps| steps >= WALK_FEWEST)
+}
+
+fn is_walk(scatter: &Scatter) -> bool {
+    scatter.effect.page().texture == Texture::Walk
 }
 
 /// How much more each channel scatters than the twin has it; 1 where the effect is not.
@@ -332,38 +379,4 @@ fn louder(problem: &Problem, model: &Model, scatter: &Scatter) -> Vec<f64> {
         }
     };
     (0..problem.frames.len()).map(factor).collect()
-}
-
-/// A walk and what else there is once it is open, with the library as that search left it; `None` where there is no walk.
-fn walked(
-    problem: &mut Problem,
-    library: &Library,
-    first: &Model,
-    withheld: &[String],
-    progress: &dyn Fn(f64),
-) -> Option<(Walk, Attribution, Library)> {
-    let mut walk = Walk::beside(problem, &[], withheld)?;
-    let mut library = library.clone();
-    let described = problem.frames.clone();
-    let misfits = misfit::factors(&first.fitted.rest);
-    for _ in 0..WALKS {
-        let is_walking = |channel: usize| walk.channels.iter().any(|(own, _)| *own == channel);
-        let factors = misfits.iter().enumerate();
-        let factors: Vec<f64> = factors
-            .map(|(channel, misfit)| if is_walking(channel) { 1.0 } else { *misfit })
-            .collect();
-        let frames = walk.open(problem, weighed(described.clone(), &factors));
-        reframe(problem, &mut library, frames);
-        let found = attribute(problem, &mut library, progress);
-        reframe(problem, &mut library, described.clone());
-        let again = Walk::beside(problem, &found.model(&library), withheld)?;
-        let is_same = again.is_near(&walk);
-        walk = again;
-        if is_same {
-            return walk
-                .is_one(problem, &found.model(&library))
-                .then_some((walk, found, library));
-        }
-    }
-    None
 }

@@ -67,6 +67,8 @@ pub struct Remainder {
     pub attitude_deg: Option<[f64; 3]>,
     /// Probability that it is there and above the bar.
     pub matters: f64,
+    /// Whether it is a slow course, not energy of any course.
+    pub is_slow: bool,
     /// The bar over the middle of the size.
     bar_over_size: f64,
 }
@@ -84,6 +86,7 @@ impl Default for Remainder {
             sigma: [0.0; 3],
             attitude_deg: None,
             matters: 0.0,
+            is_slow: false,
             bar_over_size: f64::INFINITY,
         }
     }
@@ -126,6 +129,7 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
             sigma: size.map(|size| size * slow.sigmas_per_unit),
             attitude_deg: degrees(problem, slow.place).map(|degrees| size.map(|size| size * degrees)),
             matters,
+            is_slow: true,
             bar_over_size: bar / size[1],
         }
     });
@@ -146,6 +150,7 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
             sigma,
             attitude_deg: None,
             matters: present * likelier_above(fast.excess, fast.error, bar),
+            is_slow: false,
             bar_over_size: bar.sqrt() / sigma[1],
         }
     });

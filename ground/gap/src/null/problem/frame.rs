@@ -6,7 +6,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::{
     input::log::Series,
-    null::{colour::Colour, normal::Normal},
+    null::{
+        colour::Colour,
+        normal::{Normal, widen},
+    },
 };
 
 /// One channel of the fit windows.
@@ -99,11 +102,7 @@ impl Frame {
 
     /// Opens further columns of its calibration, in units of noise for one prior sigma.
     pub fn widen(&mut self, columns: &DMatrix<f64>) {
-        let open = self.nuisance.ncols();
-        let mut wider = std::mem::replace(&mut self.nuisance, DMatrix::zeros(0, 0))
-            .resize_horizontally(open + columns.ncols(), 0.0);
-        wider.columns_mut(open, columns.ncols()).copy_from(columns);
-        self.nuisance = wider;
+        widen(&mut self.nuisance, columns);
         self.factorise();
     }
 
