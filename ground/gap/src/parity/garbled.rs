@@ -32,6 +32,9 @@ const NEAR: f64 = 3.0;
 /// One in so many sizes is [`NEAR`] a power of two by chance, of those beyond `2 ODDS NEAR`: from there on powers are as far apart as that.
 const ODDS: f64 = 8.0;
 
+/// Of a vector.
+const UNKNOWNS: usize = 3;
+
 /// A normal law's standard deviation over the median of what it is off by.
 const ROBUST: f64 = 1.482_602;
 
@@ -104,6 +107,10 @@ struct Packet {
 fn off(log: &Log, unit: &UnitDescription, kind: Kind) -> Vec<Off> {
     let is_own = |index: &usize| unit.channels[*index].sensor == kind && sends_codes(&unit.channels[*index]);
     let channels: Vec<usize> = (0..unit.channels.len()).filter(is_own).collect();
+    // A vector fits so many whatever they are.
+    if channels.len() <= UNKNOWNS {
+        return Vec::new();
+    }
     let mut packets: Vec<Packet> = (0..log.start_s.len())
         .map(|row| Packet {
             row: row as u32,
@@ -165,12 +172,16 @@ impl Fit {
     fn of(unit: &UnitDescription, channels: &[usize]) -> Self {
         let own: Vec<&Channel> = channels.iter().map(|channel| &unit.channels[*channel]).collect();
         let middle_s = own.iter().map(|channel| channel.slot_s).sum::<f64>() / own.len().max(1) as f64;
-        let unknowns = if own.len() > 6 { 6 } else { 3 };
+        let unknowns = if own.len() > 2 * UNKNOWNS {
+            2 * UNKNOWNS
+        } else {
+            UNKNOWNS
+        };
         let slopes = DMatrix::from_fn(own.len(), unknowns, |row, unknown| {
             let channel = own[row];
             let after_s = channel.slot_s - channel.tau_s() - middle_s;
-            let size = if unknown < 3 { 1.0 } else { after_s };
-            size * channel.axis_b[unknown % 3] / channel.sigma()
+            let size = if unknown < UNKNOWNS { 1.0 } else { after_s };
+            size * channel.axis_b[unknown % UNKNOWNS] / channel.sigma()
         });
         // Slots that are all alike tell no derivative.
         let inverse = slopes
@@ -211,7 +222,7 @@ fn of_packet(log: &Log, unit: &UnitDescription, packet: &Packet, usual: &Usual) 
             .max_by(|one, other| one.1.total_cmp(&other.1))
     };
     // A motion has three unknowns; of the rest no more than half can be off and still be told from it.
-    while kept.len() > 3 + out.len()
+    while kept.len() > UNKNOWNS + out.len()
         && let Some((at, _)) = farthest(&kept).filter(|(_, off)| *off > OFF)
     {
         let at = match kept.len() > 4 {
