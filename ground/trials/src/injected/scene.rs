@@ -139,3 +139,44 @@ fn without_gaps<T: Copy>(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along x at 1 m/s, unseen in its middle; the sensor is 15 ms before its row.
+    #[test]
+    fn a_sensor_is_where_the_unit_was_at_its_own_instant() {
+        let step_s = 0.01;
+        let place = |row: usize| Vector3::x() * (row as f64 * step_s);
+        let seen = |row: usize| Pose {
+            q_nb: Some(UnitQuaternion::identity()),
+            place_n: (row != 5).then(|| place(row)),
+        };
+        let sensor = Sensor {
+            kind: Kind::Magnetometer,
+            names: ["mx", "my", "mz"].map(str::to_owned),
+            slot_s: -0.015,
+            lever_b: Vector3::zeros(),
+            bias: Vector3::zeros(),
+            sigmas: [0.0; 3],
+            values: vec![Vector3::zeros(); 10],
+        };
+        let scene = Scene {
+            times_s: (0..10).map(|row| row as f64 * step_s).collect(),
+            step_s,
+            sensors: vec![sensor],
+            record: (0..10).map(seen).collect(),
+            temperature_c: None,
+            gravity: 9.81,
+            field_n_ut: None,
+            latitude: 0.0,
+            sizes: Vec::new(),
+        };
+        let places: Vec<f64> = scene.followed_by(0).iter().map(|(_, place_n)| place_n.x).collect();
+        for (row, place) in places.iter().enumerate() {
+            let expected = (row as f64 * step_s - 0.015).max(0.0);
+            assert!((place - expected).abs() < 1e-12, "row {row}: {place}");
+        }
+    }
+}
