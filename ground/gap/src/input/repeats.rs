@@ -4,7 +4,9 @@
 //! oftener than they do by chance.
 //!
 //! A sample that is a few steps wide repeats by chance, on one axis in ten or fifty. All axes of a part do so with the product of these
-//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Rows in which
+//! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Axes that a
+//! calibration has mixed repeat together, oftener than that product; but what repeats by chance is as often the sample before the last, and what
+//! was sent twice is not. Chance is the larger of the two. Rows in which
 //! another part repeats too are the logger's, which wrote them twice, and are not looked at. Those in which every part does so say how often it
 //! does: one part may have been changed since. With `c` repeats where `e` are expected chance has
 //! `c ln(c/e) - c + e` nats against it (Chernoff's bound of Poisson's tail). Rests shorter than a stretch still bring more than is expected
@@ -47,9 +49,11 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
     }
     let parts = parts(unit, &[Kind::Accelerometer, Kind::Gyro]);
     let every = self::parts(unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
-    let repeated: Vec<Vec<bool>> = (log.channels.iter())
-        .map(|series| repeated(series, log.start_s.len()))
-        .collect();
+    let as_before = |back: usize| -> Vec<Vec<bool>> {
+        let all = log.channels.iter();
+        all.map(|series| repeated(series, log.start_s.len(), back)).collect()
+    };
+    let (repeated, as_last_but_one) = (as_before(1), as_before(2));
     let rows: Vec<usize> = (0..log.start_s.len()).collect();
     let all_of = |row: usize, channels: &[usize]| channels.iter().all(|channel| repeated[*channel][row]);
     let is_of_another = |row: usize, part: &[usize]| every.iter().any(|other| other != part && all_of(row, other));
@@ -67,7 +71,12 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
             };
             rows.len() as f64 * channels.iter().map(share).product::<f64>()
         };
-        let chance: f64 = rows.chunks(STRETCH).map(by_chance).sum();
+        let returns = |row: &&usize| {
+            let is_as_before = channels.iter().all(|channel| as_last_but_one[*channel][**row]);
+            is_as_before && !all_of(**row, channels) && !is_of_another(**row, channels)
+        };
+        let apart: f64 = rows.chunks(STRETCH).map(by_chance).sum();
+        let chance = apart.max(rows.iter().filter(returns).count() as f64);
         let expected = chance + by_logger + 1.0;
         let nats = if count - expected >= SAID * count {
             count * (count / expected).ln() - count + expected
@@ -93,12 +102,12 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
     Some(all.filter(|repeats| repeats.nats > least).collect())
 }
 
-/// Per row, whether a channel has a sample and it is that of the row before.
-fn repeated(series: &Series, rows: usize) -> Vec<bool> {
+/// Per row, whether a channel has a sample and it is that of so many rows before.
+fn repeated(series: &Series, rows: usize, back: usize) -> Vec<bool> {
     let mut repeated = vec![false; rows];
-    let pairs = series.rows.windows(2).zip(series.values.windows(2));
-    for (at, _) in pairs.filter(|(rows, values)| rows[0] + 1 == rows[1] && values[0] == values[1]) {
-        repeated[at[1] as usize] = true;
+    let spans = series.rows.windows(back + 1).zip(series.values.windows(back + 1));
+    for (at, _) in spans.filter(|(rows, values)| rows[0] + back as u32 == rows[back] && values[0] == values[back]) {
+        repeated[at[back] as usize] = true;
     }
     repeated
 }
@@ -129,6 +138,11 @@ mod tests {
     /// An accelerometer, a gyro and a magnetometer, a noise of two steps, at rest in every second stretch; `is_old` says of part and row whether the row
     /// before is sent again, with some number between none and one.
     fn found(is_old: impl Fn(usize, u32, f64) -> bool) -> Vec<Repeats> {
+        let (unit, log) = logged(is_old);
+        repeats(&log, &unit).expect("no codes")
+    }
+
+    fn logged(is_old: impl Fn(usize, u32, f64) -> bool) -> (UnitDescription, Log) {
         let mut text = "name = \"x\"\ncycle_s = 0.01\n".to_owned();
         let sensors = ["accelerometer", "gyro", "magnetometer"];
         for (index, sensor) in sensors.iter().flat_map(|one| [one; 3]).enumerate() {
@@ -157,7 +171,7 @@ mod tests {
                 }
             }
         }
-        repeats(&log, &unit).expect("no codes")
+        (unit, log)
     }
 
     #[test]
@@ -181,5 +195,28 @@ mod tests {
         // Nor are some of them, or all, in which another part was changed since.
         assert_eq!(found(|part, row, _| row % 20 == 0 && (part == 0 || row % 80 != 0)), []);
         assert_eq!(found(|part, row, _| row % 20 == 0 && part != 1), []);
+    }
+
+    /// The gyros' steps are no longer along their axes: all three repeat where one does.
+    #[test]
+    fn axes_that_a_calibration_has_mixed_repeat_together_by_chance() {
+        let mixed = |is_old: &dyn Fn(usize, u32, f64) -> bool| {
+            let (unit, mut log) = logged(is_old);
+            for row in 0..ROWS as usize {
+                let [x, y, z] = [3, 4, 5].map(|channel| log.channels[channel].values[row]);
+                for (channel, value) in [
+                    (3, x + 0.11 * y - 0.07 * z),
+                    (4, y + 0.05 * z - 0.11 * x),
+                    (5, z + 0.07 * x),
+                ] {
+                    log.channels[channel].values[row] = value;
+                }
+            }
+            repeats(&log, &unit).expect("no codes")
+        };
+        assert_eq!(mixed(&|_, _, _| false), []);
+        let found = mixed(&|part, _, chance| part == 1 && chance < 0.05);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!((found[0].share - 0.05).abs() < 3.0 * found[0].sigma, "{found:?}");
     }
 }
