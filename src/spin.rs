@@ -143,6 +143,10 @@ pub struct Spin {
     refused: u8,
     /// The force before, and when.
     force: Option<(u64, Vector3<f32>)>,
+    /// [m/s2] by what the force had changed before that.
+    changed_b: Option<Vector3<f32>>,
+    /// [m2/s4] mean square of a component of what shakes it.
+    shaken: f32,
     /// [rad/s for each g] ...
     by_load: [f32; PLATES],
     /// [m/s2] ... more along x_b than on the pad.
@@ -215,6 +219,8 @@ impl Spin {
             surprised_s: 0.0,
             refused: 0,
             force: None,
+            changed_b: None,
+            shaken: 0.0,
             by_load: [0.0; PLATES],
             pad_force: start.pad.along_x,
             slice_us: start.at_us,

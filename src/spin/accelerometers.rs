@@ -20,6 +20,14 @@ use crate::{
 
 /// \[s\] by how much the ages of two accelerometers' conversions differ: uniform over 20 ms.
 const FORCE_AGE_S: f32 = 0.006;
+/// Of the mean square of a vibration, what two conversions do not share whose ages are each uniform over the 20 ms from one to the
+/// next: a tone of `f` keeps `sinc^2(20 ms f)` in common, in the mean over all tones that are not folded, up to 50 Hz, 0.45.
+const NOT_SHARED: f32 = 0.55;
+/// What the square of a second difference of white noise is, of a vector of three: `3 (1 + 4 + 1)` variances.
+const OF_SECOND_DIFFERENCE: f32 = 18.0;
+/// Of how many readings a vibration is the mean: a part of three squares alone is too often small by chance, and its level changes
+/// within some readings.
+const SHAKEN: f32 = 2.0;
 /// \[s\] how long a surprise lasts.
 const SURPRISED_S: f32 = 0.6;
 /// Mean square of the force equations' residuals, over what they should be, that is a surprise.
@@ -62,7 +70,7 @@ impl Spin {
             Some((before_us, before_b)) if before_us < self.at_us => {
                 let dt_s = seconds_between(before_us, self.at_us);
                 let change = (first.force_b - before_b).norm() / dt_s;
-                reading.variance += square(FORCE_AGE_S * change);
+                reading.variance += square(FORCE_AGE_S * change) + self.shakes(first.force_b - before_b);
                 forces::equations(set, &reading, &believed).unwrap_or(first)
             }
             _ => first,
@@ -108,6 +116,15 @@ impl Spin {
         for k in 0..count {
             self.covariance.update(&rows(k), found.residuals[k], scale, GATE);
         }
+    }
+
+    /// [m2/s4] by what the accelerometers' unlike ages make them disagree in a vibration, from the change of the force since the reading
+    /// before: a change that goes on is no vibration. From one reading to the next it turns many times, so that the change says
+    /// little of how fast it is.
+    fn shakes(&mut self, change_b: Vector3<f32>) -> f32 {
+        let bend_b = change_b - self.changed_b.replace(change_b).unwrap_or(change_b);
+        self.shaken += (bend_b.norm_squared() * (1.0 / OF_SECOND_DIFFERENCE) - self.shaken) * (1.0 / SHAKEN);
+        NOT_SHARED * self.shaken
     }
 
     /// \[g\] force along x_b beyond that of the pad.
