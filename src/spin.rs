@@ -42,6 +42,7 @@ mod cycle;
 pub mod forces;
 mod gyros;
 pub mod kept;
+mod lasting;
 mod magnetometers;
 mod motion;
 pub mod pad;
@@ -52,6 +53,7 @@ use self::{
     covariance::{
         ACROSS, ACROSS_UP, ATTITUDE, BIAS, BY_LOAD, Covariance, IRON, LEVER, SEES_SPIN, SPIN, SPIN_UP, STATES,
     },
+    lasting::Lasting,
     pad::Pad,
 };
 use crate::{
@@ -143,6 +145,8 @@ pub struct Spin {
     refused: u8,
     /// The force before, and when.
     force: Option<(u64, Vector3<f32>)>,
+    /// What of the gyros' noise lasts.
+    lasting: Lasting,
     /// [m/s2] by what the force had changed before that.
     changed_b: Option<Vector3<f32>>,
     /// [m2/s4] mean square of a component of what shakes it.
@@ -219,6 +223,7 @@ impl Spin {
             surprised_s: 0.0,
             refused: 0,
             force: None,
+            lasting: Lasting::new(set),
             changed_b: None,
             shaken: 0.0,
             by_load: [0.0; PLATES],

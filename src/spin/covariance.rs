@@ -82,6 +82,16 @@ impl Covariance {
         }
     }
 
+    /// All of it.
+    #[cfg(test)]
+    pub fn set(&mut self, p: &SMatrix<f32, STATES, STATES>) {
+        for (row, of) in self.p.iter_mut().enumerate() {
+            for (column, element) in of.iter_mut().enumerate() {
+                *element = p[(row, column)];
+            }
+        }
+    }
+
     /// Of the states from `row` on with those from `column` on.
     pub fn block<const R: usize, const C: usize>(&self, row: usize, column: usize) -> SMatrix<f32, R, C> {
         SMatrix::from_fn(|r, c| self.p[row + r][column + c])
@@ -115,6 +125,27 @@ impl Covariance {
         for row in 0..3 {
             for column in 0..3 {
                 self.p[row][column] += covariance_n[(row, column)];
+            }
+        }
+    }
+
+    /// `P <- S P S'`, where of the attitude `a` beyond what the rate across it says of it, `a - by_rate u`, the part `less` is taken off.
+    pub fn lessen_attitude(&mut self, less: &Matrix3<f32>, by_rate: &SMatrix<f32, 3, 2>) {
+        let with_rate = less * by_rate;
+        let taken = |attitude: [f32; 3], [y, z]: [f32; 2]| {
+            less * Vector3::from(attitude) - with_rate * nalgebra::Vector2::new(y, z)
+        };
+        for column in 0..STATES {
+            let of = |row: usize| self.p[row][column];
+            let taken = taken([of(0), of(1), of(2)], [of(ACROSS), of(ACROSS + 1)]);
+            for axis in 0..3 {
+                self.p[axis][column] -= taken[axis];
+            }
+        }
+        for row in &mut self.p {
+            let taken = taken([row[0], row[1], row[2]], [row[ACROSS], row[ACROSS + 1]]);
+            for axis in 0..3 {
+                row[axis] -= taken[axis];
             }
         }
     }

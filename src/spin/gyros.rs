@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     attitude::sin_cos,
-    calibration::{Measured, Set},
+    calibration::{Axis, Measured, Set},
     geometry::PLATES,
     increments::slices::BEYOND,
     sample::NOT_READ,
@@ -30,6 +30,11 @@ const STOP_COUNTS: f32 = 4368.0;
 /// [rad/s] how near its stop a gyro may be said to be beyond it: noise and the slice's own change.
 const STOP_SD: f32 = 0.2;
 
+/// [rad2/s2] variance of a slice by its samples' noise.
+pub(super) fn sampled(axis: &Axis) -> f32 {
+    SLICE_NOISE * axis.noise * axis.noise
+}
+
 impl Spin {
     pub(super) fn take_slice(&mut self, set: &Set, measured: &Measured, quarters: &[i16; PLATES], lasts_us: u16) {
         let across_b = self.across_b();
@@ -43,6 +48,8 @@ impl Spin {
         self.seen = quarters.iter().filter(gives).count() >= 3;
         self.answering =
             (quarters.iter().enumerate()).fold(0, |all, (k, quarters)| all | u16::from(*quarters != NOT_READ) << k);
+        let lasts_s = 1e-6 * f32::from(lasts_us);
+        self.lasting.last(lasts_s);
         for (k, (quarters, axis)) in quarters.iter().zip(&set.gyro).enumerate() {
             if *quarters == NOT_READ {
                 continue;
@@ -60,7 +67,7 @@ impl Spin {
                 sees * self.spin + left * axis.axis_b.dot(&turning_b) + self.bias[k] + self.by_load[k] * load;
             let above_c = measured.gyros_above_c[k];
             let value = |counts: f32| axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c));
-            let sampled = SLICE_NOISE * axis.noise * axis.noise;
+            let sampled = sampled(axis);
             if quarters.unsigned_abs() == BEYOND.unsigned_abs() {
                 let stop = value(if *quarters > 0 { STOP_COUNTS } else { -STOP_COUNTS });
                 let residual = stop - believed;
@@ -82,8 +89,14 @@ impl Spin {
             }
             // A jerk is not missed for being one: what is far off weighs less, and is not left out.
             let far = left_over * left_over * (1.0 / FAR) - of_state;
-            self.covariance
-                .update(&row, residual, if far > r { far } else { r }, f32::MAX);
+            let r = if far > r { far } else { r };
+            if k == self.lasting.gyro {
+                let off = left_over / ComplexField::sqrt(of_state + r);
+                self.lasting.hear(off, self.spin, self.phase, lasts_s);
+            }
+            self.lasting
+                .tell(0.5 * left * left * (1.0 - axis.axis_b.x * axis.axis_b.x) / r);
+            self.covariance.update(&row, residual, r, f32::MAX);
         }
     }
 }

@@ -88,6 +88,8 @@ impl Spin {
         self.refused = self.refused.saturating_add(1);
         let nose_n = dcm_nb(&self.q_nb).column(0).into_owned();
         let [roll, all] = SHUT;
+        // The accelerometers have just said that the spin changed, and the field says that it did: two witnesses.
+        let roll = if self.surprised_s > 0.0 { 1 } else { roll };
         if self.refused.is_multiple_of(roll) {
             self.covariance.open_attitude(&(nose_n * nose_n.transpose()));
             self.covariance.open(SPIN, 0.25);

@@ -20,7 +20,7 @@ const SPIN_WALK: f32 = 2.0;
 /// [rad/s2/sqrt(s)] the same after a surprise: a yo-yo takes 19 rad/s away in a second.
 pub(super) const SURPRISED_WALK: f32 = 60.0;
 /// [rad/s2/sqrt(s)] walk of the derivative of the rate across: a cone of 1 deg at 0.4 turns a second has 0.1 rad/s2.
-const ACROSS_WALK: f32 = 0.2;
+pub(super) const ACROSS_WALK: f32 = 0.2;
 /// [rad/sqrt(s)] angle noise that no model explains.
 const ANGLE_WALK: f32 = 1e-4;
 /// [rad/s/sqrt(s)] walk of a gyro's bias.
