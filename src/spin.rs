@@ -237,6 +237,11 @@ impl Spin {
         Vector3::new(self.spin, 0.0, 0.0) + self.turning_b(self.across)
     }
 
+    /// [rad/s] bias of each gyro.
+    pub fn biases(&self) -> [f32; PLATES] {
+        self.bias
+    }
+
     /// What it knows at an instant that is at most some 20 ms from its latest measurement.
     pub fn known(&self, set: &Set, at_us: u64) -> Known {
         let dt_s = seconds_between(self.at_us, at_us);

@@ -5,7 +5,7 @@
 //!
 //! Leaves out what is stamped more than [`FAR_US`] from the state.
 
-use super::{Spin, gyros::sampled};
+use super::Spin;
 use crate::{
     calibration::{Measured, Set},
     geometry::PLATES,
@@ -113,7 +113,7 @@ impl Spin {
             }
             self.correct();
         }
-        self.give_back(sampled(&set.gyro[self.lasting.gyro]));
+        self.give_back();
         self.mind_the_gate(of_field);
         let end_us = increments.end_us;
         let gap_s = end_us.saturating_sub(self.slice_us) as f32 * 1e-6;

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     attitude::sin_cos,
-    calibration::{Axis, Measured, Set},
+    calibration::{Measured, Set},
     geometry::PLATES,
     increments::slices::BEYOND,
     sample::NOT_READ,
@@ -29,11 +29,6 @@ const ROUGH: f32 = 150.0;
 const STOP_COUNTS: f32 = 4368.0;
 /// [rad/s] how near its stop a gyro may be said to be beyond it: noise and the slice's own change.
 const STOP_SD: f32 = 0.2;
-
-/// [rad2/s2] variance of a slice by its samples' noise.
-pub(super) fn sampled(axis: &Axis) -> f32 {
-    SLICE_NOISE * axis.noise * axis.noise
-}
 
 impl Spin {
     pub(super) fn take_slice(&mut self, set: &Set, measured: &Measured, quarters: &[i16; PLATES], lasts_us: u16) {
@@ -67,7 +62,7 @@ impl Spin {
                 sees * self.spin + left * axis.axis_b.dot(&turning_b) + self.bias[k] + self.by_load[k] * load;
             let above_c = measured.gyros_above_c[k];
             let value = |counts: f32| axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c));
-            let sampled = sampled(axis);
+            let sampled = SLICE_NOISE * axis.noise * axis.noise;
             if quarters.unsigned_abs() == BEYOND.unsigned_abs() {
                 let stop = value(if *quarters > 0 { STOP_COUNTS } else { -STOP_COUNTS });
                 let residual = stop - believed;
@@ -91,6 +86,7 @@ impl Spin {
             let far = left_over * left_over * (1.0 / FAR) - of_state;
             let r = if far > r { far } else { r };
             if k == self.lasting.gyro {
+                self.lasting.sampled = sampled;
                 let off = left_over / ComplexField::sqrt(of_state + r);
                 self.lasting.hear(off, self.spin, self.phase, lasts_s);
             }

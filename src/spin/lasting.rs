@@ -30,7 +30,6 @@ use super::{
 use crate::{
     attitude::{dcm_nb, sin_cos},
     calibration::Set,
-    geometry::PLATES,
 };
 
 /// Of the corner, the width of a low-pass: what lies at the spin itself, which the filter took for the rate, passes two of them
@@ -60,15 +59,18 @@ pub struct Lasting {
     /// [s2/rad2] what the gyros told of a component of the rate across since the latest packet, and \[s\] for how long.
     told: f32,
     told_s: f32,
+    /// [rad2/s2] variance of a slice of the gyro that is heard by its samples' noise, which is white.
+    pub sampled: f32,
 }
 
 impl Lasting {
     /// Nothing was heard, all lasts.
     pub fn new(set: &Set) -> Self {
-        let mut gyro = 0;
-        for k in 1..PLATES {
-            if set.gyro[k].axis_b.x.abs() < set.gyro[gyro].axis_b.x.abs() {
-                gyro = k;
+        let (mut gyro, mut least) = (0, f32::MAX);
+        for (k, axis) in set.gyro.iter().enumerate() {
+            let along = axis.axis_b.x.abs();
+            if along < least {
+                (gyro, least) = (k, along);
             }
         }
         Lasting {
@@ -80,6 +82,7 @@ impl Lasting {
             heard: 1.0,
             told: 0.0,
             told_s: 0.0,
+            sampled: f32::MAX,
         }
     }
 
@@ -137,7 +140,7 @@ impl Lasting {
 impl Spin {
     /// After a packet: what of the gyros' noise was counted and does not last.
     #[inline(never)]
-    pub(super) fn give_back(&mut self, sampled: f32) {
+    pub(super) fn give_back(&mut self) {
         let lasting = &mut self.lasting;
         let told = core::mem::take(&mut lasting.told);
         let lasted_s = core::mem::take(&mut lasting.told_s);
@@ -147,8 +150,7 @@ impl Spin {
         // Over the packet, each gyro's variance and weight in it.
         let density = lasted_s / told;
         lasting.corner = ComplexField::sqrt(ACROSS_WALK / ComplexField::sqrt(density));
-        // What samples of their own have is white.
-        let lasts = (lasting.part() * self.rough).max(sampled);
+        let lasts = (lasting.part() * self.rough).max(lasting.sampled);
         if lasts >= self.rough {
             return;
         }

@@ -4,4 +4,5 @@
 pub mod calibration;
 pub mod mekf;
 pub mod redundancy;
+pub mod spin;
 pub mod wahba;

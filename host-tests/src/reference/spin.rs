@@ -1,0 +1,609 @@
+//! The filter of the spin in f64: dense matrices, `F P F' + Q`, the full Joseph form, equations of force by the null space of the axes.
+//!
+//! The model of `emems::spin`, from its equations, with its adaptive noises and its gates; of what it knows at the end only the
+//! attitude, its covariance, the rate and the gyros' biases are said. It takes counts through the unit's own calibration: those
+//! numbers are what is measured.
+
+use emems::{
+    calibration::{Axis, Measured, Set},
+    increments::{Increments, Slice, slices::BEYOND},
+    sample::{Kind, NO_SLOT, NOT_READ, Sample},
+    spin::Start,
+};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+/// Error states: attitude in n, spin and its derivative, rate across and its derivative, biases, what gyros see of the spin, iron, lever,
+/// biases by load.
+const N: usize = 25;
+const SPIN: usize = 3;
+const SPIN_UP: usize = 4;
+const ACROSS: usize = 5;
+const ACROSS_UP: usize = 7;
+const BIAS: usize = 9;
+const SEES: usize = 13;
+const IRON: usize = 17;
+const LEVER: usize = 20;
+const BY_LOAD: usize = 21;
+
+const GATE: f64 = 25.0;
+
+/// State, covariance and noises.
+pub struct Spin {
+    start: Start<'static>,
+    at_us: u64,
+    /// Attitude.
+    pub q_nb: UnitQuaternion<f64>,
+    /// Covariance of all error states.
+    pub p: SMatrix<f64, N, N>,
+    /// Error that the scalars since the latest correction found.
+    error: SVector<f64, N>,
+    spin: f64,
+    spin_up: f64,
+    phase: f64,
+    across: [f64; 2],
+    across_up: [f64; 2],
+    /// [rad/s] of each gyro.
+    pub bias: [f64; 4],
+    sees: [f64; 4],
+    by_load: [f64; 4],
+    iron_b: Vector3<f64>,
+    lever: f64,
+    rough: f64,
+    usual: f64,
+    seen: bool,
+    surprised_s: f64,
+    refused: u8,
+    force: Option<(u64, Vector3<f64>)>,
+    changed_b: Option<Vector3<f64>>,
+    shaken: f64,
+    lasting: Lasting,
+}
+
+/// Densities on either side of the spin.
+struct Lasting {
+    corner: f64,
+    turned: f64,
+    passed: [[[f64; 2]; 2]; 2],
+    density: [f64; 2],
+    heard: f64,
+    told: f64,
+    told_s: f64,
+}
+
+enum Event {
+    Slice(Slice),
+    Force([[i16; 3]; 4]),
+    Field(usize),
+}
+
+fn square(x: f64) -> f64 {
+    x * x
+}
+
+fn value(axis: &Axis, counts: f32, above_c: f32) -> f64 {
+    f64::from(axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c)))
+}
+
+fn axis_b(axis: &Axis) -> Vector3<f64> {
+    axis.axis_b.cast()
+}
+
+impl Spin {
+    /// From what the unit's own filter begins with, without a pad.
+    pub fn begin(start: &Start<'static>, set: &Set) -> Self {
+        let [_, _, of_gyro] = set.uncertainty;
+        let mut variances = [0.0; N];
+        variances[SPIN] = square(start.rate_sd.into());
+        variances[SPIN_UP] = 9.0;
+        for axis in 0..2 {
+            variances[ACROSS + axis] = square(start.rate_sd.into());
+            variances[ACROSS_UP + axis] = 0.25;
+        }
+        for k in 0..4 {
+            variances[BIAS + k] = start.bias_variance.into();
+            let along = axis_b(&set.gyro[k]).x;
+            variances[SEES + k] = square(f64::from(of_gyro.scale) * along) + square(of_gyro.direction.into());
+            variances[BY_LOAD + k] = square(start.surroundings.bias_per_g.into());
+        }
+        let shortest = set.place_b.iter().map(|place| place.norm()).fold(f32::MAX, f32::min);
+        variances[LEVER] = square(f64::from(set.place_sigma) / f64::from(shortest));
+        let mut p = SMatrix::from_diagonal(&SVector::from(variances));
+        p.fixed_view_mut::<3, 3>(0, 0).copy_from(&start.covariance_n.cast());
+        p.fixed_view_mut::<3, 3>(IRON, IRON)
+            .copy_from(&start.iron_covariance.cast());
+        let rate_b: Vector3<f64> = start.rate_b.cast();
+        Spin {
+            at_us: start.at_us,
+            q_nb: UnitQuaternion::new_normalize(start.q_nb.into_inner().cast()),
+            p,
+            error: SVector::zeros(),
+            spin: rate_b.x,
+            spin_up: 0.0,
+            phase: 0.0,
+            across: [rate_b.y, rate_b.z],
+            across_up: [0.0; 2],
+            bias: set.gyro.map(|axis| axis_b(&axis).dot(&start.bias_b.cast())),
+            sees: [0.0; 4],
+            by_load: [0.0; 4],
+            iron_b: start.iron_b.cast(),
+            lever: 0.0,
+            rough: 1e-4,
+            usual: 10.0,
+            seen: true,
+            surprised_s: 0.0,
+            refused: 0,
+            force: None,
+            changed_b: None,
+            shaken: 0.0,
+            lasting: Lasting {
+                corner: 8.0,
+                turned: 0.0,
+                passed: [[[0.0; 2]; 2]; 2],
+                density: [1.0; 2],
+                heard: 1.0,
+                told: 0.0,
+                told_s: 0.0,
+            },
+            start: start.clone(),
+        }
+    }
+
+    /// [rad/s] the rate in b.
+    pub fn rate_b(&self) -> Vector3<f64> {
+        Vector3::new(self.spin, 0.0, 0.0) + self.turning_b(self.across)
+    }
+
+    /// \[rad2\] covariance of the attitude with what the field's model may be off by.
+    pub fn covariance_n(&self) -> Matrix3<f64> {
+        let along_n: Vector3<f64> = self.start.surroundings.field_n_ut.cast().normalize();
+        let across = Matrix3::identity() - along_n * along_n.transpose();
+        self.p.fixed_view::<3, 3>(0, 0) + across * square(self.start.surroundings.field_sd.into())
+    }
+
+    /// Attitude at an instant.
+    pub fn attitude_at(&self, at_us: u64) -> UnitQuaternion<f64> {
+        self.carried((at_us as f64 - self.at_us as f64) * 1e-6).0
+    }
+
+    fn across_b(&self) -> [Vector3<f64>; 2] {
+        let (sin, cos) = self.phase.sin_cos();
+        [Vector3::new(0.0, cos, -sin), Vector3::new(0.0, sin, cos)]
+    }
+
+    fn turning_b(&self, across: [f64; 2]) -> Vector3<f64> {
+        let [y_b, z_b] = self.across_b();
+        y_b * across[0] + z_b * across[1]
+    }
+
+    fn nose_n(&self) -> Vector3<f64> {
+        self.q_nb * Vector3::x()
+    }
+
+    fn load(&self) -> f64 {
+        let pad = f64::from(self.start.pad.along_x);
+        self.force.map_or(0.0, |(_, force_b)| (force_b.x - pad) / 9.806_65)
+    }
+
+    /// Takes a cycle.
+    pub fn take(&mut self, set: &Set, sample: &Sample, measured: &Measured, increments: &Increments) {
+        let delays = self.start.surroundings.delays;
+        let late_us = |late_s: f32| (late_s * 1e6) as u64;
+        let mut events = Vec::new();
+        for slice in increments.slices.iter().filter(|slice| !slice.is_none()) {
+            let middle_us = increments.end_us - u64::from(slice.before_us) - u64::from(slice.lasts_us) / 2;
+            events.push((middle_us - late_us(delays.gyro_s), Event::Slice(*slice)));
+        }
+        let began_us = increments.end_us - u64::from(increments.covered_us);
+        for force in increments.forces.iter().filter(|force| !force.is_none()) {
+            let at_us = began_us + u64::from(force.covered_us) + u64::from(force.after_us);
+            events.push((at_us - late_us(delays.acc_s), Event::Force(force.acc_p)));
+        }
+        let slots = sample.slots_of(Kind::Accelerometer);
+        let mean_us = slots.iter().map(|slot| u64::from(*slot)).sum::<u64>() / slots.len() as u64;
+        let at_us = sample.start_us + mean_us - late_us(delays.acc_s);
+        events.push((at_us, Event::Force(sample.reading.acc_p)));
+        for (plate, slot) in sample.slots_of(Kind::Magnetometer).iter().enumerate() {
+            assert_ne!(*slot, NO_SLOT);
+            let at_us = sample.start_us + u64::from(*slot) - late_us(delays.mag_s);
+            events.push((at_us, Event::Field(plate)));
+        }
+        events.sort_by_key(|(at_us, _)| *at_us);
+        let mut of_field = [0, 0];
+        for (at_us, event) in events {
+            self.carry(at_us);
+            match event {
+                Event::Slice(slice) => self.take_slice(set, measured, &slice),
+                Event::Force(acc_p) => self.take_force(set, &acc_p),
+                Event::Field(plate) => of_field[usize::from(self.take_field(set, measured, plate))] += 1,
+            }
+            self.correct();
+        }
+        self.give_back(set);
+        self.mind_the_gate(of_field);
+    }
+
+    fn carried(&self, dt_s: f64) -> (UnitQuaternion<f64>, f64) {
+        let across = [0, 1].map(|k| (self.across[k] + 0.5 * dt_s * self.across_up[k]) * dt_s);
+        let spun = (self.spin + 0.5 * dt_s * self.spin_up) * dt_s;
+        let earth_n: Vector3<f64> = self.start.surroundings.earth_rate_n.cast();
+        let turned = UnitQuaternion::from_scaled_axis(self.turning_b(across))
+            * UnitQuaternion::from_scaled_axis(Vector3::x() * spun);
+        (
+            UnitQuaternion::from_scaled_axis(earth_n * -dt_s) * self.q_nb * turned,
+            spun,
+        )
+    }
+
+    fn carry(&mut self, at_us: u64) {
+        let all_s = (at_us as f64 - self.at_us as f64) * 1e-6;
+        self.at_us = at_us;
+        let steps = (all_s.abs() / 0.03) as u32 + 1;
+        let dt_s = all_s / f64::from(steps);
+        for _ in 0..if all_s == 0.0 { 0 } else { steps } {
+            let [y_b, z_b] = self.across_b();
+            let mut f = SMatrix::<f64, N, N>::identity();
+            let sources = [
+                (SPIN, SPIN_UP, Vector3::x()),
+                (ACROSS, ACROSS_UP, y_b),
+                (ACROSS + 1, ACROSS_UP + 1, z_b),
+            ];
+            for (rate, up, along_b) in sources {
+                let along_n = self.q_nb * along_b;
+                f.fixed_view_mut::<3, 1>(0, rate).copy_from(&(along_n * dt_s));
+                f.fixed_view_mut::<3, 1>(0, up)
+                    .copy_from(&(along_n * (0.5 * dt_s * dt_s)));
+                f[(rate, up)] = dt_s;
+            }
+            let surprised = self.surprised_s > 0.0;
+            let mut walks = SVector::<f64, N>::zeros();
+            walks.fixed_rows_mut::<3>(0).fill(1e-4);
+            walks[SPIN_UP] = if surprised { 60.0 } else { 2.0 };
+            walks
+                .fixed_rows_mut::<2>(ACROSS_UP)
+                .fill(if surprised { 1.0 } else { 0.2 });
+            walks.fixed_rows_mut::<4>(BIAS).fill(1.5e-6);
+            walks.fixed_rows_mut::<3>(IRON).fill(0.01);
+            let q = SMatrix::from_diagonal(&walks.map(|walk| walk * walk * dt_s.abs()));
+            self.p = f * self.p * f.transpose() + q;
+            let (q_nb, spun) = self.carried(dt_s);
+            self.q_nb = q_nb;
+            self.phase += spun;
+            self.spin += self.spin_up * dt_s;
+            for axis in 0..2 {
+                self.across[axis] += self.across_up[axis] * dt_s;
+            }
+            self.surprised_s -= dt_s;
+        }
+    }
+
+    fn row(of: &[(usize, f64)]) -> SVector<f64, N> {
+        let mut row = SVector::zeros();
+        for (state, part) in of {
+            row[*state] += part;
+        }
+        row
+    }
+
+    /// Variance of what is seen, and what is left of the residual.
+    fn look(&self, h: &SVector<f64, N>, residual: f64) -> (f64, f64) {
+        (h.dot(&(self.p * h)), residual - h.dot(&self.error))
+    }
+
+    fn update(&mut self, h: &SVector<f64, N>, residual: f64, r: f64, gate: f64) -> f64 {
+        let (of_state, left) = self.look(h, residual);
+        let off = left * left / (of_state + r);
+        if off > gate {
+            return off;
+        }
+        let gain = self.p * h / (of_state + r);
+        self.error += gain * left;
+        let left_over = SMatrix::<f64, N, N>::identity() - gain * h.transpose();
+        self.p = left_over * self.p * left_over.transpose() + gain * r * gain.transpose();
+        off
+    }
+
+    fn correct(&mut self) {
+        let error = std::mem::replace(&mut self.error, SVector::zeros());
+        self.q_nb = UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(0).into_owned()) * self.q_nb;
+        self.spin += error[SPIN];
+        self.spin_up += error[SPIN_UP];
+        for axis in 0..2 {
+            self.across[axis] += error[ACROSS + axis];
+            self.across_up[axis] += error[ACROSS_UP + axis];
+        }
+        for k in 0..4 {
+            self.bias[k] += error[BIAS + k];
+            self.sees[k] += error[SEES + k];
+            self.by_load[k] += error[BY_LOAD + k];
+        }
+        self.iron_b += error.fixed_rows::<3>(IRON);
+        self.lever += error[LEVER];
+    }
+
+    fn take_slice(&mut self, set: &Set, measured: &Measured, slice: &Slice) {
+        let lasts_s = 1e-6 * f64::from(slice.lasts_us);
+        let [y_b, z_b] = self.across_b();
+        let turning_b = self.turning_b(self.across);
+        let left = 0.5 * (1.0 + (0.5 * self.spin * lasts_s).cos()) / (1.0 + square(0.0125 * self.spin)).sqrt();
+        let (load, spin) = (self.load(), self.spin);
+        let at_stop = |quarters: i16| quarters.unsigned_abs() == BEYOND.unsigned_abs();
+        let gives = |quarters: &&i16| **quarters != NOT_READ && !at_stop(**quarters);
+        self.seen = slice.quarters.iter().filter(gives).count() >= 3;
+        self.lasting.told_s += lasts_s;
+        let heard = least_along(set);
+        // Each gyro's row and what is believed of it are of before the slice.
+        let (bias, by_load) = (self.bias, self.by_load);
+        for k in 0..4 {
+            let (quarters, axis) = (slice.quarters[k], &set.gyro[k]);
+            if quarters == NOT_READ {
+                continue;
+            }
+            let n_b = axis_b(axis);
+            let sees = n_b.x + self.sees[k];
+            let h = Self::row(&[
+                (SPIN, sees),
+                (ACROSS, left * n_b.dot(&y_b)),
+                (ACROSS + 1, left * n_b.dot(&z_b)),
+                (BIAS + k, 1.0),
+                (SEES + k, spin),
+                (BY_LOAD + k, load),
+            ]);
+            let believed = sees * spin + left * n_b.dot(&turning_b) + bias[k] + by_load[k] * load;
+            let above_c = measured.gyros_above_c[k];
+            if at_stop(quarters) {
+                let stop = value(axis, if quarters > 0 { 4368.0 } else { -4368.0 }, above_c);
+                if (stop - believed > 0.0) == (quarters > 0) {
+                    self.update(&h, stop - believed, 0.04, f64::MAX);
+                }
+                continue;
+            }
+            let residual = value(axis, 0.25 * f32::from(quarters), above_c) - believed;
+            let r = self.rough.max(0.5 * square(axis.noise.into()));
+            let (of_state, left_over) = self.look(&h, residual);
+            if of_state < r {
+                let shown = (left_over * left_over - of_state).min(GATE * r);
+                self.rough += (shown - self.rough) / 150.0;
+            }
+            let r = r.max(left_over * left_over / 9.0 - of_state);
+            if k == heard {
+                self.lasting
+                    .hear(left_over / (of_state + r).sqrt(), spin, self.phase, lasts_s);
+            }
+            self.lasting.told += 0.5 * left * left * (1.0 - n_b.x * n_b.x) / r;
+            self.update(&h, residual, r, f64::MAX);
+        }
+    }
+
+    /// Residuals and rows of the equations of force, white with variance one, and the force.
+    fn equations(
+        &self,
+        set: &Set,
+        along: &[Option<f64>; 12],
+        more: f64,
+    ) -> (Vec<(f64, SVector<f64, N>)>, Vector3<f64>) {
+        let rate_b = self.rate_b();
+        let x = Vector3::x();
+        let turned = |axis: &Vector3<f64>| axis.cross(&x);
+        let dot_b = x * self.spin_up + self.turning_b(self.across_up) + turned(&rate_b) * self.spin;
+        let [y_b, z_b] = self.across_b();
+        let largest = along
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |largest, along| largest.max(along.abs()));
+        let [of_acc, ..] = set.uncertainty;
+        let used: Vec<usize> = (0..12).filter(|k| along[*k].is_some()).collect();
+        let mut axes = DMatrix::<f64>::zeros(used.len(), 3);
+        let mut residuals = DVector::<f64>::zeros(used.len());
+        let mut rows = DMatrix::<f64>::zeros(used.len(), N);
+        for (row, k) in used.iter().enumerate() {
+            let axis = &set.acc[*k];
+            let along = along[*k].unwrap_or_default();
+            let n_b = axis_b(axis);
+            let variance = square(axis.noise.into())
+                + square(0.02)
+                + square(f64::from(of_acc.scale) * along)
+                + square(f64::from(of_acc.direction) * largest)
+                + more;
+            let by_sd = 1.0 / variance.sqrt();
+            let place_b: Vector3<f64> = set.place_b[k / 3].cast();
+            let far_b = place_b * (1.0 + self.lever);
+            // Derivative of `w' x r + w x (w x r)`, where an axis across the spin turns with b.
+            let by_rate = |axis: &Vector3<f64>, dot: &Vector3<f64>| {
+                dot.cross(&far_b) + axis.cross(&rate_b.cross(&far_b)) + rate_b.cross(&axis.cross(&far_b))
+            };
+            let felt = |place_b: &Vector3<f64>| dot_b.cross(place_b) + rate_b.cross(&rate_b.cross(place_b));
+            let seen = [
+                (SPIN, by_rate(&x, &turned(&rate_b))),
+                (SPIN_UP, x.cross(&far_b)),
+                (ACROSS, by_rate(&y_b, &(turned(&y_b) * self.spin))),
+                (ACROSS + 1, by_rate(&z_b, &(turned(&z_b) * self.spin))),
+                (ACROSS_UP, y_b.cross(&far_b)),
+                (ACROSS_UP + 1, z_b.cross(&far_b)),
+                (LEVER, felt(&place_b)),
+            ];
+            for (state, seen_b) in seen {
+                rows[(row, state)] = n_b.dot(&seen_b) * by_sd;
+            }
+            residuals[row] = (along - n_b.dot(&felt(&far_b))) * by_sd;
+            axes.row_mut(row).copy_from(&(n_b.transpose() * by_sd));
+        }
+        let inverse = (axes.transpose() * &axes).try_inverse().expect("axes span space");
+        let force = &inverse * axes.transpose() * &residuals;
+        let beside = DMatrix::identity(used.len(), used.len()) - &axes * &inverse * axes.transpose();
+        let eigen = beside.symmetric_eigen();
+        let free = (0..used.len()).filter(|k| eigen.eigenvalues[*k] > 0.5);
+        let equation = |k: usize| {
+            let by = eigen.eigenvectors.column(k);
+            let row = rows.tr_mul(&by);
+            (
+                by.dot(&residuals),
+                SVector::<f64, N>::from_iterator(row.iter().copied()),
+            )
+        };
+        (free.map(equation).collect(), Vector3::new(force[0], force[1], force[2]))
+    }
+
+    fn take_force(&mut self, set: &Set, acc_p: &[[i16; 3]; 4]) {
+        let counts = acc_p.as_flattened();
+        let codes = emems::sensor::lis331hh::CODES;
+        let along = std::array::from_fn(|k| {
+            let within = counts[k] > *codes.start() && counts[k] < *codes.end();
+            within.then(|| f64::from(set.acc[k].value(counts[k], 0.0)))
+        });
+        let mut more = square(4.0 * 0.006 * self.spin * self.spin_up * 0.045);
+        let (_, force_b) = self.equations(set, &along, more);
+        if let Some((before_us, before_b)) = self.force.replace((self.at_us, force_b)) {
+            let change_b = force_b - before_b;
+            let dt_s = (self.at_us - before_us) as f64 * 1e-6;
+            let bend_b = change_b - self.changed_b.replace(change_b).unwrap_or(change_b);
+            self.shaken += (bend_b.norm_squared() / 18.0 - self.shaken) / 2.0;
+            more += square(0.006 * change_b.norm() / dt_s) + 0.55 * self.shaken;
+        }
+        let (equations, _) = self.equations(set, &along, more);
+        let scale = self.usual.max(1.0);
+        let off = |of: &Self| {
+            let each = equations.iter().map(|(residual, h)| {
+                let (of_state, left) = of.look(h, *residual);
+                left * left / (of_state + scale)
+            });
+            each.sum::<f64>() / equations.len() as f64
+        };
+        let mean = off(self);
+        let surprising = if self.seen { f64::MAX } else { 4.0 };
+        self.usual += (scale * mean.min(4.0) - self.usual) / 20.0;
+        if mean > surprising && self.surprised_s <= 0.0 {
+            self.surprised_s = 0.6;
+            self.p[(SPIN_UP, SPIN_UP)] += 360.0;
+            self.p[(SPIN, SPIN)] += 1.44;
+            if off(self) > surprising {
+                for axis in 0..2 {
+                    self.p[(ACROSS_UP + axis, ACROSS_UP + axis)] += 1.0;
+                    self.p[(ACROSS + axis, ACROSS + axis)] += 0.0025;
+                }
+            }
+        }
+        let scale = scale * off(self).max(1.0);
+        for (residual, h) in &equations {
+            self.update(h, *residual, scale, GATE);
+        }
+    }
+
+    fn take_field(&mut self, set: &Set, measured: &Measured, plate: usize) -> bool {
+        let dcm = Rotation3::from(self.q_nb).into_inner();
+        let field_n: Vector3<f64> = self.start.surroundings.field_n_ut.cast();
+        let field_b = dcm.transpose() * field_n;
+        let mut residual_b = Vector3::zeros();
+        let mut noise = 0.0_f64;
+        for k in 3 * plate..3 * plate + 3 {
+            let axis = &set.mag[k];
+            let n_b = axis_b(axis);
+            residual_b += n_b * (f64::from(measured.mag[k]) - n_b.dot(&(field_b + self.iron_b)));
+            noise = noise.max(axis.noise.into());
+        }
+        let white = square(noise) + square(0.12);
+        let way_b = self.rate_b().cross(&field_b);
+        let speed = way_b.norm();
+        let (along_b, other_b) = if speed > 1.0 {
+            (way_b / speed, (way_b / speed).cross(&field_b).normalize())
+        } else {
+            (Vector3::x(), Vector3::y())
+        };
+        let mut all = true;
+        for (n_b, r) in [(along_b, white + square(0.0002 * speed)), (other_b, white)] {
+            let seen_n = (dcm * n_b).cross(&field_n);
+            let mut h = SVector::<f64, N>::zeros();
+            h.fixed_rows_mut::<3>(0).copy_from(&seen_n);
+            h.fixed_rows_mut::<3>(IRON).copy_from(&n_b);
+            all &= self.update(&h, n_b.dot(&residual_b), r, GATE) <= GATE;
+        }
+        all
+    }
+
+    fn mind_the_gate(&mut self, [refused, taken]: [u8; 2]) {
+        if taken >= refused {
+            self.refused = 0;
+            return;
+        }
+        self.refused += 1;
+        let open = |p: &mut SMatrix<f64, N, N>, more: Matrix3<f64>| {
+            let opened = p.fixed_view::<3, 3>(0, 0) + more;
+            p.fixed_view_mut::<3, 3>(0, 0).copy_from(&opened);
+        };
+        let roll = if self.surprised_s > 0.0 { 1 } else { 3 };
+        if self.refused.is_multiple_of(roll) {
+            let nose_n = self.nose_n();
+            open(&mut self.p, nose_n * nose_n.transpose());
+            self.p[(SPIN, SPIN)] += 0.25;
+        }
+        if self.refused >= 10 {
+            self.refused = 0;
+            open(&mut self.p, Matrix3::from_diagonal_element(0.09));
+        }
+    }
+
+    fn give_back(&mut self, set: &Set) {
+        let told = std::mem::take(&mut self.lasting.told);
+        let lasted_s = std::mem::take(&mut self.lasting.told_s);
+        if told == 0.0 || lasted_s == 0.0 {
+            return;
+        }
+        let density = lasted_s / told;
+        self.lasting.corner = (0.2 / density.sqrt()).sqrt();
+        let part = (2.0 * (self.lasting.density[0] * self.lasting.density[1]).sqrt()).min(1.0);
+        let sampled = 0.5 * square(set.gyro[least_along(set)].noise.into());
+        let lasts = (part * self.rough).max(sampled);
+        if lasts >= self.rough {
+            return;
+        }
+        let nose_n = self.nose_n();
+        let back =
+            (Matrix3::identity() - nose_n * nose_n.transpose()) * ((1.0 - lasts / self.rough) * density * lasted_s);
+        let of_rate: Matrix2<f64> = self.p.fixed_view::<2, 2>(ACROSS, ACROSS).into_owned();
+        let both = self.p.fixed_view::<3, 2>(0, ACROSS).into_owned();
+        let by_rate = both * of_rate.try_inverse().expect("rates are not known for sure");
+        let given = self.p.fixed_view::<3, 3>(0, 0) - by_rate * both.transpose();
+        // The whole congruence: `a <- a - A (1 + k A)^-2 (a - by_rate u) / 2`.
+        let a = back * given.try_inverse().expect("attitude is not known for sure");
+        let slow = (Matrix3::identity() + a / (self.lasting.corner * lasted_s))
+            .try_inverse()
+            .expect("positive");
+        let less = a * slow * slow * 0.5;
+        let mut s = SMatrix::<f64, N, N>::identity();
+        s.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() - less));
+        s.fixed_view_mut::<3, 2>(0, ACROSS).copy_from(&(less * by_rate));
+        self.p = s * self.p * s.transpose();
+    }
+}
+
+impl Lasting {
+    fn hear(&mut self, off: f64, spin: f64, phase: f64, lasts_s: f64) {
+        self.turned += self.corner * lasts_s;
+        let width = self.corner * lasts_s / 6.0;
+        self.heard = (self.heard + width).min(1.5);
+        let mut squares = [0.0; 2];
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let (sin, cos) = (phase + sign * self.turned).sin_cos();
+            for (part, turned) in [cos, sin].into_iter().enumerate() {
+                let [first, second] = [0, 1].map(|pole| self.passed[side][pole][part]);
+                let first = first + off * width.sqrt() * turned - width * first;
+                let second = second + width * (first - second);
+                self.passed[side][0][part] = first;
+                self.passed[side][1][part] = second;
+                squares[side] += 4.0 * second * second;
+            }
+        }
+        let (above, below) = if spin > 0.0 { (0, 1) } else { (1, 0) };
+        if spin.abs() < 1.5 * self.corner {
+            squares[below] = squares[above];
+        }
+        for (density, square) in self.density.iter_mut().zip(squares) {
+            *density += width / self.heard * (square - *density);
+        }
+    }
+}
+
+/// The gyro that sees least of the spin.
+fn least_along(set: &Set) -> usize {
+    let along = |k: &usize| set.gyro[*k].axis_b.x.abs();
+    (0..4).min_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default()
+}
