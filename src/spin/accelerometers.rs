@@ -134,3 +134,68 @@ impl Spin {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, UnitQuaternion};
+
+    use super::*;
+    use crate::{
+        calibration::Ranges,
+        kalman::Delays,
+        spin::{Start, Surroundings, pad::Pad},
+        unit::Settings,
+    };
+
+    fn spin() -> Spin {
+        let set = Set::nominal(Ranges::of(&Settings::NOMINAL));
+        let start = Start {
+            at_us: 0,
+            q_nb: UnitQuaternion::identity(),
+            covariance_n: Matrix3::identity(),
+            rate_b: Vector3::zeros(),
+            rate_sd: 0.1,
+            bias_b: Vector3::zeros(),
+            bias_variance: 1e-4,
+            pad: &Pad::EMPTY,
+            iron_b: Vector3::zeros(),
+            iron_covariance: Matrix3::identity(),
+            surroundings: Surroundings {
+                field_n_ut: Vector3::x(),
+                field_sd: 0.0,
+                earth_rate_n: Vector3::zeros(),
+                bias_per_g: 0.0,
+                delays: Delays {
+                    gyro_s: 0.0,
+                    acc_s: 0.0,
+                    mag_s: 0.0,
+                },
+            },
+        };
+        Spin::begin(&start, &set)
+    }
+
+    /// Mean of what readings of this force are said to disagree by.
+    fn shaken(force_b: impl Fn(f32) -> Vector3<f32>) -> f32 {
+        let mut spin = spin();
+        let times_s = |k: usize| 0.2 * (k / 3) as f32 + [0.05, 0.12, 0.19][k % 3];
+        let changes = (1..300).map(|k| force_b(times_s(k)) - force_b(times_s(k - 1)));
+        changes.map(|change_b| spin.shakes(change_b)).sum::<f32>() / 299.0
+    }
+
+    #[test]
+    fn a_vibration_is_seen_and_a_change_that_goes_on_is_none() {
+        // Each component of a mean square of 25.
+        let tones = |t_s: f32| {
+            Vector3::from_fn(|axis, _| {
+                let turned = core::f32::consts::TAU * [37.3, 41.9, 46.1][axis] * t_s;
+                f32::sqrt(50.0) * f32::sin(turned)
+            })
+        };
+        let seen = shaken(tones);
+        assert!((0.7..1.3).contains(&(seen / (NOT_SHARED * 25.0))), "{seen}");
+        // A motor's 100 m/s3; three readings a packet are not evenly spaced, by 0.01 s at most.
+        let ramp = shaken(|t_s| Vector3::x() * (100.0 * t_s));
+        assert!(ramp < NOT_SHARED * 1.0, "{ramp}");
+    }
+}
