@@ -105,7 +105,7 @@ pub fn analysed(
     let coded = Findings::coded(&flight, withheld)?;
     let followed = Followed::of(&flight, &flight.log, &coded);
     let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
-    let told = Told::along(&followed, &|share| progress("attitude", share))?;
+    let told = Told::explained(&followed, &findings, &|share| progress("attitude", share))?;
     let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings, &told))?;
     let screen = text::screen(&flight, &findings, &told);
     let texts = [format!("{verdict}\n"), screen, page::html(&flight, &findings, &told)?];

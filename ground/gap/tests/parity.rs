@@ -6,7 +6,7 @@ use clap::Parser;
 use gap::{
     command::{GapArguments, run},
     input::case::Subject,
-    parity::{analysed, findings::Findings, flight::Flight, name::By, smooth::told::Told, visible::Row},
+    parity::{analysed, findings::Findings, flight::Flight, followed::Followed, name::By, smooth::told::Told, visible::Row},
     probability::outcome::Outcome,
     thresholds::PARITY_SNR,
 };
@@ -270,6 +270,53 @@ fn the_smoothed_attitude_of_a_healthy_unit_is_the_truth_within_what_it_says() {
     }
 }
 
+/// Error and sigma of an attitude, root mean squares in degrees.
+fn held_against(told: &Told, name: &str, from_s: f64) -> (f64, f64) {
+    let motion = motion::world_by_name(name).expect("a motion").motion;
+    let (mut square, mut said) = (0.0, 0.0);
+    for own in &told.attitudes {
+        let truth = motion.at(from_s + own.t_s).attitude.q_nb;
+        square += truth.angle_to(&own.q_nb).to_degrees().powi(2);
+        said += own.sigmas_b_deg.norm_squared();
+    }
+    let count = told.attitudes.len().max(1) as f64;
+    ((square / count).sqrt(), (said / count).sqrt())
+}
+
+#[test]
+fn an_attitude_is_smoothed_beside_what_is_named_and_not_told_where_something_is_left() {
+    let unit = emems(thesis_slot_s);
+    let cause = Cause {
+        effect: by_name("gyro-bias").expect("an effect"),
+        locality: Locality::Channel(unit.channels.iter().position(|own| own.name == "g1").expect("a gyro")),
+        variant: 0.0,
+    };
+    let sigma = cause.parameters(&unit)[0].prior_sigma;
+    let active = [Active {
+        cause,
+        theta: vec![4.0 * sigma],
+    }];
+    let flight = Flight::open(flown("tumble", 20.0, 3, &active, |_| true).path()).expect("opens");
+    let mut findings = Findings::of(&flight, &[], &|_, _| ()).expect("has redundancy");
+    assert_eq!(findings.outcome, Outcome::Named, "{:?} {:?}", findings.names, findings.alternatives);
+    let followed = Followed::of(&flight, &flight.log, &[]);
+    let without = held_against(&Told::along(&followed, &|_| ()).expect("is smoothed"), "tumble", 20.0);
+    let told = Told::explained(&followed, &findings, &|_| ()).expect("is smoothed");
+    let with = held_against(&told, "tumble", 20.0);
+    println!("without {without:?}, with {with:?}, turns {:?}", told.turns);
+    assert!(without.0 > 3.0 * without.1, "{without:?}");
+    assert!(with.0 < 2.0 * with.1 && with.1 < 2.0 * without.1, "{with:?}");
+    for (outcome, why) in [
+        (Outcome::Unknown, "that no name explains"),
+        (Outcome::PartlyNamed, "that no name explains"),
+        (Outcome::Undecided, "which of several"),
+    ] {
+        findings.outcome = outcome;
+        let told = Told::explained(&followed, &findings, &|_| ()).expect("is smoothed");
+        assert!(told.csv().is_none() && told.line().contains(why), "{}", told.line());
+    }
+}
+
 #[test]
 fn an_attitude_that_does_not_settle_is_said_and_not_written() {
     let told = Told {
@@ -281,6 +328,7 @@ fn an_attitude_that_does_not_settle_is_said_and_not_written() {
         belief: None,
         kept: None,
         lost: Vec::new(),
+        withheld: None,
     };
     assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
     assert!(

@@ -90,6 +90,8 @@ pub struct Findings {
     pub none_of_these: f64,
     /// What it comes to.
     pub outcome: Outcome,
+    /// What is named by the readings, its parameters fitted.
+    pub model: Vec<Component>,
 }
 
 impl Findings {
@@ -214,6 +216,7 @@ impl Findings {
             names,
             alternatives,
             none_of_these,
+            model,
         })
     }
 }

@@ -12,7 +12,7 @@ use twin::{
 
 use crate::{
     input::{case::CaseError, log::Log, windows::Fit},
-    null::problem::Problem,
+    null::problem::{Component, Problem},
     parity::{
         codes::{self, Finding},
         course::{Course, Start},
@@ -71,18 +71,35 @@ impl Followed {
         if let Some(known) = self.smoothed.get() {
             return Ok(known);
         }
-        let about = About {
-            log: &self.log,
-            unit: &self.unit,
-            environment: &self.environment,
-            course: &self.course,
-            start: &self.start,
-        };
+        let about = self.about();
         let mut smoothed = Smoothed::of(&about, self.rests.clone(), progress)?;
         if smoothed.is_settled() {
             smoothed.hold(&self.known, &about, progress)?;
         }
         Ok(self.smoothed.get_or_init(|| smoothed))
+    }
+
+    fn about(&self) -> About<'_> {
+        About {
+            log: &self.log,
+            unit: &self.unit,
+            environment: &self.environment,
+            course: &self.course,
+            start: &self.start,
+        }
+    }
+
+    /// A motion that has settled, with these effects in the model.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn beside(&self, smoothed: &Smoothed, model: &[Component]) -> Result<Smoothed, CaseError> {
+        smoothed.beside(&self.about(), model)
+    }
+
+    /// Another smoothed motion of it, to be eliminated from a problem of [`Followed::twin`].
+    pub fn another(&self, smoothed: &Smoothed, problem: &Problem) -> Smoothing {
+        smoothed.smoothing(problem, &self.course, &self.start)
     }
 
     /// The twin along the course.

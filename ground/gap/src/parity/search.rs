@@ -236,25 +236,39 @@ impl Taken {
 impl First {
     /// These.
     pub fn of(space: &Space, model: &[Component]) -> Self {
-        let unit = space.problem.twin.unit();
-        let slopes = |(at, component): (usize, &Component)| {
-            let cause = &component.active.cause;
-            match cause.effect.page().nature {
-                Nature::Discrete => return Taken::of(space, Vec::new(), Vec::new()),
-                Nature::Spread => {
-                    let (columns, sigmas) = walk::columns(space.problem, cause).into_iter().unzip();
-                    return Taken::of(space, columns, sigmas);
-                }
-                Nature::Smooth => {}
-            }
-            let sigmas = cause.parameters(unit).iter().map(|own| own.prior_sigma).collect();
-            Taken::of(space, space.problem.slopes(model, at), sigmas)
+        let taken = |at: usize| {
+            let (columns, sigmas) = free(space.problem, model, at).into_iter().unzip();
+            Taken::of(space, columns, sigmas)
         };
         Self {
             effects: model.iter().map(|own| own.active.cause.effect.page().name).collect(),
-            taken: model.iter().enumerate().map(slopes).collect(),
+            taken: (0..model.len()).map(taken).collect(),
         }
     }
+}
+
+/// Columns of what is free of one component of a model, with their sigmas: its slopes there, or those of its law; none of one that is there or not.
+fn free(problem: &Problem, model: &[Component], at: usize) -> Vec<(Entries, f64)> {
+    let cause = &model[at].active.cause;
+    match cause.effect.page().nature {
+        Nature::Discrete => Vec::new(),
+        Nature::Spread => walk::columns(problem, cause),
+        Nature::Smooth => {
+            let parameters = cause.parameters(problem.twin.unit());
+            let sigmas = parameters.iter().map(|own| own.prior_sigma);
+            problem.slopes(model, at).into_iter().zip(sigmas).collect()
+        }
+    }
+}
+
+/// Columns of all that is free of a model, each for one of its sigmas.
+pub fn opened(problem: &Problem, model: &[Component]) -> Vec<Entries> {
+    let all = (0..model.len()).flat_map(|at| free(problem, model, at));
+    all.map(|(column, sigma)| {
+        let scaled = column.into_iter().map(|(channel, values)| (channel, values * sigma));
+        scaled.collect()
+    })
+    .collect()
 }
 
 /// Takes effects while the evidence asks for one, beside those that are in already.

@@ -11,6 +11,7 @@
 //! | 4 | [`prior`], [`smoothing`], [`banded`] | the normal matrix of the motion, its factor, its covariance |
 //! | 5 | this one | Gauss and Newton's steps with the calibration beside, until no attitude turns any more |
 //! | 6 | [`holding`], [`tied`] (by [`crate::parity::known`]) | further steps with what else is known of the motion, once it has settled without |
+//! | 7 | [`beside`] | further steps with what is named in the model |
 //!
 //! A step that does not make the energy of residuals and prior smaller is halved. Within [`LINEAR_RAD`] one factor serves several
 //! steps (the chord method: Ortega and Rheinboldt 1970, 7.1). It has settled where the last step turned nothing by more than
@@ -23,6 +24,7 @@
 
 pub mod banded;
 pub mod basis;
+mod beside;
 mod holding;
 pub mod prior;
 pub mod rests;

@@ -82,6 +82,7 @@ pub fn attitude(findings: &Findings) -> Told {
         belief: None,
         kept: None,
         lost: Vec::new(),
+        withheld: None,
     }
 }
 

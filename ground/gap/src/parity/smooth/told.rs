@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{
     input::{case::CaseError, reference::Reference},
-    null::problem::Problem,
+    null::problem::{Component, Problem},
     parity::{
         findings::Findings,
         flight::Flight,
@@ -24,7 +24,8 @@ use crate::{
             track::Beside,
         },
     },
-    parity::{smooth::covariances, space::Space},
+    parity::{search::opened, smooth::covariances, space::Space},
+    probability::outcome::Outcome,
 };
 
 /// Why nothing else that is known of a motion was looked at.
@@ -32,6 +33,12 @@ const NOT_SETTLED: &str = "the motion did not settle without it";
 
 /// Why neither a track nor a simulated trajectory was looked at along a motion that has settled.
 const HOLED: &str = "packets whose rate nobody knows were left out, and what happened meanwhile is not known";
+
+/// Why a motion is not told along which something is left.
+const UNEXPLAINED: &str = "something is there that no name explains";
+
+/// The same where a name is wanting.
+const UNDECIDED: &str = "something is there, and it is not known which of several it is";
 
 /// What an attitude is at a row.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +69,8 @@ pub struct Told {
     pub kept: Option<Vec<Kept>>,
     /// \[s\] pieces of the log along which nothing tells an attitude ([`super::Smoothed::lost`]).
     pub lost: Vec<(f64, f64)>,
+    /// Why the motion is not told although it has settled.
+    pub withheld: Option<&'static str>,
 }
 
 impl Told {
@@ -79,7 +88,33 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn along(followed: &Followed, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+        Self::beside(followed, &[], progress)
+    }
+
+    /// The same with what was found in it: effects that are named are in the model, and where something is left that no name explains,
+    /// nothing says how far the motion is bent by it, and it is not told.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn explained(followed: &Followed, findings: &Findings, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+        let mut told = Self::beside(followed, &findings.model, progress)?;
+        let why = match findings.outcome {
+            Outcome::Clean | Outcome::Recalibrate | Outcome::Named => return Ok(told),
+            Outcome::Undecided => UNDECIDED,
+            Outcome::PartlyNamed | Outcome::Unknown => UNEXPLAINED,
+        };
+        told.withheld = Some(why).filter(|_| !told.attitudes.is_empty());
+        told.attitudes.clear();
+        Ok(told)
+    }
+
+    fn beside(followed: &Followed, model: &[Component], progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
         let smoothed = followed.smoothed(progress)?;
+        let bent = match smoothed.is_settled() && !model.is_empty() {
+            true => Some(followed.beside(smoothed, model)?),
+            false => None,
+        };
+        let smoothed = bent.as_ref().unwrap_or(smoothed);
         let mut told = Self {
             attitudes: Vec::new(),
             rests: smoothed.rests.clone(),
@@ -89,21 +124,30 @@ impl Told {
             belief: smoothed.belief,
             kept: smoothed.attitudes.clone(),
             lost: Vec::new(),
+            withheld: None,
         };
         if !smoothed.is_settled() {
             return Ok(told);
         }
         let (twin, fit, reference) = (followed.twin(smoothed)?, followed.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
-        let motion = followed.motion(smoothed, &problem);
-        let space = followed.space(&problem, motion);
+        let another = bent.as_ref().map(|bent| followed.another(bent, &problem));
+        let motion = match &another {
+            Some(another) => another,
+            None => followed.motion(smoothed, &problem),
+        };
+        let free = opened(&problem, model);
+        let space = match free.is_empty() && another.is_none() {
+            true => followed.space(&problem, motion),
+            false => Space::new(&problem, motion, free.clone()),
+        };
         if let Some((_, sigma_s)) = &mut told.track {
             *sigma_s = motion.offset_sigma_s();
         }
         let log = &followed.log;
         let covariances = match followed.in_free_fall(smoothed, &problem) {
             Some(falling) => {
-                let space = Space::new(&problem, &falling, Vec::new());
+                let space = Space::new(&problem, &falling, free);
                 covariances(&space, &falling, &log.start_s)
             }
             None => covariances(&space, motion, &log.start_s),
@@ -215,6 +259,12 @@ impl Told {
     pub fn line(&self) -> String {
         let turn_deg = self.turns.last().copied().unwrap_or(f64::NAN).to_degrees();
         let norms = self.attitudes.iter().map(|own| (own.t_s, own.sigmas_b_deg.norm()));
+        if let Some(why) = self.withheld {
+            return format!(
+                "ATTITUDE  not told: {why}. The motion bends with it, and by how much its sigma, of noise and calibration, does not say; \
+                 no attitude.csv is written"
+            );
+        }
         let Some((worst_s, worst)) = norms.clone().max_by(|one, other| one.1.total_cmp(&other.1)) else {
             return format!(
                 "ATTITUDE  did not settle: step {} still turned it by {turn_deg:.2} deg, so no attitude.csv is written; a reference \
