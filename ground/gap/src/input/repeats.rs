@@ -13,7 +13,8 @@
 //! (gyros of six healthy recordings repeat 0.7 to 1.2 times as often), so a repeat has to be likelier old than not too, `(c - e)/c`.
 //! Whether the motion was followed does not matter, and of rows that were thinned it cannot be seen.
 //!
-//! Refuses nothing. Not looked at: units that send codes (the search for effects on the scatter knows their steps), parts with fewer than
+//! Refuses nothing. Beside a reference these are not looked at: units that send codes (the search for effects on the scatter knows their steps; without
+//! a reference [`crate::parity::codes`] asks of them), parts with fewer than
 //! three axes, of which one repeats too often, and magnetometers, which are often read oftener than they measure.
 
 use twin::predict::{Kind, UnitDescription};
@@ -40,6 +41,10 @@ pub struct Repeats {
     pub sigma: f64,
     /// \[nats\] against chance.
     pub nats: f64,
+    /// Samples in which all axes repeat those of the row before.
+    pub count: f64,
+    /// How many do by chance.
+    pub chance: f64,
 }
 
 /// Parts that repeat oftener than by chance; `None` of a unit that sends codes.
@@ -47,7 +52,12 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
     if unit.channels.iter().any(|channel| channel.bits.is_some()) {
         return None;
     }
-    let parts = parts(unit, &[Kind::Accelerometer, Kind::Gyro]);
+    Some(by_axes(log, unit, &[Kind::Accelerometer, Kind::Gyro]))
+}
+
+/// The same of the parts of some kinds, whether they send codes or not.
+pub fn by_axes(log: &Log, unit: &UnitDescription, kinds: &[Kind]) -> Vec<Repeats> {
+    let parts = parts(unit, kinds);
     let every = self::parts(unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
     let as_before = |back: usize| -> Vec<Vec<bool>> {
         let all = log.channels.iter();
@@ -95,11 +105,13 @@ pub fn repeats(log: &Log, unit: &UnitDescription) -> Option<Vec<Repeats>> {
             share: (count - chance).max(0.0) / samples,
             sigma: count.sqrt() / samples,
             nats,
+            count,
+            chance,
         }
     };
     let least = (parts.len().max(1) as f64 / REPEATS_CHANCE).ln();
     let all = parts.iter().map(of_part);
-    Some(all.filter(|repeats| repeats.nats > least).collect())
+    all.filter(|repeats| repeats.nats > least).collect()
 }
 
 /// Per row, whether a channel has a sample and it is that of so many rows before.

@@ -5,14 +5,18 @@
 //!
 //! - **Samples sent twice.** The three axes of a part repeat their codes together by chance rarely, and as often as those of
 //!   the other parts of its kind do. More repeats than Poisson's law allows at the largest rate among the others
-//!   ([`REPEATS_CHANCE`]) are old samples.
+//!   ([`REPEATS_CHANCE`]) are old samples; and so are more than its axes would make each by itself ([`crate::input::repeats`]), which
+//!   holds where all parts of a kind send some.
+//!   Few of them are seen where the others of the kind changed ([`moved`]). A gyro that is the only one of its plate is held against its own scatter ([`alone`]).
 //! - **Lost bits.** All codes of a channel lie a multiple of `n` apart. By chance all differences of `k` codes are even with
 //!   probability `2^(1 - k)`.
 //! - **A stuck bit** ([`bits`]). One bit is the same in all codes, however often those above it change.
 //! - **Stuck.** From some instant on all codes are one, where the described noise would change them, and where it changes those of
 //!   the other channels of its kind.
 
+mod alone;
 mod bits;
+mod moved;
 
 use nalgebra::Vector3;
 use statrs::{
@@ -22,7 +26,10 @@ use statrs::{
 use twin::predict::{Channel, Kind, UnitDescription};
 
 use crate::{
-    input::log::{Log, Series},
+    input::{
+        log::{Log, Series},
+        repeats,
+    },
     parity::garbled,
     thresholds::REPEATS_CHANCE,
 };
@@ -61,11 +68,19 @@ pub struct Look {
 
 /// Looks at all channels.
 pub fn look(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
+    look_along(log, log, unit)
+}
+
+/// The same of some rows of a log; old samples are counted in the whole of it, for nothing is fitted to them.
+pub fn look_along(log: &Log, whole: &Log, unit: &UnitDescription) -> Vec<Finding> {
     let steps = lost_bits(log, unit);
-    let mut found = stale(log, unit, &steps);
+    let mut found = stale(whole, unit, &steps);
     found.extend(of_parts(unit, &steps));
     found.extend(bits::stuck(log, unit, &steps));
     found.extend(stuck(log, unit));
+    let is_spoilt = |channel: usize| steps[channel].is_some() || found.iter().any(|own| own.channels.contains(&channel));
+    let others = [alone::stale(whole, unit, &is_spoilt), moved::stale(whole, unit, &is_spoilt)];
+    found.extend(others.into_iter().flatten());
     found
 }
 
@@ -86,7 +101,7 @@ pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
         .iter()
         .filter(|finding| finding.looks.is_empty() && finding.effect != "packet-corruption")
     {
-        let repeats = repeats(log, &finding.channels);
+        let repeated = repeated(log, &finding.channels);
         for channel in finding.channels.iter().copied() {
             let own = &mut unit.channels[channel];
             let series = &mut log.channels[channel];
@@ -97,7 +112,7 @@ pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
                     // Cut off instead of rounded, they are off by half a step.
                     own.bias_sigma = own.bias_sigma.hypot(0.5 * coarse);
                 }
-                ("stale-sample", _) => *series = series.only(|row| repeats.binary_search(&(row as u32)).is_err()),
+                ("stale-sample", _) => *series = series.only(|row| repeated.binary_search(&(row as u32)).is_err()),
                 ("stuck-channel", _) => {
                     let last = series.rows.len() - alike_at_end(series);
                     series.rows.truncate(last);
@@ -119,7 +134,7 @@ pub fn sends_codes(channel: &Channel) -> bool {
 }
 
 /// Rows whose values are those of the row before in all of these channels.
-fn repeats(log: &Log, channels: &[usize]) -> Vec<u32> {
+fn repeated(log: &Log, channels: &[usize]) -> Vec<u32> {
     let Some(first) = channels.first().map(|channel| &log.channels[*channel]) else {
         return Vec::new();
     };
@@ -146,7 +161,7 @@ fn stale(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Findin
             .filter(|part| part.len() >= AXES && part.iter().all(|channel| steps[*channel].is_none()))
             .collect();
         let counts: Vec<(usize, f64)> = (parts.iter())
-            .map(|part| (log.channels[part[0]].rows.len(), repeats(log, part).len() as f64))
+            .map(|part| (log.channels[part[0]].rows.len(), repeated(log, part).len() as f64))
             .collect();
         for (at, part) in parts.iter().enumerate() {
             let (samples, count) = counts[at];
@@ -157,20 +172,30 @@ fn stale(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Findin
             };
             let tail = Poisson::new(rate * samples as f64).map_or(1.0, |law| law.sf((count as u64).saturating_sub(1)));
             if count >= 1.0 && tail < REPEATS_CHANCE / parts.len() as f64 {
-                found.push(Finding {
-                    effect: "stale-sample",
-                    channels: part.clone(),
-                    what: format!(
-                        "{count} samples in which all axes repeat the one before; by chance {:.0}",
-                        rate * samples as f64
-                    ),
-                    step: None,
-                    looks: Vec::new(),
-                });
+                found.push(old_samples(part.clone(), count, rate * samples as f64));
             }
         }
     }
+    let kinds = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro];
+    for own in repeats::by_axes(log, unit, &kinds) {
+        let is_coded = |channel: &usize| sends_codes(&unit.channels[*channel]) && steps[*channel].is_none();
+        let is_known = found.iter().any(|known| known.channels == own.channels);
+        if !is_known && own.channels.iter().all(is_coded) {
+            found.push(old_samples(own.channels, own.count, own.chance));
+        }
+    }
     found
+}
+
+/// So many samples of a part that it sent twice, where chance makes so many.
+fn old_samples(channels: Vec<usize>, count: f64, chance: f64) -> Finding {
+    Finding {
+        effect: "stale-sample",
+        channels,
+        what: format!("{count} samples in which all axes repeat the one before; by chance {chance:.0}"),
+        step: None,
+        looks: Vec::new(),
+    }
 }
 
 /// Channels of a kind, a part each: those of one group.
@@ -337,6 +362,19 @@ mod tests {
     fn samples_that_a_part_sends_twice_are_found_at_that_part() {
         let twice = found(|index, row, value, before| if index / 3 == 2 && row % 20 == 7 { before } else { value });
         assert_eq!(told(&twice), [("stale-sample", vec![6, 7, 8])]);
+    }
+
+    #[test]
+    fn samples_that_all_parts_of_a_kind_send_twice_are_found_at_each() {
+        let is_old = |part: usize, row: usize| (row + 5 * part) % 20 == 7;
+        let twice = found(|index, row, value, before| if is_old(index / 3, row) { before } else { value });
+        let every: Vec<_> = (0..4).map(|part| ("stale-sample", (3 * part..3 * part + 3).collect())).collect();
+        assert_eq!(told(&twice), every);
+    }
+
+    #[test]
+    fn rows_that_all_parts_repeat_are_of_no_part() {
+        assert_eq!(found(|_, row, value, before| if row % 20 == 7 { before } else { value }), []);
     }
 
     #[test]

@@ -110,7 +110,7 @@ impl Findings {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn coded(flight: &Flight, withheld: &[String]) -> Result<Vec<Finding>, CaseError> {
-        let mut coded = codes::look(&flight.log, &flight.unit);
+        let mut coded = codes::look_along(&flight.log, &flight.whole, &flight.unit);
         coded.retain(|finding| withheld.iter().all(|name| name != finding.effect));
         let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
         codes::taken_out(&mut log, &mut unit, &coded);
