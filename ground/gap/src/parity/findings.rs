@@ -32,7 +32,7 @@ use crate::{
         nulls,
         packet::Motion,
         phases::shown,
-        search::{self, First, Offered, residual_of},
+        search::{self, First, Free, Offered, residual_of},
         smoothed::{Fitted, Left, Second, promises, strengths},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
@@ -90,8 +90,8 @@ pub struct Findings {
     pub none_of_these: f64,
     /// What it comes to.
     pub outcome: Outcome,
-    /// What is named by the readings, its parameters fitted.
-    pub model: Vec<Component>,
+    /// What is named by the readings, wherever it may be.
+    pub free_effects: Vec<Free>,
 }
 
 impl Findings {
@@ -175,6 +175,9 @@ impl Findings {
             is_believed
         });
         let model: Vec<Component> = causes.iter().map(|(_, (component, _))| component.clone()).collect();
+        let free_effects = (causes.iter())
+            .flat_map(|(name, (component, _))| Free::at_all(component, &name.elsewhere))
+            .collect();
         for (at, (name, _)) in causes.iter_mut().enumerate() {
             name.alone = shown::only_in(&problem, &model, at, &flight.phases);
         }
@@ -216,7 +219,7 @@ impl Findings {
             names,
             alternatives,
             none_of_these,
-            model,
+            free_effects,
         })
     }
 }

@@ -12,12 +12,13 @@ use twin::{
 
 use crate::{
     input::{case::CaseError, log::Log, windows::Fit},
-    null::problem::{Component, Problem},
+    null::problem::Problem,
     parity::{
         codes::{self, Finding},
         course::{Course, Start},
         flight::Flight,
         known::Known,
+        search::Free,
         smooth::{self, About, Smoothed, smoothing::Smoothing},
         space::Space,
         turning::Holes,
@@ -93,8 +94,8 @@ impl Followed {
     ///
     /// # Errors
     /// When the unit's description names an effect there is not.
-    pub fn beside(&self, smoothed: &Smoothed, model: &[Component]) -> Result<Smoothed, CaseError> {
-        smoothed.beside(&self.about(), model)
+    pub fn beside(&self, smoothed: &Smoothed, named: &[Free]) -> Result<Smoothed, CaseError> {
+        smoothed.beside(&self.about(), named)
     }
 
     /// Another smoothed motion of it, to be eliminated from a problem of [`Followed::twin`].

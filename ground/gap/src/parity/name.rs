@@ -2,12 +2,13 @@
 //!
 //! In: what codes say ([`crate::parity::codes`]), or what a search chose ([`crate::parity::search`]). Out: a [`Name`].
 
+use nalgebra::DVector;
 use twin::effect::{Parameter, by_name};
 
 use crate::{
     holdout::strength::Promise,
     library::hypotheses::{Hypothesis, Library},
-    null::problem::Problem,
+    null::problem::{Component, Problem},
     parity::{codes::Finding, phases::shown::Alone, search::Chosen, smoothed::Fitted, walk},
     probability::cause::Sized,
 };
@@ -39,6 +40,8 @@ pub struct Name {
     pub locality: String,
     /// Other places that the log does not tell from this one.
     pub or_at: Vec<String>,
+    /// The same, nothing there.
+    pub elsewhere: Vec<Component>,
     /// Channels it touches.
     pub channels: Vec<usize>,
     /// Against all others and nothing.
@@ -83,6 +86,7 @@ impl Name {
             },
             locality: String::new(),
             or_at: Vec::new(),
+            elsewhere: Vec::new(),
             channels: finding.channels.clone(),
             probability: BY_CODES,
             gain: None,
@@ -114,6 +118,10 @@ impl Name {
             by,
             locality: hypothesis.cause.locality.to_string(),
             or_at: places(chosen.elsewhere.iter().map(|at| &library.hypotheses[*at])),
+            elsewhere: (chosen.elsewhere.iter())
+                .map(|at| &library.hypotheses[*at])
+                .map(|other| other.component(&DVector::zeros(other.parameters.len())))
+                .collect(),
             channels: hypothesis.cause.channels(problem.twin.unit()),
             probability: chosen.probability,
             gain: Some(chosen.gain),

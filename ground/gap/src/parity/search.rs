@@ -261,14 +261,53 @@ fn free(problem: &Problem, model: &[Component], at: usize) -> Vec<(Entries, f64)
     }
 }
 
-/// Columns of all that is free of a model, each for one of its sigmas.
-pub fn opened(problem: &Problem, model: &[Component]) -> Vec<Entries> {
-    let all = (0..model.len()).flat_map(|at| free(problem, model, at));
-    all.map(|(column, sigma)| {
-        let scaled = column.into_iter().map(|(channel, values)| (channel, values * sigma));
-        scaled.collect()
-    })
-    .collect()
+/// An effect that is free, at one of the places where it may be.
+#[derive(Clone, Debug)]
+pub struct Free {
+    /// It.
+    pub component: Component,
+    /// What its parameters came to where they were fitted: they may be as large here.
+    pub sizes: DVector<f64>,
+}
+
+impl Free {
+    /// One that was fitted, at its place; where the log does not tell that from others, at none and all of them.
+    pub fn at_all(fitted: &Component, elsewhere: &[Component]) -> Vec<Self> {
+        let sizes = DVector::from_iterator(fitted.active.theta.len(), fitted.active.theta.iter().map(|own| own.abs()));
+        let free = |component: Component| Self {
+            component,
+            sizes: sizes.clone(),
+        };
+        if elsewhere.is_empty() {
+            return vec![free(fitted.clone())];
+        }
+        let mut own = fitted.clone();
+        own.active.theta.fill(0.0);
+        std::iter::once(own).chain(elsewhere.iter().cloned()).map(free).collect()
+    }
+}
+
+/// Columns of all that is free, each for what it is supposed to be or came to, whichever is more.
+pub fn opened(problem: &Problem, all: &[Free]) -> Vec<Entries> {
+    let model: Vec<Component> = all.iter().map(|own| own.component.clone()).collect();
+    let of = |(at, own): (usize, &Free)| -> Vec<Entries> {
+        let parameters = own.component.active.cause.parameters(problem.twin.unit());
+        let larger = |index: usize| {
+            let usual = parameters.get(index).map_or(1.0, |parameter| parameter.prior_sigma);
+            let size = own.sizes.get(index).copied().unwrap_or(0.0);
+            if usual > 0.0 { (size / usual).max(1.0) } else { 1.0 }
+        };
+        let is_law = own.component.active.cause.effect.page().nature == Nature::Spread;
+        let columns = free(problem, &model, at).into_iter().enumerate();
+        columns
+            .map(|(index, (column, sigma))| {
+                let size = sigma * larger(if is_law { 0 } else { index });
+                let scaled = column.into_iter().map(|(channel, values)| (channel, values * size));
+                scaled.collect()
+            })
+            .collect()
+    };
+    all.iter().enumerate().flat_map(of).collect()
 }
 
 /// Takes effects while the evidence asks for one, beside those that are in already.

@@ -4,13 +4,13 @@
 //!
 //! What is wrong in gyros, in forces or in the field bends the motion before it is known, and nothing in its covariance says so: of a gyro whose
 //! zero walks by 0.3 deg/s the attitude was off by 3.3 of its sigmas. So the effects' columns stand beside those of the calibration, each for the
-//! sigma of its parameter, in the steps as in the covariance.
+//! sigma of its parameter, in the steps as in the covariance; where the log does not tell a place from others, at all of them.
 
 use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::{Component, Problem},
     parity::{
-        search::{opened, residual_of},
+        search::{Free, opened, residual_of},
         smooth::{About, LONGEST_RAD, SETTLED_RAD, Smoothed, fit},
         space::Space,
     },
@@ -24,16 +24,17 @@ impl Smoothed {
     ///
     /// # Errors
     /// When the unit's description names an effect there is not.
-    pub fn beside(&self, about: &About, model: &[Component]) -> Result<Self, CaseError> {
+    pub fn beside(&self, about: &About, named: &[Free]) -> Result<Self, CaseError> {
         let mut bent = self.clone();
+        let model: Vec<Component> = named.iter().map(|own| own.component.clone()).collect();
         let (fit, reference) = (fit(about.log), Reference::default());
         let pieces = about.start.holes.pieces(&about.log.start_s);
         for _ in 0..MOST_STEPS {
             let twin = bent.twin(about.log, about.unit, about.environment)?;
             let problem = Problem::new(&twin, &fit, &reference);
             let motion = bent.smoothing(&problem, about.course, about.start);
-            let space = Space::new(&problem, &motion, opened(&problem, model));
-            let residual = space.project_residual(residual_of(&problem, model), &motion.prior());
+            let space = Space::new(&problem, &motion, opened(&problem, named));
+            let residual = space.project_residual(residual_of(&problem, &model), &motion.prior());
             let correction = motion.correction(&space.motion_part(&residual));
             let turn = bent.trajectory.turn(&bent.knots, &correction, &pieces);
             bent.turns.push(turn);

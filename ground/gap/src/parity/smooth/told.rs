@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{
     input::{case::CaseError, reference::Reference},
-    null::problem::{Component, Problem},
+    null::problem::Problem,
     parity::{
         findings::Findings,
         flight::Flight,
@@ -24,7 +24,7 @@ use crate::{
             track::Beside,
         },
     },
-    parity::{search::opened, smooth::covariances, space::Space},
+    parity::{search::{Free, opened}, smooth::covariances, space::Space},
     probability::outcome::Outcome,
 };
 
@@ -97,7 +97,7 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn explained(followed: &Followed, findings: &Findings, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
-        let mut told = Self::beside(followed, &findings.model, progress)?;
+        let mut told = Self::beside(followed, &findings.free_effects, progress)?;
         let why = match findings.outcome {
             Outcome::Clean | Outcome::Recalibrate | Outcome::Named => return Ok(told),
             Outcome::Undecided => UNDECIDED,
@@ -108,10 +108,10 @@ impl Told {
         Ok(told)
     }
 
-    fn beside(followed: &Followed, model: &[Component], progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
+    fn beside(followed: &Followed, named: &[Free], progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
         let smoothed = followed.smoothed(progress)?;
-        let bent = match smoothed.is_settled() && !model.is_empty() {
-            true => Some(followed.beside(smoothed, model)?),
+        let bent = match smoothed.is_settled() && !named.is_empty() {
+            true => Some(followed.beside(smoothed, named)?),
             false => None,
         };
         let smoothed = bent.as_ref().unwrap_or(smoothed);
@@ -136,7 +136,7 @@ impl Told {
             Some(another) => another,
             None => followed.motion(smoothed, &problem),
         };
-        let free = opened(&problem, model);
+        let free = opened(&problem, named);
         let space = match free.is_empty() && another.is_none() {
             true => followed.space(&problem, motion),
             false => Space::new(&problem, motion, free.clone()),
