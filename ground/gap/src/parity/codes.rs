@@ -74,13 +74,23 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
 /// The same of some rows of a log; old samples are counted in the whole of it, for nothing is fitted to them.
 pub fn look_along(log: &Log, whole: &Log, unit: &UnitDescription) -> Vec<Finding> {
     let steps = lost_bits(log, unit);
-    let mut found = stale(whole, unit, &steps);
-    found.extend(of_parts(unit, &steps));
-    found.extend(bits::stuck(log, unit, &steps));
-    found.extend(stuck(log, unit));
-    let is_spoilt = |channel: usize| steps[channel].is_some() || found.iter().any(|own| own.channels.contains(&channel));
-    let others = [alone::stale(whole, unit, &is_spoilt), moved::stale(whole, unit, &is_spoilt)];
-    found.extend(others.into_iter().flatten());
+    let mut others = of_parts(unit, &steps);
+    others.extend(bits::stuck(log, unit, &steps));
+    others.extend(stuck(log, unit));
+    // A part of which one axis stands repeats as often as the other two do.
+    let stands = stuck(whole, unit);
+    let is_spoilt = |channel: usize| {
+        let is_other = |own: &Finding| own.channels.contains(&channel);
+        steps[channel].is_some() || others.iter().chain(&stands).any(is_other)
+    };
+    let mut found = stale(whole, unit, &is_spoilt);
+    found.extend(alone::stale(whole, unit, &is_spoilt));
+    for own in moved::stale(whole, unit, &is_spoilt) {
+        if found.iter().all(|known| known.channels != own.channels) {
+            found.push(own);
+        }
+    }
+    found.extend(others);
     found
 }
 
@@ -152,13 +162,13 @@ fn repeated(log: &Log, channels: &[usize]) -> Vec<u32> {
     .collect()
 }
 
-fn stale(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Finding> {
+fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> bool) -> Vec<Finding> {
     let mut found = Vec::new();
     for kind in [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro] {
         let parts: Vec<Vec<usize>> = parts(unit, kind)
             .into_iter()
             // Coarse codes repeat by themselves.
-            .filter(|part| part.len() >= AXES && part.iter().all(|channel| steps[*channel].is_none()))
+            .filter(|part| part.len() >= AXES && part.iter().all(|channel| !is_spoilt(*channel)))
             .collect();
         let counts: Vec<(usize, f64)> = (parts.iter())
             .map(|part| (log.channels[part[0]].rows.len(), repeated(log, part).len() as f64))
@@ -178,7 +188,7 @@ fn stale(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Findin
     }
     let kinds = [Kind::Accelerometer, Kind::Magnetometer, Kind::Gyro];
     for own in repeats::by_axes(log, unit, &kinds) {
-        let is_coded = |channel: &usize| sends_codes(&unit.channels[*channel]) && steps[*channel].is_none();
+        let is_coded = |channel: &usize| sends_codes(&unit.channels[*channel]) && !is_spoilt(*channel);
         let is_known = found.iter().any(|known| known.channels == own.channels);
         if !is_known && own.channels.iter().all(is_coded) {
             found.push(old_samples(own.channels, own.count, own.chance));
@@ -368,13 +378,24 @@ mod tests {
     fn samples_that_all_parts_of_a_kind_send_twice_are_found_at_each() {
         let is_old = |part: usize, row: usize| (row + 5 * part) % 20 == 7;
         let twice = found(|index, row, value, before| if is_old(index / 3, row) { before } else { value });
-        let every: Vec<_> = (0..4).map(|part| ("stale-sample", (3 * part..3 * part + 3).collect())).collect();
+        let every: Vec<_> = (0..4)
+            .map(|part| ("stale-sample", (3 * part..3 * part + 3).collect()))
+            .collect();
         assert_eq!(told(&twice), every);
     }
 
     #[test]
+    fn a_part_of_which_one_axis_stands_sends_nothing_twice() {
+        let stands = found(|index, _, value, _| if index == 5 { 1.3 } else { value });
+        assert_eq!(told(&stands), [("stuck-channel", vec![5])]);
+    }
+
+    #[test]
     fn rows_that_all_parts_repeat_are_of_no_part() {
-        assert_eq!(found(|_, row, value, before| if row % 20 == 7 { before } else { value }), []);
+        assert_eq!(
+            found(|_, row, value, before| if row % 20 == 7 { before } else { value }),
+            []
+        );
     }
 
     #[test]
