@@ -273,7 +273,10 @@ pub struct Free {
 impl Free {
     /// One that was fitted, at its place; where the log does not tell that from others, at none and all of them.
     pub fn at_all(fitted: &Component, elsewhere: &[Component]) -> Vec<Self> {
-        let sizes = DVector::from_iterator(fitted.active.theta.len(), fitted.active.theta.iter().map(|own| own.abs()));
+        let sizes = DVector::from_iterator(
+            fitted.active.theta.len(),
+            fitted.active.theta.iter().map(|own| own.abs()),
+        );
         let free = |component: Component| Self {
             component,
             sizes: sizes.clone(),
@@ -283,7 +286,10 @@ impl Free {
         }
         let mut own = fitted.clone();
         own.active.theta.fill(0.0);
-        std::iter::once(own).chain(elsewhere.iter().cloned()).map(free).collect()
+        std::iter::once(own)
+            .chain(elsewhere.iter().cloned())
+            .map(free)
+            .collect()
     }
 }
 

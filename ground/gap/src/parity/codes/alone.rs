@@ -87,9 +87,17 @@ mod tests {
         let mut before = 0.0;
         for row in 0..1500_u32 {
             let [scatter, chance]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
-            let moved = if row < 750 { 0.0 } else { 200.0 * (0.05 * f64::from(row)).sin() };
+            let moved = if row < 750 {
+                0.0
+            } else {
+                200.0 * (0.05 * f64::from(row)).sin()
+            };
             let is_old = statrs::function::erf::erf(chance.abs() / 2f64.sqrt()) < share;
-            before = if is_old { before } else { 0.5 * (moved + noise * scatter).round().min(highest) };
+            before = if is_old {
+                before
+            } else {
+                0.5 * (moved + noise * scatter).round().min(highest)
+            };
             log.start_s.push(0.2 * f64::from(row));
             log.channels[0].rows.push(row);
             log.channels[0].values.push(before);

@@ -51,13 +51,13 @@ pub fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> boo
         kind.iter().filter_map(move |part| Some((old(part)?, part)))
     });
     found
-        .filter(|((count, chance), _)| {
-            *count >= LEAST_OLD && count * (count / chance).ln() - count + chance > least
-        })
+        .filter(|((count, chance), _)| *count >= LEAST_OLD && count * (count / chance).ln() - count + chance > least)
         .map(|((count, _), part)| Finding {
             effect: "stale-sample",
             channels: part.channels.clone(),
-            what: format!("{count} samples in which all axes repeat the one before, where all others of the kind changed"),
+            what: format!(
+                "{count} samples in which all axes repeat the one before, where all others of the kind changed"
+            ),
             step: None,
             looks: Vec::new(),
         })
@@ -97,7 +97,10 @@ impl Part {
             channels: channels.to_vec(),
             axes,
             sigmas: Vector3::new(x, y, z).map(|channel| unit.channels[channel].sigma()),
-            changes_b: changes.iter().map(|change| change.map(|change| inverse * change)).collect(),
+            changes_b: changes
+                .iter()
+                .map(|change| change.map(|change| inverse * change))
+                .collect(),
             changes,
         })
     }
@@ -108,7 +111,9 @@ impl Part {
         let others: Vec<&Self> = kind.iter().filter(|other| other.channels != self.channels).collect();
         for (row, change) in self.changes.iter().enumerate() {
             let Some(change) = change else { continue };
-            let told = others.iter().filter_map(|other| Some(self.axes * other.changes_b[row]?));
+            let told = others
+                .iter()
+                .filter_map(|other| Some(self.axes * other.changes_b[row]?));
             let told: Vec<(f64, f64)> = told.map(|told| self.off(change, &told)).collect();
             let least = told.iter().min_by(|one, other| one.0.total_cmp(&other.0));
             let Some((size, off)) = least.filter(|_| told.len() >= WITNESSES) else {
@@ -166,7 +171,11 @@ mod tests {
             for (index, before) in before.iter_mut().enumerate() {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 let value = field[index % 3] + own(index / 3, row) + 0.2 * noise;
-                *before = if is_old(index / 3, row) { *before } else { (value / 0.1).round() * 0.1 };
+                *before = if is_old(index / 3, row) {
+                    *before
+                } else {
+                    (value / 0.1).round() * 0.1
+                };
                 log.channels[index].rows.push(row);
                 log.channels[index].values.push(*before);
             }
@@ -186,13 +195,22 @@ mod tests {
         let old = |part: usize, row: u32| row == 1400 + 7 * part as u32 || row == 1450 + 7 * part as u32;
         let found = found(old, |_, _| 0.0);
         let channels: Vec<&Vec<usize>> = found.iter().map(|own| &own.channels).collect();
-        assert_eq!(channels, [&vec![0, 1, 2], &vec![3, 4, 5], &vec![6, 7, 8], &vec![9, 10, 11]]);
+        assert_eq!(
+            channels,
+            [&vec![0, 1, 2], &vec![3, 4, 5], &vec![6, 7, 8], &vec![9, 10, 11]]
+        );
     }
 
     #[test]
     fn a_part_that_lies_still_where_others_feel_something_of_their_own_sends_nothing_twice() {
         // Three of four beside a current that changes; the fourth repeats where it rests.
-        let current = |part: usize, row: u32| if part > 0 && row < 1350 { 20.0 * f64::from(row % 2) } else { 0.0 };
+        let current = |part: usize, row: u32| {
+            if part > 0 && row < 1350 {
+                20.0 * f64::from(row % 2)
+            } else {
+                0.0
+            }
+        };
         assert_eq!(found(|part, row| part == 0 && row < 1350 && row % 50 == 3, current), []);
     }
 }

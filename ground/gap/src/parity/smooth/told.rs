@@ -24,7 +24,11 @@ use crate::{
             track::Beside,
         },
     },
-    parity::{search::{Free, opened}, smooth::covariances, space::Space},
+    parity::{
+        search::{Free, opened},
+        smooth::covariances,
+        space::Space,
+    },
     probability::outcome::Outcome,
 };
 
