@@ -9,7 +9,7 @@ use emulated::{Covers, Error, Options, fly_with};
 use twin::{
     host,
     part::Nanos,
-    plant::Plant,
+    plant::{Plant, Quality},
     run::{Fault, Scheduled},
 };
 
@@ -225,6 +225,37 @@ fn dips_of_the_supply_are_counted_since_power_on() {
 /// \[bytes\] what the stack may have grown to: 60 % of its place. Most is the estimator's, while it is being built.
 const STACK_CEILING: usize = 64 * 1024 * 6 / 10;
 
+/// \[bytes\] what the status told of it.
+fn stack_used(tape: &Tape) -> usize {
+    let said = tape.said();
+    let used = said
+        .split("stack ")
+        .nth(1)
+        .and_then(|rest| rest.split_once(" of 65536 bytes"));
+    used.and_then(|(used, _)| used.parse().ok()).expect("the status tells")
+}
+
+/// Lift-off is at 30 s: six seconds of the filter of the spin.
+#[test]
+fn the_stack_stays_within_its_place_in_the_spin() {
+    let mut tape = Tape {
+        script: vec![(500 * MS, b"G_DL".to_vec()), (36_000 * MS, b"G_ST".to_vec())],
+        ..Tape::default()
+    };
+    // With noise: sensors that flicker by nothing are left out as frozen.
+    let plant = Plant::with(world("rocket"), 7, Quality::NOMINAL);
+    fly_with(&Options::default(), image(), plant, &[], 36_500 * MS, &mut tape).expect("it flies");
+    let spins = tape
+        .derived()
+        .iter()
+        .filter(|frame| frame.estimate.q_nb.is_some() && frame.estimate.rate_b[0] > 4.5)
+        .count();
+    assert!(spins > 5, "{spins} packets");
+    let used = stack_used(&tape);
+    println!("{used} bytes of stack in the spin");
+    assert!((512..=STACK_CEILING).contains(&used), "{used}");
+}
+
 #[test]
 fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
     let faults = [
@@ -246,12 +277,7 @@ fn the_stack_stays_within_its_place_through_commands_self_test_and_faults() {
         ..Tape::default()
     };
     flown(&Options::default(), &faults, 8_000, &mut tape);
-    let said = tape.said();
-    let used = said
-        .split("stack ")
-        .nth(1)
-        .and_then(|rest| rest.split_once(" of 65536 bytes"));
-    let used: usize = used.and_then(|(used, _)| used.parse().ok()).expect("the status tells");
+    let used = stack_used(&tape);
     println!("{used} bytes of stack");
     // A mark that was never painted or never read would be 0 or all of it.
     assert!((512..=STACK_CEILING).contains(&used), "{used}");
