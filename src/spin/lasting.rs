@@ -2,7 +2,7 @@
 //!
 //! The filter takes what the gyros' residuals show for white. The attitude is the integral of the rate, and has of a noise in the
 //! long run only what lies where the rate's own zero is: at the frequency of the spin, because the rate across it turns with b.
-//! Vibration lies above it: of a small rocket's 0.8 deg/s at 50 Hz the twentieth part lasts.
+//! Vibration lies above it: of a large rocket's 0.75 deg/s at 50 Hz a twentieth lasts.
 //!
 //! In: residuals of one gyro over what was expected of them. Out: which part of their noise lasts, `c`, and what of the attitude's
 //! covariance is to be given back.
