@@ -11,7 +11,7 @@
 //! [`recording`], [`screen`] and [`plain`] touch the world, and [`session`] is where they meet.
 
 use std::{
-    io::{self, IsTerminal},
+    io::{self, IsTerminal, Write},
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
@@ -129,7 +129,9 @@ pub fn run(line: impl Line, path: &Path, options: Options) -> Result<(), Error> 
         screen::run(&mut session)?;
     }
     let kept = display::size(session.model.recorded_bytes);
-    eprintln!(
+    // To a terminal that went away nothing can be said.
+    let _ = writeln!(
+        io::stderr(),
         "{kept} in {}, what was sent in {}",
         path.display(),
         recording::commands_path(path).display()
