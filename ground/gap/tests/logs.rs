@@ -203,7 +203,7 @@ mod long {
         let flight = unit.log("tumble", 60.0, 2, &off, false);
         assert!(causes(&together(&[&flight])).is_empty());
         let verdict = together(&[&bench, &flight]);
-        assert_eq!(causes(&verdict), ["lever-arm"]);
+        assert_eq!(causes(&verdict), ["lever-arm"], "{verdict:#}");
         let each = verdict["causes"][0]["by_log"].as_array().expect("each log");
         let ratio = |at: usize| each[at]["ratio"].as_f64().expect("a ratio");
         assert!(ratio(0) > 8.0 && ratio(1) < 3.0, "{each:?}");

@@ -537,7 +537,8 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
         is_same && is_elsewhere && other.gain > fit.gain - EFFECT_MARGIN
     };
     let snr = (seen.iter().find(|one| one.hypothesis == *best)).map_or(0.0, |one| one.snr);
-    let is_shown = may_be_named(hypothesis, snr);
+    // Of others whoever offers them has asked: several logs, one of them with a reference, show more than parity.
+    let is_shown = may_be_named(hypothesis, snr) || !walk::is_law(hypothesis);
     Some(Chosen {
         hypothesis: *best,
         elsewhere: fits.iter().filter(is_as_good).map(|(at, _)| *at).collect(),
