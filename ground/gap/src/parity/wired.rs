@@ -50,7 +50,7 @@ const KINDS: [Kind; 3] = [Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer];
 pub fn look(flight: &Flight, coded: &[Finding], withheld: &[String]) -> Result<Option<Finding>, CaseError> {
     let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
     codes::taken_out(&mut log, &mut unit, coded);
-    let read: Vec<Read> = KINDS.iter().map(|kind| Read::of(&log, &unit, *kind)).collect();
+    let read = KINDS.map(|kind| Read::of(&log, &unit, kind));
     let Some((cause, looks)) = likeliest(&unit, &flight.environment, &log, &read, withheld) else {
         return Ok(None);
     };
@@ -87,7 +87,9 @@ fn left(followed: &Followed) -> Result<f64, CaseError> {
 struct Read {
     channels: Vec<usize>,
     sigmas: DVector<f64>,
-    /// A column a packet that has all of them, over their noise.
+    /// Rows of the packets that have all of them.
+    rows: Vec<usize>,
+    /// A column for each of these, over their noise.
     values: DMatrix<f64>,
     moments: DMatrix<f64>,
 }
@@ -104,9 +106,9 @@ impl Read {
         };
         let packets = (0..log.start_s.len()).filter_map(|row| {
             let all: Option<Vec<f64>> = channels.iter().map(|channel| at(*channel, row)).collect();
-            all.map(DVector::from_vec)
+            Some((row, DVector::from_vec(all?)))
         });
-        let packets: Vec<DVector<f64>> = packets.collect();
+        let (rows, packets): (Vec<usize>, Vec<DVector<f64>>) = packets.unzip();
         let values = match packets.is_empty() {
             true => DMatrix::zeros(channels.len(), 0),
             false => DMatrix::from_columns(&packets),
@@ -115,6 +117,7 @@ impl Read {
             sigmas: DVector::from_iterator(channels.len(), channels.iter().map(|at| unit.channels[*at].sigma())),
             moments: &values * values.transpose(),
             channels,
+            rows,
             values,
         }
     }
@@ -152,7 +155,7 @@ fn likeliest(
     unit: &UnitDescription,
     environment: &Environment,
     log: &Log,
-    read: &[Read],
+    read: &[Read; 3],
     withheld: &[String],
 ) -> Option<(Cause, Vec<Look>)> {
     let log_s = (*log.start_s.first()?, *log.start_s.last()?);
@@ -198,13 +201,16 @@ fn likeliest(
     best.map(|(_, cause, looks)| (cause, looks))
 }
 
-/// Mean product of force and field.
-fn force_and_field(unit: &UnitDescription, read: &[Read], looks: &[Look]) -> Option<f64> {
-    let vectors = |of: usize| read[of].vectors(&|channel| axis_of(unit, looks, channel));
-    let (force, field) = (vectors(0)?, vectors(2)?);
-    let packets = force.ncols().min(field.ncols());
-    let sum: f64 = (0..packets).map(|at| force.column(at).dot(&field.column(at))).sum();
-    (packets > 0).then(|| sum / packets as f64)
+/// Mean product of force and field over the packets that have both.
+fn force_and_field(unit: &UnitDescription, [force, _, field]: &[Read; 3], looks: &[Look]) -> Option<f64> {
+    let vectors = |of: &Read| of.vectors(&|channel| axis_of(unit, looks, channel));
+    let (forces, fields) = (vectors(force)?, vectors(field)?);
+    let product = |(at, row): (usize, &usize)| {
+        let beside = field.rows.binary_search(row).ok()?;
+        Some(forces.column(at).dot(&fields.column(beside)))
+    };
+    let products: Vec<f64> = force.rows.iter().enumerate().filter_map(product).collect();
+    (!products.is_empty()).then(|| products.iter().sum::<f64>() / products.len() as f64)
 }
 
 fn axis_of(unit: &UnitDescription, looks: &[Look], channel: usize) -> Vector3<f64> {
