@@ -154,7 +154,7 @@ impl Believed {
     }
 }
 
-/// Whether a cause is no course that could be in the place of another.
+/// Whether a cause is on the scatter: it has no course of its own law that one that is left could belie.
 fn is_on_scatter(cause: &Cause) -> bool {
     twin::effect::by_name(cause.effect).is_some_and(|effect| effect.page().nature == Nature::Spread)
 }
@@ -235,5 +235,45 @@ mod tests {
         one_name(&mut causes);
         let probabilities = causes.map(|cause| cause.probability);
         assert_eq!(probabilities, [0.97, 0.97, 0.2, 0.3, 0.9, 0.4, 0.3, 0.4]);
+    }
+
+    /// What is slow and left in a channel takes a name there, then what that leaves takes the next; one elsewhere and one on the scatter stay.
+    #[test]
+    fn what_is_left_beneath_the_names_takes_those_that_it_belies_one_by_one() {
+        let explains = |effect, channels: &[usize], explained| Cause {
+            explained,
+            ..cause(effect, "all", channels, 0.9)
+        };
+        let believed = || Believed {
+            causes: vec![
+                explains("mag-set-reset", &[6], 200.0),
+                explains("hard-iron", &[6, 7], 20_000.0),
+                explains("gyro-bias", &[3], 200.0),
+                explains("gyro-bias-walk", &[6], 200.0),
+            ],
+            unnamed: Vec::new(),
+            keys: Vec::new(),
+            promises: Vec::new(),
+            trust: 1.0,
+        };
+        let left = |nats: f64, matters: f64, is_slow: bool| {
+            let mut left = Remainder::default();
+            (left.log_bayes_factor, left.matters, left.is_slow) = (nats, matters, is_slow);
+            left.channels = vec![6];
+            left
+        };
+        let names = |own: &[Cause]| own.iter().map(|cause| cause.effect).collect::<Vec<_>>();
+        let held = |beneath: &dyn Fn(&[Cause]) -> Remainder| {
+            let mut own = believed();
+            own.held_against(beneath);
+            (names(&own.causes), names(&own.unnamed))
+        };
+        let all = ["mag-set-reset", "hard-iron", "gyro-bias", "gyro-bias-walk"];
+        assert_eq!(held(&|_| left(60.0, 1.0, true)), (all[1..].to_vec(), vec![all[0]]));
+        let grows = |said: &[Cause]| left(if said.len() == 4 { 60.0 } else { 6000.0 }, 1.0, true);
+        assert_eq!(held(&grows), (all[2..].to_vec(), all[..2].to_vec()));
+        // Energy of any course belies no law, nor does what does not matter.
+        assert_eq!(held(&|_| left(6000.0, 1.0, false)), (all.to_vec(), Vec::new()));
+        assert_eq!(held(&|_| left(6000.0, 0.0, true)), (all.to_vec(), Vec::new()));
     }
 }

@@ -20,13 +20,13 @@ use crate::{
     thresholds::{REPEATS_CHANCE, SAID},
 };
 
-/// Part of a change that is another one elsewhere on the unit, and some 20 ms of a packet later.
+/// Part of a change that is another one elsewhere on the unit, and some 20 of a packet's 200 ms later. Assumed; a larger one asks for quicker turns.
 const ELSEWHERE: f64 = 0.3;
 
-/// Times the described noise that a healthy part may have.
+/// Times the described noise that a healthy part may have, as the units that are dealt a little wrong have at most (ring R0m).
 const NOISIER: f64 = 1.5;
 
-/// Chance of a repeat below which a row moved.
+/// Chance of a repeat below which a row moved: over the 3000 packets of ten minutes these add up to less than one.
 const MOVED: f64 = 1e-4;
 
 /// Other parts that must say so.
@@ -151,6 +151,11 @@ mod tests {
     /// What is said of four magnetometers with a noise of two codes in a unit that turns in the last of ten parts of the log, in rows in which
     /// a part sends the row before as told; `own` is what a part reads besides.
     fn found(is_old: impl Fn(usize, u32) -> bool, own: impl Fn(usize, u32) -> f64) -> Vec<Finding> {
+        let (log, unit) = logged(is_old, own);
+        stale(&log, &unit, &|_| false)
+    }
+
+    fn logged(is_old: impl Fn(usize, u32) -> bool, own: impl Fn(usize, u32) -> f64) -> (Log, UnitDescription) {
         let mut text = "name = \"x\"\ncycle_s = 0.2\n".to_owned();
         for index in 0..12 {
             let axis = ["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]"][index % 3];
@@ -180,7 +185,7 @@ mod tests {
                 log.channels[index].values.push(*before);
             }
         }
-        stale(&log, &unit, &|_| false)
+        (log, unit)
     }
 
     #[test]
@@ -193,7 +198,8 @@ mod tests {
     #[test]
     fn two_old_samples_in_a_turn_are_found_at_each_part() {
         let old = |part: usize, row: u32| row == 1400 + 7 * part as u32 || row == 1450 + 7 * part as u32;
-        let found = found(old, |_, _| 0.0);
+        let (log, unit) = logged(old, |_, _| 0.0);
+        let found = super::super::look(&log, &unit);
         let channels: Vec<&Vec<usize>> = found.iter().map(|own| &own.channels).collect();
         assert_eq!(
             channels,
