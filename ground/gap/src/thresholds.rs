@@ -270,7 +270,7 @@ thresholds! {
         larger: "stand-ins are believed",
         smaller: "effects that differ a little from their law are doubted",
         Assumed("a law that is a little off leaves a few parts in a hundred");
-    /// How far an effect is believed that is on in no held-out sample.
+    /// How far an effect is believed that is on in no held-out sample, or a walk of which parity shows too little.
     UNTOLD: f64 = 0.5, in "probability",
         larger: "patches are believed",
         smaller: "rare true effects are doubted",
