@@ -14,7 +14,7 @@ pub use coasting::Coasting;
 use emems::{
     derived::{self, DERIVED_BYTES, DERIVED_START, Derived},
     packet,
-    sample::Reading,
+    sample::{Reading, Sample},
     site::Site,
     unit::Settings,
 };
@@ -133,6 +133,27 @@ impl Flown {
     /// \[ns\] times between packets.
     pub fn periods(&self) -> Vec<Nanos> {
         self.packets.windows(2).map(|pair| pair[1].0 - pair[0].0).collect()
+    }
+
+    /// What the unit estimated from in each cycle: the packet's reading at the instants of its derived frame, and that frame.
+    ///
+    /// # Panics
+    /// When the packet of a frame is missing.
+    pub fn sampled(&self) -> impl Iterator<Item = (Sample, &Derived)> {
+        let of = |frame: &Derived| {
+            self.packets
+                .iter()
+                .map(|(_, own)| own)
+                .find(|own| own.counter == frame.counter)
+        };
+        self.derived.iter().map(move |frame| {
+            let sample = Sample {
+                reading: *of(frame).expect("a packet of each derived frame"),
+                start_us: frame.start_us,
+                slots_us: frame.slots_us,
+            };
+            (sample, frame)
+        })
     }
 
     /// Packets of the second `n`, counted from power-on.

@@ -1,12 +1,11 @@
 //! The attitude through a boost, smooth and spoilt: it says what it knows, and is right about it.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use emems::{
     calibration::{Ranges, Set},
     derived::Derived,
     estimate::{Estimator, KEPT_BYTES},
-    sample::{Reading, Sample},
     site::Site,
     unit::Settings,
 };
@@ -115,18 +114,8 @@ fn packets_and_derived_frames_hold_all_that_the_boost_was_estimated_from() {
         ..Settings::NOMINAL
     };
     let mut estimator = Estimator::of(&settings);
-    let readings: BTreeMap<u16, Reading> = flown
-        .packets
-        .iter()
-        .map(|(_, reading)| (reading.counter, *reading))
-        .collect();
     assert!(flown.derived.len() > 290, "{} frames", flown.derived.len());
-    for frame in &flown.derived {
-        let sample = Sample {
-            reading: readings[&frame.counter],
-            start_us: frame.start_us,
-            slots_us: frame.slots_us,
-        };
+    for (sample, frame) in flown.sampled() {
         let again = estimator.step(&sample, &frame.increments);
         assert_eq!(again, frame.estimate, "packet {}", frame.counter);
     }
@@ -240,15 +229,10 @@ fn after_a_flipped_bit_in_the_boost_the_attitude_goes_on_from_its_copy() {
         ..Settings::NOMINAL
     };
     let set = Set::compiled_in(Ranges::of(&settings));
-    let readings: BTreeMap<u16, Reading> = flown
-        .packets
-        .iter()
-        .map(|(_, reading)| (reading.counter, *reading))
-        .collect();
     let (mut estimator, mut kept) = (Estimator::of(&settings), [0; KEPT_BYTES]);
     let mut flips_s = vec![20.0, 33.0, 40.0, 50.0, 60.3, 84.0, 90.1, 105.0];
     let mut frames = Vec::new();
-    for frame in &flown.derived {
+    for (sample, frame) in flown.sampled() {
         let struck = flips_s
             .first()
             .is_some_and(|flip_s| frame.start_us as f64 * 1e-6 > *flip_s);
@@ -256,11 +240,6 @@ fn after_a_flipped_bit_in_the_boost_the_attitude_goes_on_from_its_copy() {
             flips_s.remove(0);
             estimator.restore(&set, &settings.site, Some(&kept));
         }
-        let sample = Sample {
-            reading: readings[&frame.counter],
-            start_us: frame.start_us,
-            slots_us: frame.slots_us,
-        };
         let estimate = estimator.step(&sample, &frame.increments);
         estimator.keep(&mut kept);
         frames.push(Derived { estimate, ..*frame });

@@ -1,11 +1,10 @@
 //! The filter of the spin in f32 beside the same in f64.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use emems::{
     calibration::{Ranges, Set, Temperatures},
     estimate::Estimator,
-    sample::{Reading, Sample},
     site::Site,
     spin::{Spin, Start, Surroundings, pad::Pad},
     unit::Settings,
@@ -44,21 +43,11 @@ fn apart(world: impl TruthSource + 'static) -> Apart {
         ..Settings::NOMINAL
     };
     let set = Set::compiled_in(Ranges::of(&settings));
-    let readings: BTreeMap<u16, Reading> = flown
-        .packets
-        .iter()
-        .map(|(_, reading)| (reading.counter, *reading))
-        .collect();
     let mut temperatures = Temperatures::default();
     let mut estimator = Estimator::of(&settings);
     let mut filters: Option<(Spin, reference::spin::Spin)> = None;
     let mut apart = Apart::default();
-    for frame in &flown.derived {
-        let sample = Sample {
-            reading: readings[&frame.counter],
-            start_us: frame.start_us,
-            slots_us: frame.slots_us,
-        };
+    for (sample, frame) in flown.sampled() {
         temperatures.note(&sample.reading);
         if (frame.start_us as f64) < BEGINS_S * 1e6 {
             estimator.step(&sample, &frame.increments);

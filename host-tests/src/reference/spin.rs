@@ -4,13 +4,18 @@
 //! attitude, its covariance, the rate and the gyros' biases are said. It takes counts through the unit's own calibration: those
 //! numbers are what is measured.
 
+mod forces;
+mod lasting;
+
 use emems::{
     calibration::{Axis, Measured, Set},
     increments::{Increments, Slice, slices::BEYOND},
     sample::{Kind, NO_SLOT, NOT_READ, Sample},
     spin::Start,
 };
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use self::lasting::{Lasting, least_along};
 
 /// Error states: attitude in n, spin and its derivative, rate across and its derivative, biases, what gyros see of the spin, iron, lever,
 /// biases by load.
@@ -57,17 +62,6 @@ pub struct Spin {
     changed_b: Option<Vector3<f64>>,
     shaken: f64,
     lasting: Lasting,
-}
-
-/// Densities on either side of the spin.
-struct Lasting {
-    corner: f64,
-    turned: f64,
-    passed: [[[f64; 2]; 2]; 2],
-    density: [f64; 2],
-    heard: f64,
-    told: f64,
-    told_s: f64,
 }
 
 enum Event {
@@ -135,15 +129,7 @@ impl Spin {
             force: None,
             changed_b: None,
             shaken: 0.0,
-            lasting: Lasting {
-                corner: 8.0,
-                turned: 0.0,
-                passed: [[[0.0; 2]; 2]; 2],
-                density: [1.0; 2],
-                heard: 1.0,
-                told: 0.0,
-                told_s: 0.0,
-            },
+            lasting: Lasting::NONE,
             start: start.clone(),
         }
     }
@@ -374,120 +360,6 @@ impl Spin {
         }
     }
 
-    /// Residuals and rows of the equations of force, white with variance one, and the force.
-    fn equations(
-        &self,
-        set: &Set,
-        along: &[Option<f64>; 12],
-        more: f64,
-    ) -> (Vec<(f64, SVector<f64, N>)>, Vector3<f64>) {
-        let rate_b = self.rate_b();
-        let x = Vector3::x();
-        let turned = |axis: &Vector3<f64>| axis.cross(&x);
-        let dot_b = x * self.spin_up + self.turning_b(self.across_up) + turned(&rate_b) * self.spin;
-        let [y_b, z_b] = self.across_b();
-        let largest = along
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |largest, along| largest.max(along.abs()));
-        let [of_acc, ..] = set.uncertainty;
-        let used: Vec<usize> = (0..12).filter(|k| along[*k].is_some()).collect();
-        let mut axes = DMatrix::<f64>::zeros(used.len(), 3);
-        let mut residuals = DVector::<f64>::zeros(used.len());
-        let mut rows = DMatrix::<f64>::zeros(used.len(), N);
-        for (row, k) in used.iter().enumerate() {
-            let axis = &set.acc[*k];
-            let along = along[*k].unwrap_or_default();
-            let n_b = axis_b(axis);
-            let variance = square(axis.noise.into())
-                + square(0.02)
-                + square(f64::from(of_acc.scale) * along)
-                + square(f64::from(of_acc.direction) * largest)
-                + more;
-            let by_sd = 1.0 / variance.sqrt();
-            let place_b: Vector3<f64> = set.place_b[k / 3].cast();
-            let far_b = place_b * (1.0 + self.lever);
-            // Derivative of `w' x r + w x (w x r)`, where an axis across the spin turns with b.
-            let by_rate = |axis: &Vector3<f64>, dot: &Vector3<f64>| {
-                dot.cross(&far_b) + axis.cross(&rate_b.cross(&far_b)) + rate_b.cross(&axis.cross(&far_b))
-            };
-            let felt = |place_b: &Vector3<f64>| dot_b.cross(place_b) + rate_b.cross(&rate_b.cross(place_b));
-            let seen = [
-                (SPIN, by_rate(&x, &turned(&rate_b))),
-                (SPIN_UP, x.cross(&far_b)),
-                (ACROSS, by_rate(&y_b, &(turned(&y_b) * self.spin))),
-                (ACROSS + 1, by_rate(&z_b, &(turned(&z_b) * self.spin))),
-                (ACROSS_UP, y_b.cross(&far_b)),
-                (ACROSS_UP + 1, z_b.cross(&far_b)),
-                (LEVER, felt(&place_b)),
-            ];
-            for (state, seen_b) in seen {
-                rows[(row, state)] = n_b.dot(&seen_b) * by_sd;
-            }
-            residuals[row] = (along - n_b.dot(&felt(&far_b))) * by_sd;
-            axes.row_mut(row).copy_from(&(n_b.transpose() * by_sd));
-        }
-        let inverse = (axes.transpose() * &axes).try_inverse().expect("axes span space");
-        let force = &inverse * axes.transpose() * &residuals;
-        let beside = DMatrix::identity(used.len(), used.len()) - &axes * &inverse * axes.transpose();
-        let eigen = beside.symmetric_eigen();
-        let free = (0..used.len()).filter(|k| eigen.eigenvalues[*k] > 0.5);
-        let equation = |k: usize| {
-            let by = eigen.eigenvectors.column(k);
-            let row = rows.tr_mul(&by);
-            (
-                by.dot(&residuals),
-                SVector::<f64, N>::from_iterator(row.iter().copied()),
-            )
-        };
-        (free.map(equation).collect(), Vector3::new(force[0], force[1], force[2]))
-    }
-
-    fn take_force(&mut self, set: &Set, acc_p: &[[i16; 3]; 4]) {
-        let counts = acc_p.as_flattened();
-        let codes = emems::sensor::lis331hh::CODES;
-        let along = std::array::from_fn(|k| {
-            let within = counts[k] > *codes.start() && counts[k] < *codes.end();
-            within.then(|| f64::from(set.acc[k].value(counts[k], 0.0)))
-        });
-        let mut more = square(4.0 * 0.006 * self.spin * self.spin_up * 0.045);
-        let (_, force_b) = self.equations(set, &along, more);
-        if let Some((before_us, before_b)) = self.force.replace((self.at_us, force_b)) {
-            let change_b = force_b - before_b;
-            let dt_s = (self.at_us - before_us) as f64 * 1e-6;
-            let bend_b = change_b - self.changed_b.replace(change_b).unwrap_or(change_b);
-            self.shaken += (bend_b.norm_squared() / 18.0 - self.shaken) / 2.0;
-            more += square(0.006 * change_b.norm() / dt_s) + 0.55 * self.shaken;
-        }
-        let (equations, _) = self.equations(set, &along, more);
-        let scale = self.usual.max(1.0);
-        let off = |of: &Self| {
-            let each = equations.iter().map(|(residual, h)| {
-                let (of_state, left) = of.look(h, *residual);
-                left * left / (of_state + scale)
-            });
-            each.sum::<f64>() / equations.len() as f64
-        };
-        let mean = off(self);
-        let surprising = if self.seen { f64::MAX } else { 4.0 };
-        self.usual += (scale * mean.min(4.0) - self.usual) / 20.0;
-        if mean > surprising && self.surprised_s <= 0.0 {
-            self.surprised_s = 0.6;
-            self.p[(SPIN_UP, SPIN_UP)] += 360.0;
-            self.p[(SPIN, SPIN)] += 1.44;
-            if off(self) > surprising {
-                for axis in 0..2 {
-                    self.p[(ACROSS_UP + axis, ACROSS_UP + axis)] += 1.0;
-                    self.p[(ACROSS + axis, ACROSS + axis)] += 0.0025;
-                }
-            }
-        }
-        let scale = scale * off(self).max(1.0);
-        for (residual, h) in &equations {
-            self.update(h, *residual, scale, GATE);
-        }
-    }
-
     fn take_field(&mut self, set: &Set, measured: &Measured, plate: usize) -> bool {
         let dcm = Rotation3::from(self.q_nb).into_inner();
         let field_n: Vector3<f64> = self.start.surroundings.field_n_ut.cast();
@@ -540,70 +412,4 @@ impl Spin {
             open(&mut self.p, Matrix3::from_diagonal_element(0.09));
         }
     }
-
-    fn give_back(&mut self, set: &Set) {
-        let told = std::mem::take(&mut self.lasting.told);
-        let lasted_s = std::mem::take(&mut self.lasting.told_s);
-        if told == 0.0 || lasted_s == 0.0 {
-            return;
-        }
-        let density = lasted_s / told;
-        self.lasting.corner = (0.2 / density.sqrt()).sqrt();
-        let part = (2.0 * (self.lasting.density[0] * self.lasting.density[1]).sqrt()).min(1.0);
-        let sampled = 0.5 * square(set.gyro[least_along(set)].noise.into());
-        let lasts = (part * self.rough).max(sampled);
-        if lasts >= self.rough {
-            return;
-        }
-        let nose_n = self.nose_n();
-        let back =
-            (Matrix3::identity() - nose_n * nose_n.transpose()) * ((1.0 - lasts / self.rough) * density * lasted_s);
-        let of_rate: Matrix2<f64> = self.p.fixed_view::<2, 2>(ACROSS, ACROSS).into_owned();
-        let both = self.p.fixed_view::<3, 2>(0, ACROSS).into_owned();
-        let by_rate = both * of_rate.try_inverse().expect("rates are not known for sure");
-        let given = self.p.fixed_view::<3, 3>(0, 0) - by_rate * both.transpose();
-        // The whole congruence: `a <- a - A (1 + k A)^-2 (a - by_rate u) / 2`.
-        let a = back * given.try_inverse().expect("attitude is not known for sure");
-        let slow = (Matrix3::identity() + a / (self.lasting.corner * lasted_s))
-            .try_inverse()
-            .expect("positive");
-        let less = a * slow * slow * 0.5;
-        let mut s = SMatrix::<f64, N, N>::identity();
-        s.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() - less));
-        s.fixed_view_mut::<3, 2>(0, ACROSS).copy_from(&(less * by_rate));
-        self.p = s * self.p * s.transpose();
-    }
-}
-
-impl Lasting {
-    fn hear(&mut self, off: f64, spin: f64, phase: f64, lasts_s: f64) {
-        self.turned += self.corner * lasts_s;
-        let width = self.corner * lasts_s / 6.0;
-        self.heard = (self.heard + width).min(1.5);
-        let mut squares = [0.0; 2];
-        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-            let (sin, cos) = (phase + sign * self.turned).sin_cos();
-            for (part, turned) in [cos, sin].into_iter().enumerate() {
-                let [first, second] = [0, 1].map(|pole| self.passed[side][pole][part]);
-                let first = first + off * width.sqrt() * turned - width * first;
-                let second = second + width * (first - second);
-                self.passed[side][0][part] = first;
-                self.passed[side][1][part] = second;
-                squares[side] += 4.0 * second * second;
-            }
-        }
-        let (above, below) = if spin > 0.0 { (0, 1) } else { (1, 0) };
-        if spin.abs() < 1.5 * self.corner {
-            squares[below] = squares[above];
-        }
-        for (density, square) in self.density.iter_mut().zip(squares) {
-            *density += width / self.heard * (square - *density);
-        }
-    }
-}
-
-/// The gyro that sees least of the spin.
-fn least_along(set: &Set) -> usize {
-    let along = |k: &usize| set.gyro[*k].axis_b.x.abs();
-    (0..4).min_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default()
 }
