@@ -13,12 +13,11 @@
 //! and leaves `|1 - H|^2 = 1/2` of a noise there; nearer to the spin it has taken the noise for the rate. Between both sides the
 //! logarithm of a density is taken for straight, so that `c = 2 sqrt(a b)`. Motion only adds to it; more than white is not said.
 //!
-//! **What is given back.** Over a packet's time `T` the attitude across the spin has gained `R T` where it gained `c R T`: too much
-//! is `D = (1 - c) R T (1 - x x')`. Noise that does not last still moves the attitude for `1/w`, so that of a direction that the
-//! field corrects as fast nothing is given back: with `A = D P^-1` and `k = 1 / (w T)`, `A (1 + k A)^-2` in place of `A`.
-//! `P <- S P S'` with `S = 1 - A (1 + k A)^-2 / 2` leaves a covariance whatever the numbers are. It is done to what of the attitude
-//! is not of the rate at this moment, whose noise is all there: `P` of the attitude given the rate across, and nothing of what the two
-//! have in common changes.
+//! **What is given back.** In a packet's time `T` the filter adds `R T` to the attitude's variance across the spin, where `c R T` is
+//! right: `D = (1 - c) R T (1 - x x')` is too much. Noise that does not last still moves the attitude for a time of `1/w`. Where the field
+//! corrects a direction as fast as that, nothing is given back: with `A = D P^-1` and `k = 1 / (w T)`, `A (1 + k A)^-2` stands for `A`.
+//! `P <- S P S'` with `S = 1 - A (1 + k A)^-2 / 2` stays a covariance whatever the numbers are. `P` is here that of the attitude
+//! given the rate across: the rate's noise of this moment is all there, and what the two have in common does not change.
 
 use nalgebra::{ComplexField, Matrix3};
 
