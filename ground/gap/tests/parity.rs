@@ -156,7 +156,26 @@ fn a_log_without_windows_is_parted_in_the_middle_and_a_healthy_one_is_given_no_n
     assert!(others.all(|row| row.smoothed.is_some()), "did not settle");
     let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is analysed");
     let (_, screen) = texts.iter().find(|(name, _)| name == "all.txt").expect("a screen");
-    assert!(screen.contains("WINDOWS"), "{screen}");
+    assert!(screen.contains("WINDOWS none in case.toml"), "{screen}");
+}
+
+#[test]
+fn windows_that_take_turns_are_not_used_for_no_motion_is_smoothed_across_what_lies_between() {
+    let folder = flown("tumble", 20.0, 3, &[], |_| true);
+    let open = |windows: &str| {
+        without_windows(&folder);
+        let file = folder.path().join("case.toml");
+        let text = fs::read_to_string(&file).expect("a case");
+        fs::write(&file, text + windows).expect("writes");
+        let flight = Flight::open(folder.path()).expect("opens");
+        let held = flight.held.as_ref().map_or(0, |held| held.start_s.len());
+        (flight.windows.is_some(), flight.log.start_s.len(), held)
+    };
+    let one = open("[windows]\nfit = [[0.0, 80.0]]\nhold = [[80.0, 120.0]]\n");
+    assert_eq!(one, (false, 400, 200));
+    // As a flight's folder has them for its reference.
+    let turns = open("[windows]\nfit = [[0.0, 30.0], [60.0, 90.0]]\nhold = [[30.0, 60.0], [90.0, 120.0]]\n");
+    assert_eq!(turns, (true, 300, 300));
 }
 
 #[test]

@@ -2,8 +2,8 @@
 //!
 //! In: the folder of a case. Out: [`Flight`]. A `motion` that is there is not opened.
 //!
-//! A log whose file has no `[windows]` is parted in the middle: the motion of each half is smoothed by itself, and a smoother does not
-//! bridge the minutes that windows which take turns leave out.
+//! A log whose file has no `[windows]`, or has them in pieces that take turns, is parted in the middle: the motion of each half is
+//! smoothed by itself, and a smoother does not bridge the minutes that lie between two pieces.
 //!
 //! Refuses, naming file and key, what any case is refused for, and tables, which are nothing but commanded motion.
 
@@ -57,7 +57,7 @@ pub struct Flight {
     pub unturned: usize,
     /// Where such rows are.
     pub holes: Holes,
-    /// How it was parted where its file does not say it.
+    /// How it was parted where its file does not say it, or has pieces that a smoother does not bridge.
     pub windows: Option<Windows>,
 }
 
@@ -75,7 +75,10 @@ impl Flight {
         let unit = UnitDescription::open(&opened.path(&opened.text.unit))?;
         let environment = environment_of(&opened, &unit)?;
         let log = opened.log(&columns_of(&unit), unit.cycle_s)?;
-        let parted = opened.text.windows.is_none().then(|| halves(&log));
+        let is_whole = |spans: &[Span]| spans.len() < 2;
+        let is_told =
+            opened.text.windows.is_some() && is_whole(opened.windows.fit()) && is_whole(opened.windows.hold());
+        let parted = (!is_told).then(|| halves(&log));
         let windows = parted.as_ref().unwrap_or(&opened.windows);
         let rows = rows(&log, windows.fit());
         if rows.len() < LEAST_ROWS {

@@ -70,14 +70,17 @@ fn unturned(flight: &Flight) -> String {
     }
 }
 
-/// How the log was parted where its file does not say it, in a line.
+/// How the log was parted where its file does not say it, or says it in pieces, in a line.
 fn parted(flight: &Flight) -> String {
     let Some(windows) = &flight.windows else {
         return String::new();
     };
+    let why = match flight.opened.text.windows {
+        None => "none in case.toml",
+        Some(_) => "those of case.toml are in pieces, and no motion is smoothed across what lies between",
+    };
     if windows.hold().is_empty() {
-        return "WINDOWS none in case.toml, and the log is too short to be parted: nothing judges what is named\n"
-            .to_owned();
+        return format!("WINDOWS {why}; the log is too short to be parted: nothing judges what is named\n");
     }
     let spans = |spans: &[Span]| {
         let spans: Vec<String> = (spans.iter())
@@ -86,7 +89,7 @@ fn parted(flight: &Flight) -> String {
         spans.join(", ")
     };
     format!(
-        "WINDOWS none in case.toml; parted in the middle: fitted {} s, held out {} s\n",
+        "WINDOWS {why}; parted in the middle: fitted {} s, held out {} s\n",
         spans(windows.fit()),
         spans(windows.hold())
     )
