@@ -1,29 +1,46 @@
 //! The gradient of the field where the body moves: what magnetometers feel of it.
 //!
 //! In: the twin, how fields err ([`SlowErrors`]). Out: a column for each of its five components, for it is symmetric and
-//! has no trace, about the middle of the places where the unit was. None of a field that is stated as exact. It is
-//! that at the centre of the body; what the places of the sensors about it add is not in them.
+//! has no trace, about the middle of the places where the unit was. None of a field that is stated as exact. A magnetometer
+//! is where the accelerometer of its plate is, for only the places of these are described.
+//!
+//! Where the case does not say how large it may be, it makes the field differ by the sigma that is stated of it, over the places where
+//! the magnetometers were: a field that is known to half a microtesla is not known to be more uniform than that. On recordings of
+//! BROAD, carried over some half a metre, that is the 1 to 2 uT/m which was found there.
 
-use nalgebra::Matrix3;
-use twin::predict::{Column, Feel, Kind, Twin};
+use nalgebra::{Matrix3, Vector3};
+use twin::predict::{Column, Feel, Kind, Twin, UnitDescription};
 
 use crate::input::case::SlowErrors;
 
+/// What a magnetometer felt, and where it was.
+struct Felt {
+    channel: usize,
+    feels: Vec<Feel>,
+    /// \[m\] in n, from the middle of the places where the unit was.
+    places_n: Vec<Vector3<f64>>,
+}
+
 /// What each magnetometer feels of a gradient of one uT/m.
 pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
-    let sigma = errors.field_gradient_sigma_ut_m;
-    let all = twin.unit().channels.iter().enumerate();
-    let magnetometers: Vec<(usize, Vec<Feel>)> = (all.filter(|(_, own)| own.sensor == Kind::Magnetometer))
-        .map(|(channel, _)| (channel, twin.feels(channel)))
-        .collect();
-    let is_told = |(_, feels): &(usize, Vec<Feel>)| {
-        feels
-            .iter()
-            .any(|feel| feel.position_n.iter().all(|value| value.is_finite()))
+    let unit = twin.unit();
+    let magnetometers = (0..unit.channels.len()).filter(|channel| unit.channels[*channel].sensor == Kind::Magnetometer);
+    let felt = |channel: usize| {
+        let place_b = place_b(unit, channel);
+        let feels = twin.feels(channel);
+        let places_n = (feels.iter())
+            .map(|feel| feel.position_n + feel.q_nb * place_b)
+            .collect();
+        Felt {
+            channel,
+            feels,
+            places_n,
+        }
     };
-    if sigma <= 0.0 || !magnetometers.iter().any(is_told) {
+    let magnetometers: Vec<Felt> = magnetometers.map(felt).collect();
+    let Some(sigma) = sigma(&magnetometers, errors) else {
         return Vec::new();
-    }
+    };
     let parts = [
         ("xx", [(0, 0, 1.0), (2, 2, -1.0)]),
         ("yy", [(1, 1, 1.0), (2, 2, -1.0)]),
@@ -34,10 +51,11 @@ pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
     let column = |(name, part): (&str, [(usize, usize, f64); 2])| {
         let mut gradient = Matrix3::zeros();
         (part.iter()).for_each(|(row, column, value)| gradient[(*row, *column)] = *value);
-        let of_channel = |(channel, feels): &(usize, Vec<Feel>)| {
-            let axis_b = twin.unit().channels[*channel].axis_b;
-            let felt = |feel: &Feel| axis_b.dot(&feel.to_b(gradient * feel.position_n));
-            (*channel, feels.iter().map(felt).collect())
+        let of_channel = |felt: &Felt| {
+            let axis_b = unit.channels[felt.channel].axis_b;
+            let values = felt.feels.iter().zip(&felt.places_n);
+            let values = values.map(|(feel, place_n)| axis_b.dot(&feel.to_b(gradient * place_n)));
+            (felt.channel, values.collect())
         };
         Column {
             name: format!("field_gradient_{name}"),
@@ -46,4 +64,25 @@ pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
         }
     };
     parts.into_iter().map(column).collect()
+}
+
+/// [uT/m] of each component: as stated, or what makes the field's own sigma at the root mean square of the places; none where no place is told or
+/// the field is exact.
+fn sigma(magnetometers: &[Felt], errors: &SlowErrors) -> Option<f64> {
+    let places = magnetometers.iter().flat_map(|felt| &felt.places_n);
+    let squares: Vec<f64> = places
+        .map(|place_n| place_n.norm_squared())
+        .filter(|square| square.is_finite())
+        .collect();
+    let reach_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    let stated = errors.field_gradient_sigma_ut_m;
+    let sigma = stated.unwrap_or(errors.field_sigma_ut / reach_m);
+    (reach_m > 0.0 && sigma > 0.0).then_some(sigma)
+}
+
+/// \[m\] in b of the plate's accelerometer, or of the magnetometer itself where the plate has none.
+fn place_b(unit: &UnitDescription, magnetometer: usize) -> Vector3<f64> {
+    let own = &unit.channels[magnetometer];
+    let on_plate = |other: &&twin::predict::Channel| other.group == own.group && other.sensor == Kind::Accelerometer;
+    unit.channels.iter().find(on_plate).unwrap_or(own).lever_m
 }

@@ -16,9 +16,6 @@ const ATTITUDE_CORRELATION_S: f64 = 20.0;
 /// \[uT\] and \[s\] of a field error beside a gradient, and of one that has to hold the gradient too.
 const FIELD: [(f64, f64); 2] = [(0.15, 10.0), (0.3, 25.0)];
 
-/// [uT/m] each component of the field's gradient in a room.
-const GRADIENT_UT_M: f64 = 1.5;
-
 /// \[s\] a longer correlation time is a constant in any log.
 const LONGEST_S: f64 = 1e6;
 
@@ -33,8 +30,10 @@ pub struct SlowErrors {
     pub field_wander_sigma_ut: f64,
     /// \[s\] over which that stays alike (Ornstein-Uhlenbeck).
     pub field_correlation_s: f64,
-    /// [uT/m] how much it changes with the place, each component.
-    pub field_gradient_sigma_ut_m: f64,
+    /// \[uT\] how well it is known, each axis.
+    pub field_sigma_ut: f64,
+    /// [uT/m] how much it changes with the place, each component; otherwise as much as its sigma lets it.
+    pub field_gradient_sigma_ut_m: Option<f64>,
 }
 
 /// Sizes from which what is not explained matters.
@@ -112,10 +111,8 @@ pub(super) fn allowance(opened: &Opened) -> Result<(SlowErrors, Bars), CaseError
         // What is known of the field bounds what it may do unseen.
         field_wander_sigma_ut: (environment.field_wander_sigma_ut).unwrap_or(wander_ut.min(environment.field_sigma_ut)),
         field_correlation_s: environment.field_correlation_s.unwrap_or(alike_s),
-        field_gradient_sigma_ut_m: gradient.unwrap_or(match environment.field_sigma_ut > 0.0 {
-            true => GRADIENT_UT_M,
-            false => 0.0,
-        }),
+        field_sigma_ut: environment.field_sigma_ut,
+        field_gradient_sigma_ut_m: gradient,
     };
     let bars = Bars {
         attitude_deg: matters.attitude_deg.unwrap_or(MATTERS_DEG),

@@ -219,7 +219,7 @@ fn slow_errors_and_bars_are_read_or_have_the_usual_values() {
     // What is exact errs by nothing.
     assert_eq!(usual.slow.attitude_sigma_rad, 0.0);
     assert_eq!(
-        (usual.slow.field_wander_sigma_ut, usual.slow.field_gradient_sigma_ut_m),
+        (usual.slow.field_wander_sigma_ut, usual.slow.field_sigma_ut),
         (0.0, 0.0)
     );
     let room = opened("case.toml", Some(&with("field_sigma_ut = 0.8", ""))).expect("opens");
@@ -227,7 +227,10 @@ fn slow_errors_and_bars_are_read_or_have_the_usual_values() {
         (room.slow.field_wander_sigma_ut, room.slow.field_correlation_s),
         (0.15, 10.0)
     );
-    assert_eq!(room.slow.field_gradient_sigma_ut_m, 1.5);
+    assert_eq!(
+        (room.slow.field_sigma_ut, room.slow.field_gradient_sigma_ut_m),
+        (0.8, None)
+    );
     assert_eq!(room.slow.attitude_correlation_s, 20.0);
     let stated = with(
         "field_wander_sigma_ut = 0.4\nfield_correlation_s = 7.0\nfield_gradient_sigma_ut_m = 0.2",
@@ -237,7 +240,7 @@ fn slow_errors_and_bars_are_read_or_have_the_usual_values() {
     let slow = stated.slow;
     assert_eq!((slow.attitude_sigma_rad, slow.attitude_correlation_s), (0.004, 9.0));
     assert_eq!((slow.field_wander_sigma_ut, slow.field_correlation_s), (0.4, 7.0));
-    assert_eq!(slow.field_gradient_sigma_ut_m, 0.2);
+    assert_eq!(slow.field_gradient_sigma_ut_m, Some(0.2));
     assert_eq!((stated.bars.attitude_deg, stated.bars.gap_sigma), (2.0, 0.3));
 }
 

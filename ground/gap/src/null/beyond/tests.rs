@@ -100,7 +100,8 @@ fn worth_in(
         attitude_correlation_s: 20.0,
         field_wander_sigma_ut: 0.0,
         field_correlation_s: 10.0,
-        field_gradient_sigma_ut_m: gradient_ut_m,
+        field_sigma_ut: 0.0,
+        field_gradient_sigma_ut_m: Some(gradient_ut_m),
     };
     let model = [Component { active, span }];
     Beyond::of(&problem, &errors).map_or(f64::INFINITY, |beyond| beyond.nats(&model, 0))
@@ -128,7 +129,7 @@ fn a_gradient_that_the_room_may_have_is_no_effect() {
         )
     };
     let [unknown, none] = [1.5, 0.0].map(gradient);
-    // Two sigmas of it, but for what the places of the four plates add, which the columns do not have.
+    // Two sigmas of it.
     assert!(unknown < 0.02 * none && none > 1000.0, "{unknown} {none}");
 }
 
