@@ -24,20 +24,27 @@ pub struct Instrument {
     pub places: Vec<f64>,
 }
 
-/// Where in the record each octave starts, as a part of its length, and with which sign.
+/// Where in the record each octave starts, as a part of its length, and its size with its sign.
 #[derive(Clone, Debug)]
 pub struct Played {
-    starts: Vec<(f64, f64)>,
+    octaves: Vec<(f64, f64)>,
+    /// Standard deviation of them all.
+    sigma: f64,
 }
 
 impl Played {
     /// Draws.
     pub fn draw(random: &mut Xoshiro256PlusPlus) -> Self {
         let mut between = |low: f64, high: f64| Uniform::new(low, high).map_or(low, |law| law.sample(&mut *random));
-        let starts = (0..OCTAVES)
-            .map(|_| (between(0.0, 1.0), between(-1.0, 1.0).signum()))
-            .collect();
-        Self { starts }
+        let variance = |octave: i32| 0.5f64.powi(octave);
+        let octaves = (1..=OCTAVES).map(|octave| {
+            let (start, sign) = (between(0.0, 1.0), between(-1.0, 1.0).signum());
+            (start, sign * variance(octave).sqrt())
+        });
+        Self {
+            octaves: octaves.collect(),
+            sigma: (1..=OCTAVES).map(variance).sum::<f64>().sqrt(),
+        }
     }
 }
 
@@ -51,16 +58,26 @@ impl Instrument {
     /// One standard deviation of error of the reference, more or less, at a sample.
     fn error(&self, sample: usize, played: &Played) -> f64 {
         let length = self.record.len() as f64;
-        let octaves = (1i32..).zip(&played.starts);
-        let (sum, variance) = octaves.fold((0.0, 0.0), |(sum, variance), (octave, (start, sign))| {
-            let place = (start * length + self.places[sample] * 0.5f64.powi(octave)).rem_euclid(length);
-            let (below, part) = (place as usize % self.record.len(), place.fract());
-            let above = (below + 1) % self.record.len();
-            let value = self.record[below] * (1.0 - part) + self.record[above] * part;
-            let own = 0.5f64.powi(octave);
-            (sum + sign * own.sqrt() * value, variance + own)
-        });
-        sum / variance.sqrt()
+        let (mut sum, mut place) = (0.0, self.places[sample]);
+        for (start, size) in &played.octaves {
+            place *= 0.5;
+            let at = wrapped(start * length + place, length);
+            let below = (at as usize).min(self.record.len() - 1);
+            let above = if below + 1 < self.record.len() { below + 1 } else { 0 };
+            let beyond = at - below as f64;
+            sum += size * (self.record[below] * (1.0 - beyond) + self.record[above] * beyond);
+        }
+        sum / played.sigma
+    }
+}
+
+/// A place in a record that begins anew where it ends. Most are within it or one length beyond, and a remainder is dear.
+fn wrapped(place: f64, length: f64) -> f64 {
+    let near = if place < length { place } else { place - length };
+    if (0.0..length).contains(&near) {
+        near
+    } else {
+        near.rem_euclid(length)
     }
 }
 
