@@ -75,14 +75,13 @@ impl Model {
         let of_effect = |(at, value): (usize, &f64)| (are_held && at >= problem.reference.len()).then_some(*value);
         let held: Vec<Option<f64>> = values.iter().enumerate().map(of_effect).collect();
         let values = DVector::from_vec(values);
-        let about_zero: Vec<DVector<f64>> = columns
-            .iter()
-            .zip(problem.residuals(&components))
-            .map(|(columns, residual)| residual + &columns.effects * &values)
+        let readings = problem.predictions(&components);
+        let about_zero: Vec<DVector<f64>> = (columns.iter().zip(&readings).enumerate())
+            .map(|(channel, (columns, readings))| problem.left_by(channel, readings) + &columns.effects * &values)
             .collect();
         let joint = Joint::new(columns, &sigmas);
         let fitted = joint.fit_beside(&about_zero, &held);
-        let predicted = problem.predictions(&components).into_iter().enumerate();
+        let predicted = readings.into_iter().enumerate();
         let predicted = predicted.map(|(channel, readings)| finished(problem, readings, &fitted, channel));
         let mut predicted: Vec<Vec<f64>> = predicted.collect();
         for (channel, courses) in followed {

@@ -273,7 +273,11 @@ impl<'a> Problem<'a> {
 
     /// The same of one channel, with what is kept from others.
     pub fn residual_with(&self, channel: usize, model: &[Component], memory: &mut Memory) -> DVector<f64> {
-        let predicted = self.predict_with(channel, model, memory);
+        self.left_by(channel, &self.predict_with(channel, model, memory))
+    }
+
+    /// Measured minus these readings at every row of the log of one channel, in units of noise.
+    pub fn left_by(&self, channel: usize, predicted: &[f64]) -> DVector<f64> {
         let frame = &self.frames[channel];
         let samples = frame.series.rows.iter().zip(&frame.series.values);
         let errors = samples.map(|(row, value)| value - predicted[*row as usize]);
