@@ -5,12 +5,15 @@
 
 use std::cell::RefCell;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::null::{
     evidence::Screen,
     problem::{Frame, Problem},
 };
+
+/// Columns that are taken from colour to colour together: what happens at a sample is then read once for all of them.
+const BLOCK: usize = 32;
 
 /// A column: for each channel it touches, its values in units of noise.
 pub type Entries = Vec<(usize, DVector<f64>)>;
@@ -45,11 +48,18 @@ impl Products {
 
     /// After the problem's frames were these.
     pub fn reframe(&mut self, problem: &Problem, before: &[Frame]) {
-        for (place, column) in self.columns.iter_mut().enumerate() {
-            for (channel, values) in column.iter_mut() {
-                *values = problem.frames[*channel].white(before[*channel].physical(values));
+        for (channel, (frame, before)) in problem.frames.iter().zip(before).enumerate() {
+            let columns = self.columns.iter_mut().flatten();
+            let own = columns.filter(|(of, _)| *of == channel).map(|(_, values)| values);
+            let mut own: Vec<&mut DVector<f64>> = own.collect();
+            for block in own.chunks_mut(BLOCK) {
+                let white = DMatrix::from_fn(frame.weights.len(), block.len(), |row, at| block[at][row]);
+                let anew = frame.whites(before.physical(white));
+                (block.iter_mut().zip(anew.column_iter())).for_each(|(own, anew)| own.copy_from(&anew));
             }
-            self.open[place] = open_part(problem, column);
+        }
+        for (open, column) in self.open.iter_mut().zip(&self.columns) {
+            *open = open_part(problem, column);
         }
         self.known.get_mut().iter_mut().for_each(|row| row.fill(f64::NAN));
     }

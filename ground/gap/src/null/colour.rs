@@ -100,21 +100,29 @@ impl Colour {
         }
     }
 
-    /// A column in units of noise, white.
-    pub fn applied(&self, column: &DVector<f64>) -> DVector<f64> {
-        if column.iter().all(|value| *value == 0.0) {
-            return column.clone();
+    /// Columns in units of noise, white.
+    pub fn applied(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        if columns.iter().all(|value| *value == 0.0) {
+            return columns;
         }
-        let errors = DMatrix::from_columns(&[self.autoregression.errors(column)]);
-        self.slow.whiten(&errors).column(0).into_owned()
+        for mut column in columns.column_iter_mut() {
+            let errors = self.autoregression.errors(&column.clone_owned());
+            column.copy_from(&errors);
+        }
+        self.slow.whiten(&columns)
     }
 
-    /// The column that is this one when it is white.
-    pub fn taken_back(&self, white: &DVector<f64>) -> DVector<f64> {
+    /// The columns that are these when they are white.
+    pub fn taken_back(&self, white: DMatrix<f64>) -> DMatrix<f64> {
         if white.iter().all(|value| *value == 0.0) {
-            return white.clone();
+            return white;
         }
-        self.autoregression.taken_back(&self.slow.taken_back(white))
+        let mut columns = self.slow.taken_back(&white);
+        for mut column in columns.column_iter_mut() {
+            let own = self.autoregression.taken_back(&column.clone_owned());
+            column.copy_from(&own);
+        }
+        columns
     }
 }
 

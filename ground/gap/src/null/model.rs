@@ -66,11 +66,7 @@ impl Model {
             let frame = &problem.frames[*channel];
             let rows: Vec<usize> = frame.series.rows.iter().map(|row| *row as usize).collect();
             let fitted = courses.select_rows(&rows);
-            let white: Vec<DVector<f64>> = fitted
-                .column_iter()
-                .map(|course| frame.white(course.into_owned()))
-                .collect();
-            widen(&mut columns[*channel].nuisance, &DMatrix::from_columns(&white));
+            widen(&mut columns[*channel].nuisance, &frame.whites(fitted));
         }
         let of_effect = |(at, value): (usize, &f64)| (are_held && at >= problem.reference.len()).then_some(*value);
         let held: Vec<Option<f64>> = values.iter().enumerate().map(of_effect).collect();

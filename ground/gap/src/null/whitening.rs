@@ -213,11 +213,11 @@ impl Whitening {
         white.transpose()
     }
 
-    /// The column that is this one when it is white; a sample that is passed over is what it is here.
-    pub fn taken_back(&self, white: &DVector<f64>) -> DVector<f64> {
+    /// The columns that are these when they are white; a sample that is passed over is what it is here.
+    pub fn taken_back(&self, white: &DMatrix<f64>) -> DMatrix<f64> {
         let (places, _) = places(&self.processes);
-        let mut column = white.clone();
-        let mut states = DMatrix::<f64>::zeros(self.states, 1);
+        let mut columns = white.transpose();
+        let mut states = DMatrix::<f64>::zeros(self.states, white.ncols());
         for (at, step) in self.steps.iter().enumerate() {
             if !step.go.is_empty() {
                 carry(&step.go, &places, &self.processes, &mut states);
@@ -225,11 +225,13 @@ impl Whitening {
             if step.weight <= 0.0 {
                 continue;
             }
-            let innovation = white[at] / step.weight;
-            column[at] = innovation + step.sees.iter().map(|(place, part)| part * states[*place]).sum::<f64>();
-            states.column_mut(0).axpy(innovation, &step.gain, 1.0);
+            for (own, mut state) in columns.column_mut(at).iter_mut().zip(states.column_iter_mut()) {
+                let innovation = *own / step.weight;
+                *own = innovation + step.sees.iter().map(|(place, part)| part * state[*place]).sum::<f64>();
+                state.axpy(innovation, &step.gain, 1.0);
+            }
         }
-        column
+        columns.transpose()
     }
 
     /// `-(sum ln s + u'u + n ln 2 pi) / 2` of a residual.

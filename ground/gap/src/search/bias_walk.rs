@@ -182,11 +182,9 @@ fn shapes(problem: &Problem, channel: usize, frame: &Frame) -> DMatrix<f64> {
     let parts: Vec<f64> = (frame.series.rows.iter())
         .map(|row| (t_s[*row as usize] - first) / span_s)
         .collect();
-    let column = |term: usize| {
-        let course = parts.iter().map(|part| shape(term, *part, span_s));
-        frame.white(DVector::from_iterator(parts.len(), course))
-    };
-    DMatrix::from_columns(&(0..TERMS).map(column).collect::<Vec<_>>())
+    frame.whites(DMatrix::from_fn(parts.len(), TERMS, |row, term| {
+        shape(term, parts[row], span_s)
+    }))
 }
 
 /// \[s\] the first fitted sample of a channel, and from there to the last.

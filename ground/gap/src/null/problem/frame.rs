@@ -66,27 +66,34 @@ impl Frame {
 
     /// A column in units of white noise, of one in physical units.
     pub fn white(&self, column: DVector<f64>) -> DVector<f64> {
-        let column = column.component_div(&self.weights);
         match &self.colour {
-            Some(colour) => colour.applied(&column),
-            None => column,
+            Some(_) => self.whites(DMatrix::from_columns(&[column])).column(0).into_owned(),
+            None => column.component_div(&self.weights),
         }
     }
 
-    /// The column in physical units that this one is in white noise.
-    pub fn physical(&self, white: &DVector<f64>) -> DVector<f64> {
+    /// The same of several columns.
+    pub fn whites(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        (columns.column_iter_mut()).for_each(|mut column| column.component_div_assign(&self.weights));
         match &self.colour {
-            Some(colour) => colour.taken_back(white).component_mul(&self.weights),
-            None => white.component_mul(&self.weights),
+            Some(colour) => colour.applied(columns),
+            None => columns,
         }
+    }
+
+    /// The columns in physical units that these are in white noise.
+    pub fn physical(&self, white: DMatrix<f64>) -> DMatrix<f64> {
+        let mut columns = match &self.colour {
+            Some(colour) => colour.taken_back(white),
+            None => white,
+        };
+        (columns.column_iter_mut()).for_each(|mut column| column.component_mul_assign(&self.weights));
+        columns
     }
 
     /// Takes its noise for one of this colour, from white: colours do not add up.
     pub fn tint(&mut self, colour: Colour) {
-        for mut column in self.nuisance.column_iter_mut() {
-            let white = colour.applied(&column.clone_owned());
-            column.copy_from(&white);
-        }
+        self.nuisance = colour.applied(self.nuisance.clone());
         self.colour = Some(colour);
         self.factorise();
     }
