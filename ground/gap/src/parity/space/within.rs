@@ -98,8 +98,11 @@ impl Space<'_> {
             let mut known = 0;
             for ((frame, touching), apart) in frames.iter().zip(&touching).zip(apart) {
                 let apart = apart.transpose();
-                let mut own = inner.view_mut((from, known), (apart.nrows(), frame.nuisance.ncols()));
-                own.gemm(1.0, &apart, &frame.nuisance, 1.0);
+                // What is right of the diagonal is known from below it.
+                if known < from + apart.nrows() {
+                    let mut own = inner.view_mut((from, known), (apart.nrows(), frame.nuisance.ncols()));
+                    own.gemm(1.0, &apart, &frame.nuisance, 1.0);
+                }
                 known += frame.nuisance.ncols();
                 for touching in touching.chunks(HELD) {
                     let mut values = DMatrix::zeros(apart.ncols(), touching.len());
