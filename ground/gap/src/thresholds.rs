@@ -75,6 +75,11 @@ thresholds! {
         larger: "rare unknown events are taken for louder noise",
         smaller: "louder noise is called an unknown effect",
         Derived("a Student law of ten degrees of freedom, as simulated logs have it");
+    /// Factor up to which noise that all sensors of a kind have alike is what the description is off by, beside a reference that is not exact.
+    NOISE_ALIKE: f64 = 1.5, in "declared sigmas",
+        larger: "what is unknown in all sensors of a kind is taken for noise",
+        smaller: "units whose noise is described too quiet raise alarms",
+        Convention("data sheets give typical noise; healthy units of ring R0m are described so far off");
     // Step 1, input
     /// Attitude error from which what is not explained matters, where the case does not say.
     MATTERS_DEG: f64 = 0.5, in "deg",

@@ -6,6 +6,7 @@
 //! matters, says [`remainder::Remainder`]; whether it is an effect of the library after all, [`recognised`].
 
 pub mod adequacy;
+pub mod alike;
 pub mod binned;
 pub mod discrepancy;
 pub mod fast;

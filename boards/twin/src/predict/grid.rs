@@ -11,7 +11,7 @@
 //! so the filter is exact whatever the step and smooth in `tau`: a low-pass stepped at the simulator's step is neither,
 //! and hides a lag from whoever looks for it. Before the first sample all is as at the first, after the last as at the last.
 
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector1};
 
 /// The spline.
 #[derive(Clone, Debug)]
@@ -23,10 +23,27 @@ pub struct Grid<const N: usize> {
     bends: Vec<SVector<f64, N>>,
 }
 
+/// An instant on a grid: its piece, and what the values and the second derivatives at the ends of that count for.
+pub(super) struct Spot {
+    piece: usize,
+    parts: [f64; 2],
+    bends: [f64; 2],
+}
+
 /// One piece: u(s) = c0 + c1 s + c2 s^2 + c3 s^3.
 struct Piece<const N: usize>([SVector<f64, N>; 4]);
 
 impl<const N: usize> Piece<N> {
+    /// Through the values at both ends of a step, with the second derivatives there.
+    fn between(step_s: f64, values: [SVector<f64, N>; 2], bends: [SVector<f64, N>; 2]) -> Self {
+        Self([
+            values[0],
+            (values[1] - values[0]) / step_s - (bends[0] * 2.0 + bends[1]) * (step_s / 6.0),
+            bends[0] * 0.5,
+            (bends[1] - bends[0]) / (6.0 * step_s),
+        ])
+    }
+
     fn value(&self, s: f64) -> SVector<f64, N> {
         let [c0, c1, c2, c3] = self.0;
         c0 + (c1 + (c2 + c3 * s) * s) * s
@@ -80,14 +97,12 @@ impl<const N: usize> Grid<N> {
     }
 
     fn piece(&self, i: usize) -> Piece<N> {
-        let h = self.step_s;
-        let (before, after) = (self.bends[i], self.bends[i + 1]);
-        Piece([
-            self.values[i],
-            (self.values[i + 1] - self.values[i]) / h - (before * 2.0 + after) * (h / 6.0),
-            before * 0.5,
-            (after - before) / (6.0 * h),
-        ])
+        let ends = [i, i + 1];
+        Piece::between(
+            self.step_s,
+            ends.map(|end| self.values[end]),
+            ends.map(|end| self.bends[end]),
+        )
     }
 
     /// The piece of an instant and how far into it the instant is; `None` beyond the ends, where nothing moves.
@@ -98,23 +113,53 @@ impl<const N: usize> Grid<N> {
         (i, s.clamp(0.0, self.step_s))
     }
 
+    /// An instant on it, and on every other of the same instants.
+    pub(super) fn spot(&self, t_s: f64) -> Spot {
+        let (piece, s) = self.place(t_s);
+        let after = s / self.step_s;
+        let parts = [1.0 - after, after];
+        let bend = |part: f64| (part.powi(3) - part) * self.step_s.powi(2) / 6.0;
+        Spot {
+            piece,
+            parts,
+            bends: parts.map(bend),
+        }
+    }
+
+    /// Value there; exactly the samples' where these are all alike.
+    pub(super) fn on(&self, spot: &Spot) -> SVector<f64, N> {
+        let (before, after) = (spot.piece, spot.piece + 1);
+        self.values[before]
+            + (self.values[after] - self.values[before]) * spot.parts[1]
+            + self.bends[before] * spot.bends[0]
+            + self.bends[after] * spot.bends[1]
+    }
+
+    /// Its time derivative there.
+    pub(super) fn slope_on(&self, spot: &Spot) -> SVector<f64, N> {
+        let (before, after, h) = (spot.piece, spot.piece + 1, self.step_s);
+        let [of_before, of_after] = spot.parts.map(|part| (3.0 * part * part - 1.0) * h / 6.0);
+        (self.values[after] - self.values[before]) / h + self.bends[after] * of_after - self.bends[before] * of_before
+    }
+
+    /// Its second time derivative there.
+    pub(super) fn bend_on(&self, spot: &Spot) -> SVector<f64, N> {
+        self.bends[spot.piece] * spot.parts[0] + self.bends[spot.piece + 1] * spot.parts[1]
+    }
+
     /// Value at `t_s`.
     pub fn at(&self, t_s: f64) -> SVector<f64, N> {
-        let (i, s) = self.place(t_s);
-        self.piece(i).value(s)
+        self.on(&self.spot(t_s))
     }
 
     /// Its time derivative at `t_s`.
     pub fn slope(&self, t_s: f64) -> SVector<f64, N> {
-        let (i, s) = self.place(t_s);
-        self.piece(i).slope(s)
+        self.slope_on(&self.spot(t_s))
     }
 
     /// Its second time derivative at `t_s`.
     pub fn bend(&self, t_s: f64) -> SVector<f64, N> {
-        let (i, s) = self.place(t_s);
-        let Piece([_, _, c2, c3]) = self.piece(i);
-        c2 * 2.0 + c3 * (6.0 * s)
+        self.bend_on(&self.spot(t_s))
     }
 
     /// Its low-pass of time constant `tau_s`, settled at the first sample.
@@ -144,17 +189,25 @@ pub struct LowPass<const N: usize> {
 }
 
 impl<const N: usize> LowPass<N> {
-    /// Output at `t_s`; `grid` is the one it was made of.
-    pub fn at(&self, grid: &Grid<N>, t_s: f64) -> SVector<f64, N> {
+    /// Its scalar product with `weights` at `t_s`; `grid` is the one it was made of. The ends of a piece are multiplied and not the
+    /// cubic in between: the rest is then a cubic of one number.
+    pub fn along(&self, weights: &SVector<f64, N>, grid: &Grid<N>, t_s: f64) -> f64 {
         let (i, s) = grid.place(t_s);
-        let piece = grid.piece(i);
-        match self.nodes.get(i) {
+        let along = |vector: &SVector<f64, N>| Vector1::new(weights.dot(vector));
+        let ends = [i, i + 1];
+        let piece = Piece::between(
+            grid.step_s,
+            ends.map(|end| along(&grid.values[end])),
+            ends.map(|end| along(&grid.bends[end])),
+        );
+        let output = match self.nodes.get(i) {
             Some(node) => {
                 let decay = (-s / self.tau_s).exp();
-                piece.low_passed(s, self.tau_s) + (node - piece.low_passed_first(self.tau_s)) * decay
+                piece.low_passed(s, self.tau_s) + (along(node) - piece.low_passed_first(self.tau_s)) * decay
             }
             None => piece.value(s),
-        }
+        };
+        output.x
     }
 }
 
@@ -183,7 +236,7 @@ mod tests {
             for k in 0..300 {
                 let t = 5.0 + 0.011 * f64::from(k);
                 let expected = gain * (TAU * 2.0 * t - phase).sin();
-                let out = low_pass.at(&grid, t).x;
+                let out = low_pass.along(&Vector1::new(1.0), &grid, t);
                 assert!((out - expected).abs() < SPLINE, "tau {tau_s} at {t}: {out} {expected}");
             }
         }
@@ -195,7 +248,8 @@ mod tests {
         let grid = sine(0.01, 3.0);
         let slope = |tau_s: f64| {
             let h = 1e-6;
-            (grid.low_pass(tau_s + h).at(&grid, 5.003).x - grid.low_pass(tau_s - h).at(&grid, 5.003).x) / (2.0 * h)
+            let at = |tau_s: f64| grid.low_pass(tau_s).along(&Vector1::new(1.0), &grid, 5.003);
+            (at(tau_s + h) - at(tau_s - h)) / (2.0 * h)
         };
         for tau_s in [5e-4, 2e-3, 9.9e-3, 0.01, 0.02] {
             let (before, after) = (slope(tau_s * 0.999), slope(tau_s * 1.001));
@@ -214,7 +268,8 @@ mod tests {
         assert_eq!((line.at(-9.0).x, line.at(1.5).x, line.at(99.0).x), (2.0, 3.0, 6.0));
         // A ramp lags by tau once settled.
         let low_pass = line.low_pass(0.01);
-        assert!((low_pass.at(&line, 2.5).x - 4.98).abs() < 1e-12);
+        let lagged = low_pass.along(&Vector1::new(1.0), &line, 2.5);
+        assert!((lagged - 4.98).abs() < 1e-12);
     }
 
     #[test]

@@ -135,12 +135,7 @@ impl Twin {
     /// The input through one low-pass.
     fn through(&self, look: &Look, tau_s: f64, filters: &mut Filters) -> Vec<f64> {
         let sensor = look.aim.sensor;
-        let at = |filter: &Filter| -> Vec<f64> {
-            let instants_s = look.instants_s.iter();
-            instants_s
-                .map(|t_s| self.scene.input(&look.aim, filter, *t_s))
-                .collect()
-        };
+        let at = |filter: &Filter| self.scene.inputs(&look.aim, filter, &look.instants_s);
         let mut known = self.filters.iter().chain(filters.iter());
         if let Some((.., filter)) = known.find(|(kind, tau, _)| (*kind, *tau) == (sensor, tau_s)) {
             return at(filter);

@@ -17,9 +17,9 @@ use crate::{
         doubt::{Belief, Promised, against, beyond_reference, promises, second_keys},
         importance::Importance,
     },
-    search::{explanation::Explanation, odds::alternatives},
+    search::{explanation::Explanation, odds::alternatives, scatter::Scatter},
     thresholds::{NOISE_TAILS, SAID},
-    unknown::{adequacy::Leftover, octaves, remainder::Remainder},
+    unknown::{adequacy::Leftover, alike, octaves, remainder::Remainder},
 };
 
 /// An explanation with its probabilities.
@@ -72,7 +72,11 @@ impl Believed {
         let beside_reference = causes.len() + usize::from(explanation.is_followed());
         causes.extend(scatter.map(|scatter| {
             let sigmas = scatter.sigmas(problem, &explanation.beneath);
-            cause_of_scatter(subject, scatter, &sigmas)
+            let mut cause = cause_of_scatter(subject, scatter, &sigmas);
+            if is_of_the_description(subject, scatter) {
+                cause.probability = 0.0;
+            }
+            cause
         }));
         if let (true, Some(walk)) = (explanation.is_followed(), causes.last_mut()) {
             let grows = importance.as_ref().is_some_and(|importance| importance.is_walk_seen);
@@ -194,6 +198,14 @@ fn loud(problem: &Problem, explanation: &Explanation, floor: &[Vec<f64>]) -> Vec
     };
     let rests = explanation.model.fitted.rest.iter().enumerate();
     rests.map(of_channel).collect()
+}
+
+/// Whether it is noise that is described too quiet in all sensors of a kind, beside a reference that is not exact either.
+fn is_of_the_description(subject: &Subject, scatter: &Scatter) -> bool {
+    let louder = (scatter.channels.iter().zip(&scatter.thetas)).map(|(channel, theta)| (*channel, theta[0].exp()));
+    subject.slow.attitude_sigma_rad > 0.0
+        && scatter.effect.page().texture == Texture::Louder
+        && alike::is_described_too_quiet(&subject.twin.unit().channels, &louder.collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! energy is noise that is louder than described and no unknown effect; it is left out.
 
 use super::{
+    alike,
     binned::Binned,
     octaves::{self, Excess},
     remainder::Setting,
@@ -35,10 +36,22 @@ pub struct Fast {
     pub sigma: f64,
 }
 
-/// Of every channel that has samples; `louder` is how much more each scatters by the model.
-pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], louder: &[f64]) -> Vec<Fast> {
-    (0..problem.frames.len())
-        .filter_map(|channel| excess(problem, model, channel, &floor[channel], louder[channel]))
+/// Of every channel that has samples, beyond what all of its kind have ([`alike`]).
+pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Vec<Fast> {
+    let of = |channel: usize, louder: f64| excess(problem, model, channel, &floor[channel], louder);
+    let (channels, by_model) = (&problem.twin.unit().channels, setting.louder);
+    let scatter = |channel: usize| {
+        let fast = of(channel, by_model[channel])?;
+        Some((1.0 + fast.excess / fast.floor).max(0.0).sqrt())
+    };
+    let of_kind = match setting.slow.attitude_sigma_rad > 0.0 {
+        true => alike::louder(channels, scatter),
+        false => vec![1.0; channels.len()],
+    };
+    let louder = by_model.iter().zip(of_kind).map(|(own, of_kind)| own * of_kind);
+    louder
+        .enumerate()
+        .filter_map(|(channel, louder)| of(channel, louder))
         .collect()
 }
 

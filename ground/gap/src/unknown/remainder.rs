@@ -112,7 +112,7 @@ fn present(log_bayes_factor: f64, several: usize) -> f64 {
 pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Remainder {
     let beside = Beside::of(problem, model, setting, None);
     let slow = beside.map_or_else(Vec::new, |beside| courses(problem, &beside, setting, None));
-    let fast = excesses(problem, model, floor, setting.louder).into_iter();
+    let fast = excesses(problem, model, floor, setting).into_iter();
     let fast: Vec<Fast> = fast.filter(|fast| !setting.scattered.contains(&fast.channel)).collect();
     let several = slow.len() + fast.len();
     let of_slow = slow.iter().map(|slow| {
