@@ -86,3 +86,51 @@ fn place_b(unit: &UnitDescription, magnetometer: usize) -> Vector3<f64> {
     let on_plate = |other: &&twin::predict::Channel| other.group == own.group && other.sensor == Kind::Accelerometer;
     unit.channels.iter().find(on_plate).unwrap_or(own).lever_m
 }
+
+#[cfg(test)]
+mod tests {
+    use twin::{
+        environment::Environment,
+        motion::Tumble,
+        predict::{Scene, emems},
+    };
+
+    use super::*;
+
+    /// Of a unit that turns about its middle and is not carried.
+    fn turning(field_sigma_ut: f64, stated_ut_m: Option<f64>) -> Vec<Column> {
+        let environment = Environment::laboratory();
+        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 20.0, 0.01);
+        let starts_s = (0..100).map(|row| 0.2 * f64::from(row)).collect();
+        let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s).expect("a twin");
+        let errors = SlowErrors {
+            attitude_sigma_rad: 1e-3,
+            attitude_correlation_s: 20.0,
+            field_wander_sigma_ut: 0.0,
+            field_correlation_s: 10.0,
+            field_sigma_ut,
+            field_gradient_sigma_ut_m: stated_ut_m,
+        };
+        columns(&twin, &errors)
+    }
+
+    #[test]
+    fn a_unit_that_is_not_carried_feels_it_at_its_plates_as_much_as_the_field_may_be_off() {
+        let columns = turning(0.5, None);
+        assert_eq!(columns.len(), 5);
+        let values = columns.iter().flat_map(|column| {
+            let of_column = column.entries.iter().flat_map(|(_, values)| values);
+            of_column.map(|value| (value * column.sigma).powi(2))
+        });
+        let (count, squares) = values.fold((0, 0.0), |(count, sum), square| (count + 1, sum + square));
+        // The five parts add up.
+        let felt_ut = (5.0 * squares / f64::from(count)).sqrt();
+        assert!((0.3..1.2).contains(&felt_ut), "{felt_ut}");
+    }
+
+    #[test]
+    fn what_is_stated_is_taken_and_an_exact_field_has_none() {
+        assert!(turning(0.5, Some(2.0)).iter().all(|column| column.sigma == 2.0));
+        assert!(turning(0.0, None).is_empty() && turning(0.5, Some(0.0)).is_empty());
+    }
+}
