@@ -36,7 +36,7 @@ pub struct Fast {
     pub sigma: f64,
 }
 
-/// Of every channel that has samples, beyond what all of its kind have ([`alike`]).
+/// Of every channel that has samples: what it has beyond what the model says of its scatter and what its whole kind has ([`alike`]).
 pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Vec<Fast> {
     let of = |channel: usize, louder: f64| excess(problem, model, channel, &floor[channel], louder);
     let (channels, by_model) = (&problem.twin.unit().channels, setting.louder);
