@@ -206,6 +206,12 @@ const LARGEST: u64 = 16 << 20;
 const AXIS_ROUNDING: f64 = 2e-3;
 
 impl UnitDescription {
+    /// \[m\] place of a channel's sensor in b: that of the accelerometer in its group, for only these are described, or its own where there is none.
+    pub fn place_b(&self, channel: &Channel) -> Vector3<f64> {
+        let is_beside = |other: &&Channel| other.group == channel.group && other.sensor == Kind::Accelerometer;
+        self.channels.iter().find(is_beside).unwrap_or(channel).lever_m
+    }
+
     /// Reads a file.
     pub fn open(path: &Path) -> Result<Self, UnitError> {
         let file = path.display().to_string();

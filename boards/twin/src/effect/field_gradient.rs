@@ -52,7 +52,7 @@ impl Effect for FieldGradient {
             .zip([ox, oy, oz])
             .map(|(axis_b, aside)| axis_b * aside)
             .sum();
-        let (axis_b, place_b) = (site.channel.axis_b, site.place_b() + aside_b);
+        let (axis_b, place_b) = (site.channel.axis_b, site.unit.place_b(site.channel) + aside_b);
         chain.add(move |feel, _| {
             let place_n = feel.position_n + feel.q_nb * place_b;
             axis_b.dot(&feel.to_b(gradient_n * place_n))

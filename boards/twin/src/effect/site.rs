@@ -35,15 +35,6 @@ impl Site<'_> {
         wanted.map(|(index, _)| index).collect()
     }
 
-    /// \[m\] place of the channel in b: its own, or that of the accelerometer on the same plate, for only these are described.
-    pub fn place_b(&self) -> Vector3<f64> {
-        let neighbour = self
-            .of_group(&self.channel.group, Kind::Accelerometer)
-            .into_iter()
-            .next();
-        neighbour.map_or(self.channel.lever_m, |index| self.unit.channels[index].lever_m)
-    }
-
     /// An axis of the plate in b, `which` of 1, 2, 3: that of its accelerometer's or else its magnetometer's channel.
     pub fn plate_axis_b(&self, which: f64) -> Option<Vector3<f64>> {
         let place = (which as usize).checked_sub(1)?;

@@ -5,11 +5,11 @@
 //! is where the accelerometer of its plate is, for only the places of these are described.
 //!
 //! Where the case does not say how large it may be, it makes the field differ by the sigma that is stated of it, over the places where
-//! the magnetometers were: a field that is known to half a microtesla is not known to be more uniform than that. On recordings of
-//! BROAD, carried over some half a metre, that is the 1 to 2 uT/m which was found there.
+//! the magnetometers were: a field that is known to half a microtesla is not known to be more uniform than that. Of recordings of
+//! BROAD (0.8 uT, carried over some half a metre) that would be 1.6 uT/m, where 1 to 2 were found.
 
 use nalgebra::{Matrix3, Vector3};
-use twin::predict::{Column, Feel, Kind, Twin, UnitDescription};
+use twin::predict::{Column, Feel, Kind, Twin};
 
 use crate::input::case::SlowErrors;
 
@@ -26,7 +26,7 @@ pub fn columns(twin: &Twin, errors: &SlowErrors) -> Vec<Column> {
     let unit = twin.unit();
     let magnetometers = (0..unit.channels.len()).filter(|channel| unit.channels[*channel].sensor == Kind::Magnetometer);
     let felt = |channel: usize| {
-        let place_b = place_b(unit, channel);
+        let place_b = unit.place_b(&unit.channels[channel]);
         let feels = twin.feels(channel);
         let places_n = (feels.iter())
             .map(|feel| feel.position_n + feel.q_nb * place_b)
@@ -78,13 +78,6 @@ fn sigma(magnetometers: &[Felt], errors: &SlowErrors) -> Option<f64> {
     let stated = errors.field_gradient_sigma_ut_m;
     let sigma = stated.unwrap_or(errors.field_sigma_ut / reach_m);
     (reach_m > 0.0 && sigma > 0.0).then_some(sigma)
-}
-
-/// \[m\] in b of the plate's accelerometer, or of the magnetometer itself where the plate has none.
-fn place_b(unit: &UnitDescription, magnetometer: usize) -> Vector3<f64> {
-    let own = &unit.channels[magnetometer];
-    let on_plate = |other: &&twin::predict::Channel| other.group == own.group && other.sensor == Kind::Accelerometer;
-    unit.channels.iter().find(on_plate).unwrap_or(own).lever_m
 }
 
 #[cfg(test)]

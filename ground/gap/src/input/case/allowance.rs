@@ -3,7 +3,8 @@
 //! In: the optional keys of `case.toml`. Out: [`SlowErrors`], how the reference and the field err slowly, and [`Bars`], the sizes
 //! from which something that is not explained matters. A reference or a field that is stated as exact errs by nothing. Where a key
 //! is absent, it is what a marker system and a room were found to do (recordings of BROAD, session B and C: an attitude error of
-//! 1.3 to 3 mrad that stays alike over 4 to 35 s, a field error of 0.1 to 0.2 uT over 1 to 20 s beside a gradient of 1 to 2 uT/m).
+//! 1.3 to 3 mrad that stays alike over 4 to 35 s, a field error of 0.1 to 0.2 uT over 1 to 20 s beside a gradient of 1 to 2 uT/m). How large a
+//! gradient may be that nobody states follows from the field's sigma ([`crate::null::gradient`]).
 //!
 //! Refuses, naming the key: sigmas below zero, correlation times and bars that are not above zero, and values beyond any use.
 
@@ -32,7 +33,7 @@ pub struct SlowErrors {
     pub field_correlation_s: f64,
     /// \[uT\] how well it is known, each axis.
     pub field_sigma_ut: f64,
-    /// [uT/m] how much it changes with the place, each component; otherwise as much as its sigma lets it.
+    /// [uT/m] how much it changes with the place, each component; where nobody states it, as much as its sigma lets it.
     pub field_gradient_sigma_ut_m: Option<f64>,
 }
 
