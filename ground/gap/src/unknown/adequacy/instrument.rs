@@ -71,7 +71,7 @@ impl Instrument {
     }
 }
 
-/// A place in a record that begins anew where it ends. Most are within it or one length beyond, and a remainder is dear.
+/// A place in a record that begins anew where it ends. Most are within it or one length beyond it, and a remainder takes long.
 fn wrapped(place: f64, length: f64) -> f64 {
     let near = if place < length { place } else { place - length };
     if (0.0..length).contains(&near) {
