@@ -37,15 +37,16 @@ fn named(faults: &[(&str, &str, &str)], well: &[&str]) {
     }
 }
 
-#[test]
-fn the_image_of_a_good_unit_is_good() {
-    let outcome = tried(&[]);
-    assert!(outcome.is_good(), "{}", page::text(&outcome));
-}
-
 /// What takes more than six seconds of a core.
 mod long {
     use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn the_image_of_a_good_unit_is_good() {
+        let outcome = tried(&[]);
+        assert!(outcome.is_good(), "{}", page::text(&outcome));
+    }
 
     #[test]
     #[ignore = "takes more than six seconds: cargo host-test-long runs it"]

@@ -34,23 +34,6 @@ fn tumbled() -> Tape {
     tape
 }
 
-/// From lift-off on a step takes milliseconds in one piece. Nobody who waits for a part meanwhile takes it for silent.
-#[test]
-fn a_rocket_that_is_well_loses_no_sensor_while_its_spin_is_followed() {
-    let mut tape = Tape {
-        script: vec![(MS, b"G_DL".to_vec())],
-        ..Tape::default()
-    };
-    emulated::fly(image(), Plant::new(world("rocket"), 7), &[], 36_000 * MS, &mut tape).expect("the image flies");
-    assert!(tape.said().contains("lift-off: FLIGHT"), "{}", tape.said());
-    assert!(!tape.said().contains("lost"), "{}", tape.said());
-    let unwell = Health::RECONFIGURED.with(Health::BUS_RECOVERED);
-    let frames = tape.derived();
-    assert!(frames.iter().all(|frame| frame.health.0 & unwell.0 == 0));
-    let longest_us = frames.iter().map(|frame| frame.estimate_us).max();
-    assert!(longest_us > Some(2_000), "{longest_us:?}: no step was long");
-}
-
 #[test]
 fn after_a_reset_in_flight_the_first_frame_has_the_attitude_and_says_why_the_unit_started() {
     let mut tape = Tape {
@@ -123,4 +106,26 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
         costs[costs.len() - 1]
     );
     assert!(costs[costs.len() / 2] < MEDIAN_CEILING);
+}
+
+mod long {
+    use super::*;
+
+    /// From lift-off on a step takes milliseconds in one piece. Nobody who waits for a part meanwhile takes it for silent.
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn a_rocket_that_is_well_loses_no_sensor_while_its_spin_is_followed() {
+        let mut tape = Tape {
+            script: vec![(MS, b"G_DL".to_vec())],
+            ..Tape::default()
+        };
+        emulated::fly(image(), Plant::new(world("rocket"), 7), &[], 36_000 * MS, &mut tape).expect("the image flies");
+        assert!(tape.said().contains("lift-off: FLIGHT"), "{}", tape.said());
+        assert!(!tape.said().contains("lost"), "{}", tape.said());
+        let unwell = Health::RECONFIGURED.with(Health::BUS_RECOVERED);
+        let frames = tape.derived();
+        assert!(frames.iter().all(|frame| frame.health.0 & unwell.0 == 0));
+        let longest_us = frames.iter().map(|frame| frame.estimate_us).max();
+        assert!(longest_us > Some(2_000), "{longest_us:?}: no step was long");
+    }
 }

@@ -272,39 +272,6 @@ fn a_simulated_trajectory_of_another_flight_is_refused_plainly() {
 }
 
 #[test]
-fn the_screen_and_the_verdict_say_what_became_of_what_is_known() {
-    let known = SIMULATED.replace("[motion_known]\n", TRACK);
-    let (folder, motion) = flown(2, &known);
-    tracked(folder.path(), &motion, SIGMA_M);
-    simulated(folder.path(), &motion, 0.0, 0.5);
-    let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is judged");
-    let text = |name: &str| &texts.iter().find(|(own, _)| own == name).expect("is there").1;
-    println!("{}", text("all.txt"));
-    assert!(text("all.txt").contains("NOMINAL the simulated trajectory: holds the motion"));
-    assert!(text("all.txt").contains("TRACK   89 fixes") || text("all.txt").contains("TRACK   90 fixes"));
-    let verdict: Value = serde_json::from_str(text("verdict.json")).expect("JSON");
-    assert_eq!(verdict["motion_known"]["track"]["is_used"], true);
-    assert_eq!(verdict["motion_known"]["simulated"]["is_used"], true);
-    let offset = verdict["motion_known"]["track"]["clock_offset_s"]["value"]
-        .as_f64()
-        .expect("a number");
-    assert!((offset - OFFSET_S).abs() < 0.03, "{offset}");
-    let phases = verdict["phases"].as_array().expect("a list");
-    assert_eq!(verdict["phases_from"], "found");
-    let of = |name: &str| {
-        let own = phases.iter().find(|own| own["phase"] == name).expect("is there");
-        ["from_s", "to_s"].map(|key| own[key].as_f64().expect("a number"))
-    };
-    // Half a second of pushing as hard as gravity comes later and goes sooner.
-    let ([lit_s, burnt_s], [coasts_s, _]) = (of("thrust"), of("coast"));
-    assert!((15.0..18.0).contains(&lit_s) && (24.0..28.5).contains(&burnt_s) && (coasts_s - burnt_s).abs() < 1e-9);
-    // A healthy unit is given no name, with or without a track.
-    assert!(verdict["causes"].as_array().expect("a list").is_empty(), "{verdict}");
-    assert!(text("index.html").contains("NOMINAL"));
-    assert!(text("index.html").contains("The track beside the motion that it holds"));
-}
-
-#[test]
 fn what_does_not_go_together_is_refused_naming_file_and_key() {
     let refused = |more: &str, track: Option<&str>| {
         let (folder, motion) = flown(1, more);
@@ -465,4 +432,42 @@ fn windows_in_free_fall_alone_say_that_a_turn_about_the_field_is_hardly_known() 
     let own = off(&pointed, &motion);
     println!("with one attitude: {own:?} {:?}", pointed.kept);
     assert!(own.0 < 3.0 * own.1 && own.1 < 1.0, "{own:?}");
+}
+
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn the_screen_and_the_verdict_say_what_became_of_what_is_known() {
+        let known = SIMULATED.replace("[motion_known]\n", TRACK);
+        let (folder, motion) = flown(2, &known);
+        tracked(folder.path(), &motion, SIGMA_M);
+        simulated(folder.path(), &motion, 0.0, 0.5);
+        let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is judged");
+        let text = |name: &str| &texts.iter().find(|(own, _)| own == name).expect("is there").1;
+        println!("{}", text("all.txt"));
+        assert!(text("all.txt").contains("NOMINAL the simulated trajectory: holds the motion"));
+        assert!(text("all.txt").contains("TRACK   89 fixes") || text("all.txt").contains("TRACK   90 fixes"));
+        let verdict: Value = serde_json::from_str(text("verdict.json")).expect("JSON");
+        assert_eq!(verdict["motion_known"]["track"]["is_used"], true);
+        assert_eq!(verdict["motion_known"]["simulated"]["is_used"], true);
+        let offset = verdict["motion_known"]["track"]["clock_offset_s"]["value"]
+            .as_f64()
+            .expect("a number");
+        assert!((offset - OFFSET_S).abs() < 0.03, "{offset}");
+        let phases = verdict["phases"].as_array().expect("a list");
+        assert_eq!(verdict["phases_from"], "found");
+        let of = |name: &str| {
+            let own = phases.iter().find(|own| own["phase"] == name).expect("is there");
+            ["from_s", "to_s"].map(|key| own[key].as_f64().expect("a number"))
+        };
+        // Half a second of pushing as hard as gravity comes later and goes sooner.
+        let ([lit_s, burnt_s], [coasts_s, _]) = (of("thrust"), of("coast"));
+        assert!((15.0..18.0).contains(&lit_s) && (24.0..28.5).contains(&burnt_s) && (coasts_s - burnt_s).abs() < 1e-9);
+        // A healthy unit is given no name, with or without a track.
+        assert!(verdict["causes"].as_array().expect("a list").is_empty(), "{verdict}");
+        assert!(text("index.html").contains("NOMINAL"));
+        assert!(text("index.html").contains("The track beside the motion that it holds"));
+    }
 }

@@ -127,12 +127,6 @@ fn check_healthy(name: &str, from_s: f64) {
     assert!(others.all(|row| row.smoothed.is_some()), "{name} did not settle");
 }
 
-#[test]
-fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
-    check_healthy("still", 10.0);
-    check_healthy("tumble", 20.0);
-}
-
 /// Takes the windows out of a case.
 fn without_windows(folder: &TempDir) {
     let file = folder.path().join("case.toml");
@@ -176,18 +170,6 @@ fn windows_that_take_turns_are_not_used_for_no_motion_is_smoothed_across_what_li
     // As a flight's folder has them for its reference.
     let turns = open("[windows]\nfit = [[0.0, 30.0], [60.0, 90.0]]\nhold = [[30.0, 60.0], [90.0, 120.0]]\n");
     assert_eq!(turns, (true, 300, 300));
-}
-
-#[test]
-fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
-    for (name, from_s) in [
-        ("rate-table", 20.0),
-        ("rotation-1", 10.0),
-        ("rotation-2", 10.0),
-        ("rocket", 120.0),
-    ] {
-        check_healthy(name, from_s);
-    }
 }
 
 #[test]
@@ -347,55 +329,6 @@ fn an_attitude_is_smoothed_beside_what_is_named_and_not_told_where_something_is_
 }
 
 #[test]
-fn units_with_few_sensors_and_windows_without_rows_are_told_of_or_refused() {
-    let folder = flown("tumble", 20.0, 3, &[], |_| true);
-    let measured = fs::read_to_string(folder.path().join("measured.csv")).expect("a file");
-    let said = |only: &dyn Fn(Kind) -> bool, most: usize| {
-        let mut unit = emems(thesis_slot_s);
-        unit.channels.retain(|channel| only(channel.sensor));
-        unit.channels.truncate(most);
-        fs::write(folder.path().join("unit.toml"), unit.text()).expect("a file");
-        let is_kept = |name: &str| name == "t_s" || unit.channels.iter().any(|channel| channel.name == name);
-        let heads: Vec<bool> = measured
-            .lines()
-            .next()
-            .expect("a head")
-            .split(',')
-            .map(is_kept)
-            .collect();
-        let own = measured.lines().map(|line| {
-            let cells = line.split(',').zip(&heads).filter(|(_, is_kept)| **is_kept);
-            cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",") + "\n"
-        });
-        fs::write(folder.path().join("measured.csv"), own.collect::<String>()).expect("a file");
-        analysed(folder.path(), &[], &|_, _| ()).map_err(|error| error.to_string())
-    };
-    let refused = |said: Result<Vec<(String, String)>, String>, why: &str| {
-        let error = said.expect_err("is refused");
-        assert!(error.contains(why), "{error}");
-    };
-    refused(said(&|kind| kind == Kind::Gyro, 3), "Parity is empty");
-    refused(said(&|kind| kind == Kind::Thermometer, 4), "Parity is empty");
-    for missing in [Kind::Magnetometer, Kind::Accelerometer, Kind::Gyro] {
-        let texts = said(&|kind| kind != missing, usize::MAX).expect("has redundancy");
-        let screen = texts.iter().find(|(name, _)| name == "all.txt").expect("a screen");
-        assert!(screen.1.contains("ATTITUDE"), "{missing:?}: {}", screen.1);
-        // Without gyros nobody knows how fast it turned, and what that leaves is not held against anything.
-        let is_named = screen.1.contains("CAUSE");
-        assert!(!is_named || missing == Kind::Gyro, "{missing:?}: {}", screen.1);
-        let is_told = texts.iter().any(|(name, _)| name == "attitude.csv");
-        assert!(!is_told || missing != Kind::Gyro, "{missing:?}: {}", screen.1);
-    }
-    let case = fs::read_to_string(folder.path().join("case.toml")).expect("a file");
-    fs::write(
-        folder.path().join("case.toml"),
-        case.replace("[[0.0, 110.0]]", "[[500.0, 600.0]]"),
-    )
-    .expect("a file");
-    refused(said(&|_| true, usize::MAX), "hold 0 rows");
-}
-
-#[test]
 fn an_attitude_that_does_not_settle_is_said_and_not_written() {
     let told = Told {
         attitudes: Vec::new(),
@@ -427,27 +360,6 @@ fn one_plate_alone_has_no_parity_and_that_is_said() {
         error.contains("unit.toml") && error.contains("Parity is empty"),
         "{error}"
     );
-}
-
-#[test]
-fn what_is_another_motion_gets_no_name_and_leaves_no_gap() {
-    for (effect, locality, theta) in [
-        ("latency", Locality::Unit, vec![0.15]),
-        ("gravity-value", Locality::Unit, vec![0.2]),
-        ("accel-scale", Locality::Common, vec![0.05]),
-        ("hard-iron", Locality::Common, vec![9.0, -8.0, 6.0]),
-    ] {
-        let cause = Cause {
-            effect: by_name(effect).expect("an effect"),
-            locality,
-            variant: 0.0,
-        };
-        let findings = found(&flown("tumble", 20.0, 6, &[Active { cause, theta }], |_| true));
-        let names: Vec<&str> = findings.names.iter().map(|name| name.effect).collect();
-        assert!(findings.none_of_these < 0.5, "{effect}: gap {:?}", findings.gap);
-        assert!(names.is_empty(), "{effect}: {names:?}");
-        assert!((0.97..1.03).contains(&findings.gap[0]), "{effect}: {}", findings.gap[0]);
-    }
 }
 
 #[test]
@@ -484,4 +396,100 @@ fn what_needs_a_reference_is_refused_with_a_word_of_what_to_do() {
     fs::write(&case, format!("motion = \"motion.csv\"\n{text}")).expect("a file");
     let error = Flight::open(folder.path()).err().expect("is refused").to_string();
     assert!(error.contains("motion_known.none"), "{error}");
+}
+
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
+        check_healthy("still", 10.0);
+        check_healthy("tumble", 20.0);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
+        for (name, from_s) in [
+            ("rate-table", 20.0),
+            ("rotation-1", 10.0),
+            ("rotation-2", 10.0),
+            ("rocket", 120.0),
+        ] {
+            check_healthy(name, from_s);
+        }
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn units_with_few_sensors_and_windows_without_rows_are_told_of_or_refused() {
+        let folder = flown("tumble", 20.0, 3, &[], |_| true);
+        let measured = fs::read_to_string(folder.path().join("measured.csv")).expect("a file");
+        let said = |only: &dyn Fn(Kind) -> bool, most: usize| {
+            let mut unit = emems(thesis_slot_s);
+            unit.channels.retain(|channel| only(channel.sensor));
+            unit.channels.truncate(most);
+            fs::write(folder.path().join("unit.toml"), unit.text()).expect("a file");
+            let is_kept = |name: &str| name == "t_s" || unit.channels.iter().any(|channel| channel.name == name);
+            let heads: Vec<bool> = measured
+                .lines()
+                .next()
+                .expect("a head")
+                .split(',')
+                .map(is_kept)
+                .collect();
+            let own = measured.lines().map(|line| {
+                let cells = line.split(',').zip(&heads).filter(|(_, is_kept)| **is_kept);
+                cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",") + "\n"
+            });
+            fs::write(folder.path().join("measured.csv"), own.collect::<String>()).expect("a file");
+            analysed(folder.path(), &[], &|_, _| ()).map_err(|error| error.to_string())
+        };
+        let refused = |said: Result<Vec<(String, String)>, String>, why: &str| {
+            let error = said.expect_err("is refused");
+            assert!(error.contains(why), "{error}");
+        };
+        refused(said(&|kind| kind == Kind::Gyro, 3), "Parity is empty");
+        refused(said(&|kind| kind == Kind::Thermometer, 4), "Parity is empty");
+        for missing in [Kind::Magnetometer, Kind::Accelerometer, Kind::Gyro] {
+            let texts = said(&|kind| kind != missing, usize::MAX).expect("has redundancy");
+            let screen = texts.iter().find(|(name, _)| name == "all.txt").expect("a screen");
+            assert!(screen.1.contains("ATTITUDE"), "{missing:?}: {}", screen.1);
+            // Without gyros nobody knows how fast it turned, and what that leaves is not held against anything.
+            let is_named = screen.1.contains("CAUSE");
+            assert!(!is_named || missing == Kind::Gyro, "{missing:?}: {}", screen.1);
+            let is_told = texts.iter().any(|(name, _)| name == "attitude.csv");
+            assert!(!is_told || missing != Kind::Gyro, "{missing:?}: {}", screen.1);
+        }
+        let case = fs::read_to_string(folder.path().join("case.toml")).expect("a file");
+        fs::write(
+            folder.path().join("case.toml"),
+            case.replace("[[0.0, 110.0]]", "[[500.0, 600.0]]"),
+        )
+        .expect("a file");
+        refused(said(&|_| true, usize::MAX), "hold 0 rows");
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    fn what_is_another_motion_gets_no_name_and_leaves_no_gap() {
+        for (effect, locality, theta) in [
+            ("latency", Locality::Unit, vec![0.15]),
+            ("gravity-value", Locality::Unit, vec![0.2]),
+            ("accel-scale", Locality::Common, vec![0.05]),
+            ("hard-iron", Locality::Common, vec![9.0, -8.0, 6.0]),
+        ] {
+            let cause = Cause {
+                effect: by_name(effect).expect("an effect"),
+                locality,
+                variant: 0.0,
+            };
+            let findings = found(&flown("tumble", 20.0, 6, &[Active { cause, theta }], |_| true));
+            let names: Vec<&str> = findings.names.iter().map(|name| name.effect).collect();
+            assert!(findings.none_of_these < 0.5, "{effect}: gap {:?}", findings.gap);
+            assert!(names.is_empty(), "{effect}: {names:?}");
+            assert!((0.97..1.03).contains(&findings.gap[0]), "{effect}: {}", findings.gap[0]);
+        }
+    }
 }
