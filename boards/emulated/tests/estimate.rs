@@ -108,12 +108,13 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
     assert!(costs[costs.len() / 2] < MEDIAN_CEILING);
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     use super::*;
 
     /// From lift-off on a step takes milliseconds in one piece. Nobody who waits for a part meanwhile takes it for silent.
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_rocket_that_is_well_loses_no_sensor_while_its_spin_is_followed() {
         let mut tape = Tape {
             script: vec![(MS, b"G_DL".to_vec())],

@@ -247,11 +247,12 @@ fn a_zero_that_walks_is_not_named_as_a_course_that_it_resembles() {
     );
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     use super::*;
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_zero_that_walks_is_named_where_there_is_time_for_it() {
         let (names, findings) = walked(2, 240.0);
         assert_eq!(names, ["gyro-bias-walk"], "{:?}", findings.alternatives);

@@ -434,11 +434,12 @@ fn windows_in_free_fall_alone_say_that_a_turn_about_the_field_is_hardly_known() 
     assert!(own.0 < 3.0 * own.1 && own.1 < 1.0, "{own:?}");
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     use super::*;
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn the_screen_and_the_verdict_say_what_became_of_what_is_known() {
         let known = SIMULATED.replace("[motion_known]\n", TRACK);
         let (folder, motion) = flown(2, &known);

@@ -398,18 +398,19 @@ fn what_needs_a_reference_is_refused_with_a_word_of_what_to_do() {
     assert!(error.contains("motion_known.none"), "{error}");
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     use super::*;
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_healthy_unit_at_rest_and_turning_is_given_no_name() {
         check_healthy("still", 10.0);
         check_healthy("tumble", 20.0);
     }
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_healthy_unit_on_every_other_motion_is_given_no_name() {
         for (name, from_s) in [
             ("rate-table", 20.0),
@@ -422,7 +423,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn units_with_few_sensors_and_windows_without_rows_are_told_of_or_refused() {
         let folder = flown("tumble", 20.0, 3, &[], |_| true);
         let measured = fs::read_to_string(folder.path().join("measured.csv")).expect("a file");
@@ -472,7 +473,7 @@ mod long {
     }
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn what_is_another_motion_gets_no_name_and_leaves_no_gap() {
         for (effect, locality, theta) in [
             ("latency", Locality::Unit, vec![0.15]),

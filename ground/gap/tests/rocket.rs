@@ -93,11 +93,12 @@ fn an_effect_that_the_thrust_alone_shows_says_so_in_the_verdict() {
     assert_eq!(cause["only_in"], "thrust", "{cause:#}");
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     use super::*;
 
     #[test]
-    #[ignore = "takes more than six seconds of a core; cargo host-test-long runs it"]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
     fn a_healthy_rocket_leaves_its_spin_out_and_settles() {
         let site = Environment::alcantara();
         let motion = SoundingRocket::new(20.0, site.gravity);

@@ -27,8 +27,8 @@ pub fn louder(channels: &[Channel], scatter: impl Fn(usize) -> Option<f64>) -> V
     channels.iter().map(|channel| of_kind(channel.sensor)).collect()
 }
 
-/// Whether noise that is louder in these channels by these factors is louder in all of their kinds, and in none of them more than chance lets it be
-/// beyond that.
+/// Whether noise that is louder in these channels by these factors is louder in every sensor of their kinds, and none of these channels is louder
+/// than its kind by more than chance.
 pub fn is_described_too_quiet(channels: &[Channel], louder_by: &[(usize, f64)]) -> bool {
     let factor = |channel: usize| {
         let own = louder_by.iter().find(|(of, _)| *of == channel);
