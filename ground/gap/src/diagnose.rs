@@ -27,6 +27,7 @@ use crate::{
     library::hypotheses::Library,
     null::{
         model::Model,
+        noise::{Noise, noise},
         problem::{Component, Frame, Problem},
     },
     probability::{
@@ -64,6 +65,8 @@ pub struct Diagnosis {
     pub none_of_these: f64,
     /// What is left beneath what is named, and how large it is.
     pub remainder: Remainder,
+    /// Noise of each kind of sensor, as declared and as seen beneath what is named.
+    pub noise: Vec<Noise>,
     /// [prior sigmas] by how much the calibration is off without effects, most first.
     pub strains: Vec<(String, f64)>,
     /// What it all comes to.
@@ -318,6 +321,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         keys,
         promises,
         louder: finished.louder.to_vec(),
+        noise: noise(&problem, finished.after, &subject.repeated),
         gap,
         gate,
         alternatives,

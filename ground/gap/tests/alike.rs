@@ -51,6 +51,35 @@ fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
     diagnosis.causes.iter().map(|cause| cause.effect).collect()
 }
 
+/// Three standard deviations of a level and a colour: `sqrt(3/n)` of a channel's 600 fitted samples, `sqrt(pi/2)` times that twice, for both
+/// medians, over the root of six channels.
+const BY_CHANCE: f64 = 0.14;
+
+/// What is said of the gyros' noise, its level over that declared, and its colour.
+fn said(diagnosis: &Diagnosis) -> (Vec<&'static str>, f64, f64) {
+    let [gyros] = &diagnosis.noise[..] else {
+        panic!("{:?}", diagnosis.noise);
+    };
+    (gyros.words(), gyros.seen / gyros.declared, gyros.colour)
+}
+
+#[test]
+fn noise_is_told_beside_the_verdict_as_it_is() {
+    for (louder, alike, words) in [
+        ([1.0; 6], 0.0, &[][..]),
+        ([1.0, 2.0, 1.0, 1.0, 1.0, 1.0], 0.0, &[]),
+        ([0.7; 6], 0.0, &["quieter"]),
+        ([1.4; 6], 0.0, &["louder"]),
+        ([1.0; 6], 0.5, &["coloured"]),
+        ([1.4; 6], -0.5, &["louder", "coloured"]),
+    ] {
+        let (own, ratio, colour) = said(&diagnosed(louder, alike));
+        assert_eq!(own, words, "{louder:?} {alike}");
+        assert!((ratio / louder[0] - 1.0).abs() < BY_CHANCE, "{ratio} of {louder:?}");
+        assert!((colour - alike).abs() < BY_CHANCE, "{colour} of {alike}");
+    }
+}
+
 #[test]
 fn noise_that_is_louder_in_all_has_no_name_and_in_one_it_has() {
     let all = diagnosed([1.4; 6], 0.0);

@@ -32,6 +32,28 @@ pub enum Kind {
     Thermometer,
 }
 
+impl Kind {
+    /// As people write several of them.
+    pub const fn plural(self) -> &'static str {
+        match self {
+            Self::Accelerometer => "accelerometers",
+            Self::Gyro => "gyros",
+            Self::Magnetometer => "magnetometers",
+            Self::Thermometer => "thermometers",
+        }
+    }
+
+    /// The physical unit of its readings.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Accelerometer => "m/s2",
+            Self::Gyro => "rad/s",
+            Self::Magnetometer => "uT",
+            Self::Thermometer => "degC",
+        }
+    }
+}
+
 /// One logged channel.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

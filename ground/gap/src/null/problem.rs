@@ -174,6 +174,17 @@ impl<'a> Problem<'a> {
         if fast > 0.0 { own / own.hypot(fast) } else { 1.0 }
     }
 
+    /// [physical unit^2] half the mean square by which what the reference errs slowly changes in a channel over so many seconds.
+    pub fn slow_change(&self, channel: usize, over_s: f64) -> f64 {
+        let slow = Slow::of(
+            self.twin,
+            &self.instrument.accuracy,
+            self.twin.unit().channels[channel].sensor,
+        );
+        // One less the correlation, which begins as `2 t / alike` for both kinds of spectrum.
+        slow.sigma.powi(2) * (2.0 * over_s / slow.alike_s).min(1.0)
+    }
+
     /// Whether the reference errs more than a channel scatters by itself: how that scatters then says nothing.
     pub fn is_limited(&self, channel: usize) -> bool {
         let own = self.twin.unit().channels[channel].sigma();

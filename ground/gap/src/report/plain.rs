@@ -87,6 +87,20 @@ pub fn rows(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Vec<(Stri
         true => ("what else", none),
         false => ("what else", format!("{}; {none}", others.join(", "))),
     });
+    let noise: Vec<String> = (diagnosis.noise.iter())
+        .filter(|own| !own.words().is_empty())
+        .map(|own| {
+            let seen_over_declared = own.seen / own.declared;
+            format!(
+                "{}: {} ({seen_over_declared:.2} times what is declared)",
+                own.kind.plural(),
+                own.words().join(", ")
+            )
+        })
+        .collect();
+    if !noise.is_empty() {
+        rows.push(("noise", noise.join("; ")));
+    }
     let shrink = &diagnosis.shrink;
     if !matches!(diagnosis.outcome, Outcome::Clean) {
         let words = gained(

@@ -1,6 +1,7 @@
 //! The verdict on one screen.
 
 mod causes;
+mod noise;
 mod place;
 mod shrink;
 mod wrap;
@@ -148,6 +149,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
         stream.lost, stream.repeated, stream.rejected, subject.unseen, subject.thinned
     )?;
+    noise::lines(text, &diagnosis.noise)?;
     place::line(text, diagnosis)?;
     gross(text, subject, diagnosis)?;
     causes::write(text, subject, diagnosis)?;

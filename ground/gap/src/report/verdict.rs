@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use twin::predict::Kind;
 
 use crate::{
     diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::terminal,
@@ -23,8 +24,27 @@ pub struct Verdict {
     none_of_these: f64,
     outcome: &'static str,
     remainder: Remainder,
+    noise: Vec<Noise>,
     next_experiment: String,
     shrink: Shrink,
+}
+
+/// Of the sensors of a kind: what is declared of a logged sample, and what the log has beneath what is named.
+#[derive(Debug, Serialize)]
+struct Noise {
+    sensor: Kind,
+    /// `quieter` or `louder`, `coloured`, `repeated`; none where it is as declared.
+    is: Vec<&'static str>,
+    declared: f64,
+    seen: f64,
+    by_reference: f64,
+    unit: &'static str,
+    /// Least and most of seen over declared among the channels.
+    ratio: [f64; 2],
+    /// Of neighbouring samples; absent where the reference errs more than the sensors scatter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    correlation: Option<f64>,
+    repeated: f64,
 }
 
 /// What is left beneath what is named.
@@ -138,6 +158,7 @@ impl Verdict {
             none_of_these: rounded(diagnosis.none_of_these, 4),
             outcome: diagnosis.outcome.word(),
             remainder: remainder(subject, &diagnosis.remainder),
+            noise: diagnosis.noise.iter().map(noise).collect(),
             next_experiment,
             shrink: Shrink {
                 hold_before: rounded(diagnosis.shrink.before, 4),
@@ -165,6 +186,20 @@ fn remainder(subject: &Subject, found: &crate::unknown::remainder::Remainder) ->
         sigma: sized(found.sigma.map(|value| rounded(value, 4)), "sigma"),
         attitude_deg: (found.attitude_deg).map(|degrees| sized(degrees.map(|value| rounded(value, 4)), "deg")),
         matters: rounded(found.matters, 4),
+    }
+}
+
+fn noise(found: &crate::null::noise::Noise) -> Noise {
+    Noise {
+        sensor: found.kind,
+        is: found.words(),
+        declared: found.declared,
+        seen: found.seen,
+        by_reference: found.by_reference,
+        unit: found.kind.unit(),
+        ratio: found.range.map(|ratio| rounded(ratio, 3)),
+        correlation: (!found.is_at_most()).then(|| rounded(found.colour, 3)),
+        repeated: rounded(found.repeated, 4),
     }
 }
 

@@ -247,10 +247,7 @@ fn weight(problem: &Problem, channel: usize) -> f64 {
 
 fn unit(problem: &Problem, place: Where) -> &'static str {
     match (kind(problem, place), place) {
-        (Some(Kind::Accelerometer), _) => "m/s2",
-        (Some(Kind::Gyro), _) => "rad/s",
-        (Some(Kind::Magnetometer), _) => "uT",
-        (Some(Kind::Thermometer), _) => "degC",
+        (Some(kind), _) => kind.unit(),
         (None, Where::Rotation) => "rad",
         (None, Where::Delay(_)) => "s",
         (None, _) => "1",
@@ -258,18 +255,12 @@ fn unit(problem: &Problem, place: Where) -> &'static str {
 }
 
 fn words(problem: &Problem, place: Where) -> String {
-    let plural = |kind: Kind| match kind {
-        Kind::Accelerometer => "accelerometers",
-        Kind::Gyro => "gyros",
-        Kind::Magnetometer => "magnetometers",
-        Kind::Thermometer => "thermometers",
-    };
     match place {
         Where::Sensor(channel) => format!("a slow error of {}", problem.twin.unit().channels[channel].name),
-        Where::VectorB(kind) => format!("a slow vector that stands in the body, in all {}", plural(kind)),
-        Where::VectorN(kind) => format!("a slow vector that stands in the room, in all {}", plural(kind)),
+        Where::VectorB(kind) => format!("a slow vector that stands in the body, in all {}", kind.plural()),
+        Where::VectorN(kind) => format!("a slow vector that stands in the room, in all {}", kind.plural()),
         Where::Rotation => "a slow rotation against the reference, of all sensors".to_owned(),
-        Where::Factor(kind) => format!("a factor that changes slowly, of all {}", plural(kind)),
-        Where::Delay(kind) => format!("a delay that changes slowly, of all {}", plural(kind)),
+        Where::Factor(kind) => format!("a factor that changes slowly, of all {}", kind.plural()),
+        Where::Delay(kind) => format!("a delay that changes slowly, of all {}", kind.plural()),
     }
 }

@@ -19,7 +19,7 @@ use crate::input::{
     hold::Held,
     log::{Column, Log, Masked, Stream},
     reference::{Reference, SPREAD_S},
-    repeats::{Repeats, repeats},
+    repeats::{Repeats, by_axes, repeats},
     windows::{Fit, Span},
 };
 
@@ -62,6 +62,8 @@ pub struct Subject {
     pub thinned: usize,
     /// Parts that sent samples twice by their rows alone; `None` where the search for effects on the scatter sees them.
     pub repeats: Option<Vec<Repeats>>,
+    /// Parts of any kind that did, whoever sees them.
+    pub repeated: Vec<Repeats>,
     /// What was grossly wrong and is put right; in tables only.
     pub gross: Gross,
 }
@@ -106,6 +108,7 @@ impl Subject {
         log = within_windows(log, &opened);
         let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
         let repeats = repeats(&log, &unit).filter(|_| !is_exact);
+        let repeated = by_axes(&log, &unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
         let overlap_s = seen_share(&log, (from_s, to_s));
@@ -169,6 +172,7 @@ impl Subject {
             unseen,
             thinned,
             repeats,
+            repeated,
             gross: Gross::default(),
         })
     }
@@ -218,6 +222,7 @@ impl Subject {
             unseen: 0,
             thinned: 1,
             repeats: None,
+            repeated: Vec::new(),
             gross,
         })
     }
