@@ -166,6 +166,8 @@ const FORMAT: &str = r#"{ "case": "S07", "format": "gap-verdict/2",
                  "size": { "value": 0.002, "interval_90": [0.001, 0.003], "unit": "rad/s" },
                  "sigma": { "value": 0.1, "interval_90": [0.05, 0.15], "unit": "sigma" },
                  "attitude_deg": { "value": 0.3, "interval_90": [0.1, 0.4], "unit": "deg" }, "matters": 0.01 },
+  "noise": [ { "sensor": "gyro", "is": ["louder"], "declared": 0.0030, "seen": 0.0042, "by_reference": 0.0, "unit": "rad/s",
+               "ratio": [1.3, 1.5], "correlation": 0.02, "repeated": 0.0 } ],
   "next_experiment": "next",
   "shrink": { "hold_before": 7.35, "hold_recalibrated": 6.90, "hold_after": 1.08, "percent": 98.7, "interval_percent": [98.1, 99.1] } }"#;
 

@@ -41,8 +41,7 @@ struct Noise {
     unit: &'static str,
     /// Least and most of seen over declared among the channels.
     ratio: [f64; 2],
-    /// Of neighbouring samples; absent where the reference errs more than the sensors scatter.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Of neighbouring samples; null where the reference errs more than the sensors scatter.
     correlation: Option<f64>,
     repeated: f64,
 }
