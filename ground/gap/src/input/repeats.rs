@@ -6,7 +6,8 @@
 //! A sample that is a few steps wide repeats by chance, on one axis in ten or fifty. All axes of a part do so with the product of these
 //! parts, `chance = sum over stretches of n p_x p_y p_z`: stretch by stretch ([`STRETCH`]), for a part at rest repeats oftener. Axes that a
 //! calibration has mixed repeat together, oftener than that product; but what repeats by chance is as often the sample before the last, and what
-//! was sent twice is not. Chance is the larger of the two. Rows in which
+//! was sent twice is not; and steps of a few counts that axes make by chance return as often as no step does, where what was sent twice is followed
+//! by steps of all sizes. Chance is the largest of the three. Rows in which
 //! another part repeats too are the logger's, which wrote them twice, and are not looked at. Those in which every part does so say how often it
 //! does: one part may have been changed since. With `c` repeats where `e` are expected chance has
 //! `c ln(c/e) - c + e` nats against it (Chernoff's bound of Poisson's tail). Rests shorter than a stretch still bring more than is expected
@@ -17,6 +18,8 @@
 //! a reference [`crate::parity::codes`] asks of them), parts with fewer than
 //! three axes, of which one repeats too often, and magnetometers, which are often read oftener than they measure.
 
+use std::collections::HashMap;
+
 use twin::predict::{Kind, UnitDescription};
 
 use crate::{
@@ -26,6 +29,9 @@ use crate::{
 
 /// Axes of a part that are taken together.
 const AXES: usize = 3;
+
+/// Part of the largest reading within which two steps are one: f64 has 1e-16, a file nine digits.
+const SAME_STEP: f64 = 1e-9;
 
 /// Rows over which axes repeat alike: of 32 to 300 all say the same of six recordings.
 const STRETCH: usize = 64;
@@ -87,6 +93,10 @@ pub fn by_axes(log: &Log, unit: &UnitDescription, kinds: &[Kind]) -> Vec<Repeats
         };
         let apart: f64 = rows.chunks(STRETCH).map(by_chance).sum();
         let chance = apart.max(rows.iter().filter(returns).count() as f64);
+        let chance = match count > chance {
+            true => chance.max(commonest_step(log, channels)),
+            false => chance,
+        };
         let expected = chance + by_logger + 1.0;
         let nats = if count - expected >= SAID * count {
             count * (count / expected).ln() - count + expected
@@ -124,6 +134,30 @@ fn repeated(series: &Series, rows: usize, back: usize) -> Vec<bool> {
     repeated
 }
 
+/// How often the step of all axes of a part that is commonest, of those that are one, is made from a row to the next.
+fn commonest_step(log: &Log, channels: &[usize]) -> f64 {
+    let mut steps: HashMap<Vec<i64>, usize> = HashMap::new();
+    let axes: Vec<Vec<f64>> = channels.iter().map(|channel| along_rows(log, *channel)).collect();
+    let largest = axes.iter().flatten().filter(|value| value.is_finite());
+    let least = SAME_STEP * largest.fold(f64::MIN_POSITIVE, |most, value| f64::max(most, value.abs()));
+    for row in 1..log.start_s.len() {
+        let step = axes.iter().map(|axis| ((axis[row] - axis[row - 1]) / least).round());
+        let step: Option<Vec<i64>> = step.map(|step| step.is_finite().then_some(step as i64)).collect();
+        if let Some(step) = step.filter(|step| step.iter().any(|own| *own != 0)) {
+            *steps.entry(step).or_default() += 1;
+        }
+    }
+    steps.into_values().max().unwrap_or(0) as f64
+}
+
+/// A channel at every row of a log; NaN where it has no sample.
+fn along_rows(log: &Log, channel: usize) -> Vec<f64> {
+    let series = &log.channels[channel];
+    let mut rows = vec![f64::NAN; log.start_s.len()];
+    (series.rows.iter().zip(&series.values)).for_each(|(row, value)| rows[*row as usize] = *value);
+    rows
+}
+
 /// Channels of each part of some kinds: those of one kind in one group.
 fn parts(unit: &UnitDescription, kinds: &[Kind]) -> Vec<Vec<usize>> {
     let of = |kind: Kind| {
@@ -150,11 +184,12 @@ mod tests {
     /// An accelerometer, a gyro and a magnetometer, a noise of two steps, at rest in every second stretch; `is_old` says of part and row whether the row
     /// before is sent again, with some number between none and one.
     fn found(is_old: impl Fn(usize, u32, f64) -> bool) -> Vec<Repeats> {
-        let (unit, log) = logged(is_old);
+        let (unit, log) = logged(is_old, 2.0, [0.0, 3.0]);
         repeats(&log, &unit).expect("no codes")
     }
 
-    fn logged(is_old: impl Fn(usize, u32, f64) -> bool) -> (UnitDescription, Log) {
+    /// The same with a noise of so many steps, moving by so many steps in even and in odd stretches.
+    fn logged(is_old: impl Fn(usize, u32, f64) -> bool, noisy: f64, moving: [f64; 2]) -> (UnitDescription, Log) {
         let mut text = "name = \"x\"\ncycle_s = 0.01\n".to_owned();
         let sensors = ["accelerometer", "gyro", "magnetometer"];
         for (index, sensor) in sensors.iter().flat_map(|one| [one; 3]).enumerate() {
@@ -169,14 +204,14 @@ mod tests {
         let mut before = [0.0; 9];
         for row in 0..ROWS {
             log.start_s.push(0.01 * f64::from(row));
-            let moved = if row / 500 % 2 == 0 { 0.0 } else { 3.0 };
+            let moved = moving[row as usize / 500 % 2];
             for part in 0..3 {
                 let chance: f64 = StandardNormal.sample(&mut random);
                 let old = row > 0 && is_old(part, row, statrs::function::erf::erf(chance.abs() / 2f64.sqrt()));
                 for (index, before) in before.iter_mut().enumerate().skip(3 * part).take(3) {
                     let noise: f64 = StandardNormal.sample(&mut random);
                     let fresh =
-                        0.1 * (2.0 * noise + moved * (f64::from(row) * (0.11 + 0.02 * index as f64)).sin()).round();
+                        0.1 * (noisy * noise + moved * (f64::from(row) * (0.11 + 0.02 * index as f64)).sin()).round();
                     *before = if old { *before } else { fresh };
                     log.channels[index].rows.push(row);
                     log.channels[index].values.push(*before);
@@ -212,8 +247,8 @@ mod tests {
     /// The gyros' steps are no longer along their axes: all three repeat where one does.
     #[test]
     fn axes_that_a_calibration_has_mixed_repeat_together_by_chance() {
-        let mixed = |is_old: &dyn Fn(usize, u32, f64) -> bool| {
-            let (unit, mut log) = logged(is_old);
+        let mixed = |is_old: &dyn Fn(usize, u32, f64) -> bool, noisy: f64, moving: [f64; 2]| {
+            let (unit, mut log) = logged(is_old, noisy, moving);
             for row in 0..ROWS as usize {
                 let [x, y, z] = [3, 4, 5].map(|channel| log.channels[channel].values[row]);
                 for (channel, value) in [
@@ -226,8 +261,10 @@ mod tests {
             }
             repeats(&log, &unit).expect("no codes")
         };
-        assert_eq!(mixed(&|_, _, _| false), []);
-        let found = mixed(&|part, _, chance| part == 1 && chance < 0.05);
+        assert_eq!(mixed(&|_, _, _| false, 2.0, [0.0, 3.0]), []);
+        // As quick as the noise is large: the sample before the last is seldom the same.
+        assert_eq!(mixed(&|_, _, _| false, 0.5, [15.0; 2]), []);
+        let found = mixed(&|part, _, chance| part == 1 && chance < 0.05, 2.0, [0.0, 3.0]);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].share - 0.05).abs() < 3.0 * found[0].sigma, "{found:?}");
     }
