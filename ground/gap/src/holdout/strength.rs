@@ -33,6 +33,8 @@ pub struct Claimed<'a> {
     pub louder: &'a [f64],
     /// What of the model happens again at random.
     pub events: Option<&'a Events>,
+    /// Which stretch of time each row is in, where samples of one are averaged before they are compared.
+    pub stretches: Option<&'a [usize]>,
 }
 
 /// An effect's strength on the held-out windows over that on the fit windows.
@@ -77,29 +79,36 @@ impl Held {
             let after = |row: usize| course.mean(*channel, row, |after| after);
             let samples = series.rows.iter().map(|row| *row as usize).zip(&series.values);
             let seen: Vec<(usize, f64)> = samples
-                .map(|(row, value)| (row, (value - after(row)) / sigma(row)))
+                .map(|(row, value)| (row, value - after(row)))
                 .filter(|(row, rest)| rest.is_finite() && added[*row].is_finite())
                 .collect();
-            let own = DVector::from_iterator(seen.len(), seen.iter().map(|(row, _)| added[*row] / sigma(*row)));
-            let rest = DVector::from_iterator(seen.len(), seen.iter().map(|(_, rest)| *rest));
-            let nuisance = DMatrix::from_fn(seen.len(), open.nrows(), |at, column| {
-                open[(column, seen[at].0)] / sigma(seen[at].0)
-            });
+            let rows: Vec<usize> = seen.iter().map(|(row, _)| *row).collect();
+            let means = |of: &dyn Fn(usize) -> f64| means(&rows, claimed.stretches, |at| of(at) / sigma(rows[at]));
+            let own = means(&|at| added[rows[at]]);
+            let rest = means(&|at| seen[at].1);
+            let columns: Vec<DVector<f64>> = (0..open.nrows())
+                .map(|column| means(&|at| open[(column, rows[at])]))
+                .collect();
+            let nuisance = match columns.is_empty() {
+                true => DMatrix::zeros(own.len(), 0),
+                false => DMatrix::from_columns(&columns),
+            };
             // Woodbury: (I + N N')^-1 = I - N (I + N'N)^-1 N'.
             let imitated = nuisance.tr_mul(&own);
             let inner = DMatrix::identity(open.nrows(), open.nrows()) + nuisance.tr_mul(&nuisance);
             let Some(inner) = inner.cholesky() else { continue };
             let apart = &own - &nuisance * inner.solve(&imitated);
+            let apart = match claimed.stretches {
+                Some(_) => &apart / louder_than_noise(&rest, &own, &apart),
+                None => apart,
+            };
             energy += apart.dot(&own);
             along += apart.dot(&rest);
             for (sum, slope) in by_parameter.iter_mut().zip(&claimed.error.slopes) {
                 let Some((_, values)) = slope.entries.iter().find(|(index, _)| index == channel) else {
                     continue;
                 };
-                let pairs = apart.iter().zip(&seen);
-                *sum += pairs
-                    .map(|(apart, (row, _))| apart * values[*row] / sigma(*row))
-                    .sum::<f64>();
+                *sum += apart.dot(&means(&|at| values[rows[at]]));
             }
         }
         (energy > 0.0).then(|| Promise {
@@ -107,6 +116,32 @@ impl Held {
             sigma: (energy + by_parameter.dot(&(&claimed.error.covariance * &by_parameter)).max(0.0)).sqrt() / energy,
         })
     }
+}
+
+/// By how much the energy of a rest beside what is `apart` of an effect, as strong as is best there, is above that of white noise of one, at
+/// least 1: what a reference errs by is alike over some samples, and means of them are louder than their number says.
+fn louder_than_noise(rest: &DVector<f64>, effect: &DVector<f64>, apart: &DVector<f64>) -> f64 {
+    let energy = apart.dot(effect).max(f64::MIN_POSITIVE);
+    let left = rest.norm_squared() - apart.dot(rest).powi(2) / energy;
+    (left / rest.len().max(1) as f64).max(1.0)
+}
+
+/// Sums of values in units of noise over each stretch that has samples, over the root of their number: what is white stays white noise of one.
+fn means(rows: &[usize], stretches: Option<&[usize]>, value: impl Fn(usize) -> f64) -> DVector<f64> {
+    let Some(stretches) = stretches else {
+        return DVector::from_iterator(rows.len(), (0..rows.len()).map(value));
+    };
+    let mut sums: Vec<(f64, f64)> = Vec::new();
+    let mut last = None;
+    for (at, row) in rows.iter().enumerate() {
+        if last.replace(stretches[*row]) != Some(stretches[*row]) {
+            sums.push((0.0, 0.0));
+        }
+        if let Some((sum, count)) = sums.last_mut() {
+            (*sum, *count) = (*sum + value(at), *count + 1.0);
+        }
+    }
+    DVector::from_iterator(sums.len(), sums.iter().map(|(sum, count)| sum / count.sqrt()))
 }
 
 #[cfg(test)]
@@ -129,13 +164,23 @@ mod tests {
 
     /// The same of an amplitude that was fitted to `fitted_sigma`.
     fn promised_by(measured: impl Fn(usize) -> f64, fitted_sigma: f64) -> Promise {
+        promised_of(measured, fitted_sigma, &|row| sine(row, 0.1), None)
+    }
+
+    /// The same where the law of the effect is this.
+    fn promised_of(
+        measured: impl Fn(usize) -> f64,
+        fitted_sigma: f64,
+        law: &dyn Fn(usize) -> f64,
+        stretches: Option<&[usize]>,
+    ) -> Promise {
         let held = Held::new(vec![Series {
             rows: (0..SAMPLES as u32).collect(),
             values: (0..SAMPLES).map(measured).collect(),
         }]);
-        let added = [(0, (0..SAMPLES).map(|row| sine(row, 0.1)).collect())];
+        let added = [(0, (0..SAMPLES).map(law).collect())];
         let open = [DMatrix::from_element(1, SAMPLES, 100.0)];
-        let after = [(0..SAMPLES).map(|row| sine(row, 0.1)).collect()];
+        let after = [(0..SAMPLES).map(law).collect()];
         let amplitude = Column {
             name: "amplitude".into(),
             sigma: 1.0,
@@ -153,6 +198,7 @@ mod tests {
             sigmas: &[vec![0.1; SAMPLES]],
             louder: &[1.0],
             events: None,
+            stretches,
         };
         held.promise(claimed).expect("it adds something")
     }
@@ -180,6 +226,38 @@ mod tests {
         assert!(known.confidence() < 1e-6, "{known:?}");
         assert!(hardly_known.confidence() > 0.3, "{hardly_known:?}");
         assert!((known.factor - hardly_known.factor).abs() < 1e-12);
+    }
+
+    /// The law has three times its own energy of an error of the reference, which the unit has not.
+    #[test]
+    fn an_error_in_the_law_makes_no_true_effect_weaker_in_means() {
+        let law = |row: usize| sine(row, 0.1) + 1.7 * sine(row, 2.1);
+        let noisy = |row: usize| sine(row, 0.1) + 0.1 * sine(row, 1.7);
+        let stretches: Vec<usize> = (0..SAMPLES).map(|row| row / 12).collect();
+        let by_sample = promised_of(noisy, 0.01, &law, None);
+        let in_means = promised_of(noisy, 0.01, &law, Some(&stretches));
+        assert!(by_sample.confidence() < 1e-6, "{by_sample:?}");
+        assert!(
+            (in_means.factor - 1.0).abs() < 0.1 && in_means.confidence() > 0.99,
+            "{in_means:?}"
+        );
+        let gone = promised_of(|row| 0.1 * sine(row, 1.7), 0.01, &law, Some(&stretches));
+        assert!(gone.confidence() < 1e-6, "{gone:?}");
+    }
+
+    /// What is alike over a stretch makes means louder, and a factor that far from one is no refutation.
+    #[test]
+    fn means_are_as_uncertain_as_they_scatter() {
+        let stretches: Vec<usize> = (0..SAMPLES).map(|row| row / 12).collect();
+        let slow = |row: usize| 0.7 * sine(row / 12, 2.3);
+        let promise = promised_of(
+            |row| sine(row, 0.1) + slow(row),
+            0.0,
+            &|row| sine(row, 0.1),
+            Some(&stretches),
+        );
+        let white = promised_of(|row| sine(row, 0.1), 0.0, &|row| sine(row, 0.1), Some(&stretches));
+        assert!(promise.sigma > 5.0 * white.sigma, "{promise:?} {white:?}");
     }
 
     #[test]

@@ -19,7 +19,7 @@ use crate::{
         fit_error::FitError,
         strength::{Claimed, Promise},
     },
-    input::{case::SlowErrors, hold::Held},
+    input::case::{SlowErrors, Subject},
     library::hypotheses::Library,
     null::{beyond::Beyond, model::Model, problem::Problem},
     probability::{
@@ -27,7 +27,7 @@ use crate::{
         importance::{Course, Importance},
     },
     search::explanation::Explanation,
-    thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
+    thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
     unknown::adequacy::Leftover,
 };
 
@@ -226,10 +226,17 @@ impl Promised {
     }
 }
 
+/// \[s\] over which samples are averaged where the reference errs: longer than a period of its fastest errors (it is used up to 20 Hz), shorter than a
+/// motion of a hand.
+const MEAN_S: f64 = 0.2;
+
 /// What the held-out windows say of each cause, which are the model's effects in their order; one that does not keep there
 /// what it promised on the fit windows is believed less.
+///
+/// What a reference errs by fast is in the law of a delay or a lever arm too, which are derivatives of its motion: noise in a regressor, by which a
+/// true effect seems weaker the slower the windows are (Fuller 1987, section 1.1). So means over [`MEAN_S`] are compared where they show the effect.
 pub fn promises(
-    held: &Held,
+    subject: &Subject,
     problem: &Problem,
     library: &Library,
     explanation: &Explanation,
@@ -242,19 +249,29 @@ pub fn promises(
         return Vec::new();
     }
     let error = FitError::of(problem, model);
+    let starts_s = problem.twin.starts_s();
+    let stretches: Vec<usize> = starts_s.iter().map(|t_s| (t_s / MEAN_S).max(0.0) as usize).collect();
+    let is_inexact = subject.slow.attitude_sigma_rad > 0.0;
     let promised = |(index, cause): (usize, &mut Cause)| {
         let added = problem.added(&model.components, &[index]);
         let open: Vec<_> = added.iter().map(|(channel, _)| problem.still_open(*channel)).collect();
         let hypothesis = &library.hypotheses[chosen[index].hypothesis];
-        let promise = held.promise(Claimed {
-            added: &added,
-            open: &open,
-            error: &error.with_value(problem, model, index, hypothesis),
-            after: &model.predicted,
-            sigmas: &problem.sigmas,
-            louder: &explanation.louder,
-            events,
-        });
+        let error = error.with_value(problem, model, index, hypothesis);
+        let promise_in = |stretches: Option<&[usize]>| {
+            subject.held.promise(Claimed {
+                added: &added,
+                open: &open,
+                error: &error,
+                after: &model.predicted,
+                sigmas: &problem.sigmas,
+                louder: &explanation.louder,
+                events,
+                stretches,
+            })
+        };
+        let in_means = is_inexact.then(|| promise_in(Some(&stretches))).flatten();
+        let is_shown = |promise: &Promise| promise.sigma <= STRENGTH_SHOWN;
+        let promise = in_means.filter(is_shown).or_else(|| promise_in(None));
         let confidence = promise.map_or(UNTOLD, |promise| promise.confidence());
         let believed = cause.probability;
         cause.probability *= confidence;

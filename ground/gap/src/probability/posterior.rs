@@ -58,7 +58,7 @@ impl Believed {
         let importance = importance.flatten();
         let beyond = beyond_reference(problem, &subject.slow, explanation, importance.as_ref(), &mut causes);
         let keys = second_keys(problem, library, &explanation.model, &mut causes);
-        let promises = promises(&subject.held, problem, library, explanation, events, &mut causes);
+        let promises = promises(subject, problem, library, explanation, events, &mut causes);
         let loud = loud(problem, explanation, floor);
         if let Some(importance) = &importance {
             (causes.iter_mut().zip(&importance.effects))
