@@ -8,6 +8,7 @@ mod chain;
 mod feel;
 mod unit;
 
+pub(crate) use chain::BEFORE;
 pub use chain::Chain;
 pub use feel::{Aim, Feel};
 pub use unit::{Channel, Kind, KnownEffect, UnitDescription, UnitError};

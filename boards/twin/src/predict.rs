@@ -25,6 +25,7 @@ pub use input::Memory;
 use input::{Filters, Look};
 pub use scene::{Filter, Scene};
 
+use crate::channel::BEFORE;
 pub use crate::channel::{Aim, Chain, Channel, Feel, Kind, KnownEffect, UnitDescription, UnitError};
 use crate::effect::{Active, Cause, Nature, Parameter, Site, UnknownEffect};
 use crate::environment::Environment;
@@ -202,24 +203,30 @@ impl Twin {
             true => self.plain[index].clone(),
             false => self.input(index, Look::of(&chain, &t_s), memory).to_vec(),
         };
-        let felt: &[Feel] = match (chain.is_additive(), chain.is_delayed()) {
-            (false, _) => &[],
-            (true, true) => self.felt(index, Look::of(&chain, &t_s), memory),
-            (true, false) => {
-                let known = self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel));
-                known.map_or(&[], |(_, felt)| felt)
-            }
-        };
-        for (row, (reading, t_s)) in readings.iter_mut().zip(&t_s).enumerate() {
-            let added = felt.get(row).map_or(0.0, |feel| chain.added(feel, *reading));
-            let felt_before = |ago_s: f64| self.scene.feel(chain.instant(*t_s) - ago_s);
-            let added = added + chain.added_gross(channel.tau_s(), felt_before);
-            // A high-pass takes the bias with it.
-            *reading += added + if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
+        let seen = |ago_s: f64| -> Vec<f64> { t_s.iter().map(|t_s| chain.instant(*t_s) - ago_s).collect() };
+        // A high-pass takes the bias with it.
+        let bias = if chain.high_pass_s.is_some() { 0.0 } else { chain.bias };
+        let mut added = vec![0.0; readings.len()];
+        if chain.is_additive() {
+            let felt = match chain.is_delayed() {
+                true => self.felt(seen(channel.tau_s()), memory),
+                false => self.nominal_felt(channel),
+            };
+            let terms = added.iter_mut().zip(felt).zip(&readings);
+            terms.for_each(|((added, feel), reading)| *added = chain.added(feel, *reading));
         }
+        if chain.is_gross() {
+            let [near, far] = match chain.is_delayed() || channel.tau_s() > 0.0 {
+                true => self.felt_at_both(BEFORE.map(|part| seen(part * channel.tau_s())), memory),
+                // Without a low-pass all of it is felt at once.
+                false => [self.nominal_felt(channel); 2],
+            };
+            let felt = added.iter_mut().zip(near).zip(far);
+            felt.for_each(|((added, near), far)| *added += chain.added_gross([near, far]));
+        }
+        (readings.iter_mut().zip(added)).for_each(|(reading, added)| *reading += added + bias);
         for (tau_s, per_rate) in chain.thermal() {
-            let seen_s = t_s.iter().map(|t_s| chain.instant(*t_s) - channel.tau_s()).collect();
-            let rates = self.temperature_rates(*tau_s, seen_s, memory);
+            let rates = self.temperature_rates(*tau_s, seen(channel.tau_s()), memory);
             (readings.iter_mut().zip(rates)).for_each(|(reading, rate)| *reading += per_rate * rate);
         }
         chain.finish(&t_s, &mut readings);
@@ -227,6 +234,12 @@ impl Twin {
             *reading = reading.clamp(channel.range[0], channel.range[1]);
         }
         readings
+    }
+
+    /// What the centre feels when what a channel reads passes its low-pass, if it is read when it should be.
+    fn nominal_felt(&self, channel: &Channel) -> &[Feel] {
+        let known = self.felt.iter().find(|(after_s, _)| *after_s == seen_s(channel));
+        known.map_or(&[], |(_, felt)| felt)
     }
 
     /// Derivatives of the readings by the parameters of `active[of]`, one column a parameter: central differences, exact

@@ -20,6 +20,9 @@ type Felt<'a> = Box<dyn Fn(&Feel) -> f64 + 'a>;
 /// Changes the series of readings; told the nominal instants \[s\].
 type Stage<'a> = Box<dyn Fn(&[f64], &mut [f64]) + 'a>;
 
+/// [time constants of the low-pass] before an instant what is gross of a reading is felt.
+pub(crate) const BEFORE: [f64; 2] = [2.0 - core::f64::consts::SQRT_2, 2.0 + core::f64::consts::SQRT_2];
+
 /// How one channel comes to its readings.
 pub struct Chain<'a> {
     /// What it looks at.
@@ -101,14 +104,15 @@ impl<'a> Chain<'a> {
         !self.terms.is_empty()
     }
 
-    /// What is gross of a reading, through a low-pass of `tau_s`, given what is felt so long \[s\] before. The exponential's mean by
-    /// two of its instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
-    pub(crate) fn added_gross(&self, tau_s: f64, felt: impl Fn(f64) -> Feel) -> f64 {
+    pub(crate) fn is_gross(&self) -> bool {
+        !self.gross.is_empty()
+    }
+
+    /// What is gross of a reading, through a low-pass, given what is felt [`BEFORE`] the instant. The exponential's mean by two of its
+    /// instants is exact for cubics (Gauss and Laguerre; Abramowitz and Stegun 25.4.45).
+    pub(crate) fn added_gross(&self, felt: [&Feel; 2]) -> f64 {
         let root = core::f64::consts::SQRT_2;
-        let mean = |term: &Felt| {
-            let at = |part: f64| term(&felt(part * tau_s));
-            0.25 * ((2.0 + root) * at(2.0 - root) + (2.0 - root) * at(2.0 + root))
-        };
+        let mean = |term: &Felt| 0.25 * ((2.0 + root) * term(felt[0]) + (2.0 - root) * term(felt[1]));
         self.gross.iter().map(mean).sum()
     }
 

@@ -39,12 +39,18 @@ impl Look {
     }
 }
 
+/// Series of what is felt that are kept: as many as there are kinds of sensors, each of which may be late by itself.
+const FELT: usize = 4;
+
 /// What questions to one [`Twin`] have in common.
 #[derive(Default)]
 pub struct Memory {
     /// Low-passes beside the nominal channels' own.
     filters: Filters,
     latest: Option<Latest>,
+    /// What the centre feels at other instants than the nominal channels', by these instants, the latest asked for last: all channels that
+    /// are equally late feel the same, whatever they look at.
+    felt: Vec<(Vec<f64>, Vec<Feel>)>,
 }
 
 /// The latest question of a channel that does not look as described.
@@ -52,8 +58,24 @@ struct Latest {
     channel: usize,
     look: Look,
     input: Vec<f64>,
-    /// What the centre feels when what it reads passes its low-pass; empty until it is asked for.
-    felt: Vec<Feel>,
+}
+
+impl Memory {
+    /// Keeps what is felt at these instants and says that they were asked for last.
+    fn keep(&mut self, instants_s: Vec<f64>, felt: impl Fn(f64) -> Feel) {
+        let known = self.felt.iter().position(|(own, _)| *own == instants_s);
+        let latest = match known {
+            Some(at) => self.felt.remove(at),
+            None => {
+                let felt = instants_s.iter().map(|t_s| felt(*t_s)).collect();
+                (instants_s, felt)
+            }
+        };
+        if self.felt.len() == FELT {
+            self.felt.remove(0);
+        }
+        self.felt.push(latest);
+    }
 }
 
 impl Twin {
@@ -62,15 +84,23 @@ impl Twin {
         &self.latest(channel, look, memory).input
     }
 
-    /// What the centre feels when what a channel that looks so reads passes its low-pass.
-    pub(super) fn felt<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a [Feel] {
-        let tau_s = self.unit.channels[channel].tau_s();
-        let latest = self.latest(channel, look, memory);
-        if latest.felt.is_empty() {
-            let instants_s = latest.look.instants_s.iter();
-            latest.felt = instants_s.map(|t_s| self.scene.feel(t_s - tau_s)).collect();
+    /// What the centre feels at these instants.
+    pub(super) fn felt<'a>(&self, instants_s: Vec<f64>, memory: &'a mut Memory) -> &'a [Feel] {
+        memory.keep(instants_s, |t_s| self.scene.feel(t_s));
+        memory.felt.last().map_or(&[], |(_, felt)| felt)
+    }
+
+    /// The same at two series of instants.
+    pub(super) fn felt_at_both<'a>(&self, instants_s: [Vec<f64>; 2], memory: &'a mut Memory) -> [&'a [Feel]; 2] {
+        let is_one = instants_s[0] == instants_s[1];
+        instants_s
+            .into_iter()
+            .for_each(|instants_s| memory.keep(instants_s, |t_s| self.scene.feel(t_s)));
+        match &memory.felt[..] {
+            [.., (_, felt)] if is_one => [felt, felt],
+            [.., (_, first), (_, second)] => [first, second],
+            _ => [&[], &[]],
         }
-        &latest.felt
     }
 
     /// [degC/s] The temperature's rate of change at these instants through a low-pass of `tau_s` > 0: of a low-pass
@@ -93,7 +123,7 @@ impl Twin {
     }
 
     fn latest<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a mut Latest {
-        let Memory { filters, latest } = memory;
+        let Memory { filters, latest, .. } = memory;
         let known = latest
             .take()
             .filter(|known| known.channel == channel && known.look == look);
@@ -101,7 +131,6 @@ impl Twin {
             channel,
             input: self.filtered(&look, self.unit.channels[channel].tau_s(), filters),
             look,
-            felt: Vec::new(),
         }))
     }
 
