@@ -162,6 +162,13 @@ impl Twin {
         self.starts_s.iter().map(|start_s| start_s + slot_s).collect()
     }
 
+    /// \[s\] when what an effect adds to this channel is felt, one instant a cycle; `None` where a known effect may move these.
+    pub fn seen_s(&self, channel: usize) -> Option<Vec<f64>> {
+        let after_s = seen_s(&self.unit.channels[channel]);
+        let instants_s = self.starts_s.iter().map(|start_s| start_s + after_s);
+        self.known.is_empty().then(|| instants_s.collect())
+    }
+
     /// What the unit's centre feels when this channel is read, one state a cycle.
     pub fn feels(&self, channel: usize) -> Vec<Feel> {
         self.instants_s(channel)

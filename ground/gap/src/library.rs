@@ -3,5 +3,6 @@
 //! In: the problem. Out: [`hypotheses::Library`], hypotheses with prior odds, and the inner [`products`] of their columns, each
 //! made when it is first asked for.
 
+pub mod column;
 pub mod hypotheses;
 pub mod products;

@@ -4,11 +4,9 @@
 //! and at each channel's own instant, so the plates' phases come out right. Something slow that is no alias has one phase in all
 //! of them (a frequency below zero here).
 
-use core::f64::consts::TAU;
-
 use nalgebra::Vector3;
 
-use super::{Effect, Page, Scope, Site, Symbol};
+use super::{Effect, Page, Scope, Site, Symbol, Wave};
 use crate::channel::{Chain, Kind};
 
 /// \[Hz\] how far the mains and the clock of the unit are off together.
@@ -39,6 +37,14 @@ const PAGE: Page = Page {
     ..Page::SMOOTH
 };
 
+/// The line of a variant.
+fn line(variant: f64) -> Wave {
+    Wave {
+        hz: variant.abs(),
+        is_of_cycle: variant < 0.0,
+    }
+}
+
 impl Effect for MainsAlias {
     fn page(&self) -> &'static Page {
         &PAGE
@@ -50,9 +56,9 @@ impl Effect for MainsAlias {
             Vector3::from_column_slice(&theta[3..]),
         );
         let axis_b = site.channel.axis_b;
-        let later_s = if variant < 0.0 { site.channel.slot_s } else { 0.0 };
+        let (wave, slot_s) = (line(variant), site.channel.slot_s);
         chain.add(move |feel, _| {
-            let (sin, cos) = (TAU * variant.abs() * (feel.t_s - later_s)).sin_cos();
+            let (sin, cos) = wave.sine_cosine(feel.t_s, slot_s);
             axis_b.dot(&feel.to_b(sine_n * sin + cosine_n * cos))
         });
     }
@@ -68,6 +74,10 @@ impl Effect for MainsAlias {
         let steps = (SPREAD_HZ / step_hz) as i32;
         let around = |hz: f64| (-steps..=steps).map(move |k| hz + f64::from(k) * step_hz);
         around(60.0).chain(around(50.0)).collect()
+    }
+
+    fn wave(&self, variant: f64) -> Option<Wave> {
+        Some(line(variant))
     }
 
     fn without_its_physics(&self, variant: f64) -> Option<f64> {

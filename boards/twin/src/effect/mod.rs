@@ -80,7 +80,9 @@ mod tests;
 mod vibration;
 mod vibration_rectification;
 mod warm_up;
+mod wave;
 
+pub use self::wave::Wave;
 pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{CorrectedAs, Nature, Needs, Page, Scope, Symbol, Texture};
 pub use site::Site;
@@ -268,6 +270,12 @@ pub trait Effect: Sync {
     /// The variant with the same course that lacks what this effect's physics makes of it: where it explains a log better, this
     /// effect stands in for something without a name.
     fn without_its_physics(&self, _variant: f64) -> Option<f64> {
+        None
+    }
+
+    /// The wave that carries this variant, if one does: its columns are courses of time times the sine, for the first half of the
+    /// parameters, and the same courses times the cosine for the others. Variant 0 has no frequency and leaves the courses.
+    fn wave(&self, _variant: f64) -> Option<Wave> {
         None
     }
 

@@ -16,7 +16,7 @@ use twin::{
 use crate::{
     advise::confusion::Pair,
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
-    library::products::Products,
+    library::{column::Column, products::Products},
     null::problem::Problem,
     thresholds::TOLD_APART,
 };
@@ -159,7 +159,7 @@ fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f6
             .iter()
             .map(|column| {
                 sigmas.push(column.sigma);
-                products.push(&problem, problem.in_noise(column, None))
+                products.push(&problem, Column::Held(problem.in_noise(column, None)))
             })
             .collect()
     };

@@ -9,7 +9,10 @@ use nalgebra::DVector;
 use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Page, Parameter, onsets};
 
 use crate::{
-    library::products::Products,
+    library::{
+        column::{Carrier, Column},
+        products::Products,
+    },
     null::{
         evidence::Screen,
         interval::Interval,
@@ -107,7 +110,7 @@ impl Library {
             reference: problem.reference.len(),
         };
         for column in problem.reference_columns() {
-            library.products.push(problem, column);
+            library.products.push(problem, Column::Held(column));
         }
         let is_exact = problem.instrument.accuracy.attitude_sigma_rad <= 0.0;
         let is_offered = |page: &Page| {
@@ -125,6 +128,7 @@ impl Library {
             let widest = localities.iter().filter(|locality| is_wide(locality)).count();
             let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
             for locality in &localities {
+                let mut carrier = None;
                 for variant in &variants {
                     let places = if widest == 0 || widest == localities.len() {
                         localities.len()
@@ -150,16 +154,12 @@ impl Library {
                     };
                     let all_known = (0..parameters.len()).all(|index| find(index, &known).is_some());
                     if !all_known {
-                        let zero = Active {
-                            cause: cause.clone(),
-                            theta: vec![0.0; parameters.len()],
-                        };
-                        let columns = problem.twin.jacobian(&[zero], 0);
-                        for (index, column) in columns.iter().enumerate() {
+                        let carrier = carrier.get_or_insert_with(|| Carrier::of(problem, &cause));
+                        for (index, (column, sigma)) in columns(problem, &cause, carrier).into_iter().enumerate() {
                             if find(index, &known).is_none() {
-                                let place = library.products.push(problem, problem.in_noise(column, None));
+                                let place = library.products.push(problem, column);
                                 known.push((cause.touched_by(index, unit), index % width, *variant, place));
-                                library.prior_sigmas.push(column.sigma);
+                                library.prior_sigmas.push(sigma);
                             }
                         }
                     }
@@ -197,6 +197,21 @@ impl Library {
     pub fn is_discrete(&self, hypothesis: usize) -> bool {
         self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
     }
+}
+
+/// The columns of a cause at zero, each with the sigma of its parameter.
+fn columns(problem: &Problem, cause: &Cause, carrier: &Option<Carrier>) -> Vec<(Column, f64)> {
+    if let Some((carrier, wave)) = carrier.as_ref().zip(cause.effect.wave(cause.variant)) {
+        return carrier.columns(wave);
+    }
+    let zero = Active {
+        cause: cause.clone(),
+        theta: vec![0.0; cause.parameters(problem.twin.unit()).len()],
+    };
+    let columns = problem.twin.jacobian(&[zero], 0).into_iter();
+    columns
+        .map(|column| (Column::Held(problem.in_noise(&column, None)), column.sigma))
+        .collect()
 }
 
 /// Whether a place is all there is: a cause behind a whole kind of sensor is as likely as one in any single place.

@@ -3,13 +3,16 @@
 //! In: columns in units of noise, channel by channel. Out: `e'P f` and `e'P r`. A screen needs each hypothesis' own products
 //! and those with what is already chosen, which is a thousandth of all pairs of a library of two thousand columns.
 
-use std::cell::RefCell;
+use std::{borrow::Cow, cell::RefCell, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::null::{
-    evidence::Screen,
-    problem::{Frame, Problem},
+use crate::{
+    library::column::Column,
+    null::{
+        evidence::Screen,
+        problem::{Frame, Problem},
+    },
 };
 
 /// Columns that are taken from colour to colour together: what happens at a sample is then read once for all of them.
@@ -21,7 +24,7 @@ pub type Entries = Vec<(usize, DVector<f64>)>;
 /// Columns and the products known so far.
 #[derive(Clone, Debug, Default)]
 pub struct Products {
-    columns: Vec<Entries>,
+    columns: Vec<Column>,
     /// For each column and channel `L^-1 N'e`, so that `e'P f = e'f - open_e'open_f`.
     open: Vec<Entries>,
     /// Of each column with itself and those before it; NaN for not yet.
@@ -30,8 +33,8 @@ pub struct Products {
 
 impl Products {
     /// Adds a column; returns its place.
-    pub fn push(&mut self, problem: &Problem, column: Entries) -> usize {
-        self.open.push(open_part(problem, &column));
+    pub fn push(&mut self, problem: &Problem, column: Column) -> usize {
+        self.open.push(open_part(problem, &column.entries()));
         self.columns.push(column);
         self.known.get_mut().push(vec![f64::NAN; self.columns.len()]);
         self.columns.len() - 1
@@ -40,7 +43,7 @@ impl Products {
     /// Replaces a column.
     pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
         self.open[place] = open_part(problem, &column);
-        self.columns[place] = column;
+        self.columns[place] = Column::Held(column);
         let known = self.known.get_mut();
         known[place].fill(f64::NAN);
         known.iter_mut().skip(place).for_each(|row| row[place] = f64::NAN);
@@ -48,9 +51,19 @@ impl Products {
 
     /// After the problem's frames were these.
     pub fn reframe(&mut self, problem: &Problem, before: &[Frame]) {
+        if (problem.frames.iter().chain(before)).any(|frame| frame.colour.is_some()) {
+            for column in &mut self.columns {
+                *column = Column::Held(column.entries().into_owned());
+            }
+        }
+        self.reframe_courses(problem, before);
         for (channel, (frame, before)) in problem.frames.iter().zip(before).enumerate() {
-            let columns = self.columns.iter_mut().flatten();
-            let own = columns.filter(|(of, _)| *of == channel).map(|(_, values)| values);
+            let columns = self.columns.iter_mut().filter_map(|column| match column {
+                Column::Held(entries) => Some(entries),
+                Column::Carried(_) => None,
+            });
+            let own = columns.flatten().filter(|(of, _)| *of == channel);
+            let own = own.map(|(_, values)| values);
             let mut own: Vec<&mut DVector<f64>> = own.collect();
             for block in own.chunks_mut(BLOCK) {
                 let white = DMatrix::from_fn(frame.weights.len(), block.len(), |row, at| block[at][row]);
@@ -59,14 +72,43 @@ impl Products {
             }
         }
         for (open, column) in self.open.iter_mut().zip(&self.columns) {
-            *open = open_part(problem, column);
+            *open = open_part(problem, &column.entries());
         }
         self.known.get_mut().iter_mut().for_each(|row| row.fill(f64::NAN));
     }
 
-    /// A column.
-    pub fn column(&self, place: usize) -> &Entries {
-        &self.columns[place]
+    /// The same of what waves carry: a course that many columns have in common stays one.
+    fn reframe_courses(&mut self, problem: &Problem, before: &[Frame]) {
+        let mut renewed: Vec<(Arc<DVector<f64>>, Arc<DVector<f64>>)> = Vec::new();
+        let carried = self.columns.iter_mut().filter_map(|column| match column {
+            Column::Held(_) => None,
+            Column::Carried(parts) => Some(parts),
+        });
+        for (channel, course, _) in carried.flatten() {
+            let known = renewed.iter().find(|(old, _)| Arc::ptr_eq(old, course));
+            let anew = known.map(|(_, anew)| Arc::clone(anew)).unwrap_or_else(|| {
+                let physical = course.component_mul(&before[*channel].weights);
+                let anew = Arc::new(problem.frames[*channel].white(physical));
+                renewed.push((Arc::clone(course), Arc::clone(&anew)));
+                anew
+            });
+            *course = anew;
+        }
+    }
+
+    /// A column's values.
+    pub fn column(&self, place: usize) -> Cow<'_, Entries> {
+        self.columns[place].entries()
+    }
+
+    /// The same in one channel.
+    pub fn values(&self, place: usize, channel: usize) -> Option<Cow<'_, DVector<f64>>> {
+        self.columns[place].values(channel)
+    }
+
+    /// The channels that a column touches.
+    pub fn channels(&self, place: usize) -> Vec<usize> {
+        self.columns[place].channels()
     }
 
     /// Columns there are.
@@ -86,7 +128,7 @@ impl Products {
         if !known.is_nan() {
             return known;
         }
-        let value = inner(&self.columns[one], &self.columns[other]) - inner(&self.open[one], &self.open[other]);
+        let value = self.columns[one].dot(&self.columns[other]) - inner(&self.open[one], &self.open[other]);
         self.known.borrow_mut()[after][before] = value;
         value
     }
@@ -95,7 +137,7 @@ impl Products {
     pub fn scores(&self, problem: &Problem, residuals: &[DVector<f64>]) -> Vec<f64> {
         let all: Entries = residuals.iter().cloned().enumerate().collect();
         let open = open_part(problem, &all);
-        let score = |(column, own): (&Entries, &Entries)| inner(column, &all) - inner(own, &open);
+        let score = |(column, own): (&Column, &Entries)| column.dot_entries(&all) - inner(own, &open);
         self.columns.iter().zip(&self.open).map(score).collect()
     }
 

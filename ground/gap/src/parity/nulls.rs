@@ -123,7 +123,8 @@ pub fn columns(problem: &Problem, library: &Library) -> Vec<Entries> {
     places.dedup();
     let free = |place: &usize| -> Entries {
         let size = FREE * library.prior_sigmas[*place];
-        let column = library.products.column(*place).iter();
+        let column = library.products.column(*place);
+        let column = column.iter();
         column.map(|(channel, values)| (*channel, values * size)).collect()
     };
     let scales = library
@@ -155,7 +156,7 @@ fn scaled(problem: &Problem, library: &Library, hypothesis: &Hypothesis) -> Opti
     let mut sum: Entries = Vec::new();
     for (index, place) in hypothesis.small().iter().enumerate() {
         let change = FREE * SCALE * change(index)?;
-        for (channel, values) in library.products.column(*place) {
+        for (channel, values) in library.products.column(*place).iter() {
             match sum.iter_mut().find(|(own, _)| own == channel) {
                 Some((_, sum)) => sum.axpy(change, values, 1.0),
                 None => sum.push((*channel, values * change)),

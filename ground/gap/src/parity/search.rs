@@ -98,7 +98,7 @@ impl Offered {
     pub fn of(problem: &Problem, library: &Library) -> Self {
         let own = 0..library.products.len();
         let mut offered = Self {
-            columns: own.map(|place| library.products.column(place).clone()).collect(),
+            columns: own.map(|place| library.products.column(place).into_owned()).collect(),
             sets: Vec::new(),
         };
         let mut memory = Memory::default();
@@ -363,7 +363,7 @@ pub fn choose(
             break;
         }
         let places = library.hypotheses[next.hypothesis].small().iter();
-        let columns = places.clone().map(|place| library.products.column(*place).clone());
+        let columns = places.clone().map(|place| library.products.column(*place).into_owned());
         let sigmas = places.map(|place| library.prior_sigmas[*place]);
         taken.push(Taken::of(space, columns.collect(), sigmas.collect()));
         chosen.push(next);
@@ -474,7 +474,7 @@ impl<'a> Beside<'a> {
             .copy_from(&seen.information);
         for (row, place) in places.iter().enumerate() {
             for (column, rest) in self.rests.iter().enumerate() {
-                let product = dot(library.products.column(*place), rest);
+                let product = dot(&library.products.column(*place), rest);
                 both.information[(from + row, column)] = product;
                 both.information[(column, from + row)] = product;
             }

@@ -21,6 +21,7 @@ use twin::{
 
 use crate::{
     library::{
+        column::Column,
         hypotheses::{Hypothesis, Library},
         products::Entries,
     },
@@ -60,7 +61,7 @@ pub fn offer(problem: &Problem, library: &mut Library, withheld: &[String]) {
                     let own: Vec<usize> = own
                         .map(|(column, sigma)| {
                             library.prior_sigmas.push(sigma);
-                            library.products.push(problem, column)
+                            library.products.push(problem, Column::Held(column))
                         })
                         .collect();
                     known.push((channel, own.clone()));

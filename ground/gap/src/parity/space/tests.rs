@@ -82,7 +82,7 @@ fn share(space: &Space, library: &Library, effect: &str, is_place: impl Fn(&Loca
     let (mut own, mut known) = (0.0, 0.0);
     for place in &hypothesis.places {
         let variance = library.prior_sigmas[*place].powi(2);
-        own += variance * kept(space, library.products.column(*place));
+        own += variance * kept(space, &library.products.column(*place));
         known += variance * library.products.product(*place, *place);
     }
     (own / known).sqrt()
@@ -134,6 +134,7 @@ fn an_inner_product_is_that_of_the_dense_marginal_covariance() {
         let own = |place: usize| library.products.column(place);
         let places = [0, library.products.len() / 3, library.products.len() - 1];
         let columns = places.map(own);
+        let columns = columns.each_ref().map(AsRef::as_ref);
         let (among, opened) = Space::among(space.problem, space.motion, Vec::new(), &columns);
         // Sets that have columns in common, and one that names them in another order.
         let sets = [vec![0, 1, 2], vec![2, 1]];
@@ -158,9 +159,10 @@ fn an_inner_product_is_that_of_the_dense_marginal_covariance() {
 /// Both ways to eliminate a motion, and columns that touch one channel, a plate and all.
 fn eliminated(check: impl Fn(&str, &Problem, &dyn Elimination, &[&Entries])) {
     posed(30, |problem, library, course| {
-        let columns: Vec<&Entries> = (0..library.products.len())
+        let columns: Vec<_> = (0..library.products.len())
             .map(|place| library.products.column(place))
             .collect();
+        let columns: Vec<&Entries> = columns.iter().map(AsRef::as_ref).collect();
         // More than are solved together, and no multiple.
         assert!(columns.len() > LANES && !columns.len().is_multiple_of(LANES));
         check("packet by packet", problem, &Motion::of(problem, course), &columns);

@@ -44,7 +44,7 @@ pub(super) fn stretches(
             return None;
         }
         let places = hypothesis.places.iter();
-        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place).clone()).collect();
+        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place).into_owned()).collect();
         let sigmas: Vec<f64> = (hypothesis.parameters.iter())
             .map(|parameter| parameter.prior_sigma)
             .collect();

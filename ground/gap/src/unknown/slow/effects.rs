@@ -51,16 +51,15 @@ pub(super) fn asked(library: &Library) -> Vec<Asked> {
 impl Asked {
     /// In physical units at the means of a channel.
     pub fn tried<'a>(&'a self, problem: &'a Problem, library: &'a Library, seen: &'a [Seen]) -> Tried<'a> {
-        let columns = || self.places.iter().map(|place| library.products.column(*place));
-        let mut channels: Vec<usize> = columns().flatten().map(|(channel, _)| *channel).collect();
+        let places = self.places.iter();
+        let mut channels: Vec<usize> = places.flat_map(|place| library.products.channels(*place)).collect();
         channels.sort_unstable();
         channels.dedup();
         let of_channel = move |channel: usize| {
             let (binned, weights) = (&seen[channel].binned, &problem.frames[channel].weights);
             let mut means = DMatrix::zeros(binned.bins.len(), self.places.len());
             for (place, mut into) in self.places.iter().zip(means.column_iter_mut()) {
-                let own = library.products.column(*place).iter();
-                if let Some((_, values)) = own.clone().find(|(own, _)| *own == channel) {
+                if let Some(values) = library.products.values(*place, channel) {
                     into.copy_from_slice(&binned.means(|sample| values[sample] * weights[sample]));
                 }
             }
