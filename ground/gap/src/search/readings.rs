@@ -18,6 +18,7 @@ mod screen;
 mod variant;
 
 use nalgebra::{DMatrix, DVector};
+use twin::predict::Memory;
 
 pub use self::chosen::{Chosen, Rival};
 use self::{
@@ -145,18 +146,27 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
 fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refined, gains: &mut [f64]) {
     let model = model_of(library, set, &best.thetas);
     let unit = problem.twin.unit();
-    let energy = |channel: usize, model: &[Component]| {
-        let residual = problem.residual(channel, model);
+    let energy = |channel: usize, model: &[Component], memory: &mut Memory| {
+        let residual = problem.residual_with(channel, model, memory);
         problem.frames[channel]
             .normal(&DMatrix::zeros(residual.len(), 0), &residual)
             .energy
     };
+    let mut memory = Memory::default();
     let before: Vec<f64> = (0..unit.channels.len())
-        .map(|channel| energy(channel, &model))
+        .map(|channel| energy(channel, &model, &mut memory))
         .collect();
-    for (index, hypothesis) in library.hypotheses.iter().enumerate() {
-        if !library.is_discrete(index) || set.contains(&index) {
-            continue;
+    let is_tried = |index: &usize| library.is_discrete(*index) && !set.contains(index);
+    let mut tried: Vec<usize> = (0..library.hypotheses.len()).filter(is_tried).collect();
+    // One value of all places after the other: what sensors feel through a filter that has been left on is then filtered once, and kept
+    // no longer than it is needed.
+    let variant = |index: &usize| library.hypotheses[*index].cause.variant;
+    tried.sort_by(|one, other| variant(one).total_cmp(&variant(other)));
+    let mut latest = f64::NAN;
+    for index in tried {
+        let hypothesis = &library.hypotheses[index];
+        if variant(&index) != latest {
+            (memory, latest) = (Memory::default(), variant(&index));
         }
         let mut with = model.clone();
         with.push(hypothesis.component(&DVector::zeros(hypothesis.parameters.len())));
@@ -169,7 +179,7 @@ fn add_discrete(problem: &Problem, library: &Library, set: &[usize], best: &Refi
         while 0.5 * possible + hypothesis.log_prior >= 0.0
             && let Some(channel) = channels.next()
         {
-            let own = before[channel] - energy(channel, &with);
+            let own = before[channel] - energy(channel, &with, &mut memory);
             possible += own - above(channel);
             fall += own;
         }
