@@ -11,6 +11,8 @@ mod effects;
 mod normal;
 mod open;
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use twin::predict::{Feel, Kind};
 
@@ -89,8 +91,8 @@ struct Seen {
     binned: Binned,
     /// What the whole model leaves, and what it leaves without each of its effects and all parts of it.
     residuals: Vec<Vec<f64>>,
-    /// What the unit does at each of its samples.
-    feels: Vec<Feel>,
+    /// What the unit does at each of its samples: the same for all that are read at once.
+    feels: Arc<[Feel]>,
     /// Its reading's slope by the instant, and its reading without the zero.
     by_instant: Vec<f64>,
     reading: Vec<f64>,
@@ -117,9 +119,16 @@ impl Beside {
         let rows = problem.fitted_rows();
         let starts_s = problem.twin.starts_s();
         let span_s = [starts_s[*rows.first()?], starts_s[*rows.last()?]];
-        let seen: Vec<Seen> = (0..channels.len())
-            .map(|channel| see(problem, model, channel, span_s, setting))
-            .collect();
+        let mut seen: Vec<Seen> = Vec::new();
+        for channel in 0..channels.len() {
+            let frames = &problem.frames;
+            let is_as_it = |other: &usize| {
+                channels[*other].slot_s == channels[channel].slot_s
+                    && frames[*other].series.rows == frames[channel].series.rows
+            };
+            let feels = (0..channel).find(is_as_it).map(|other| Arc::clone(&seen[other].feels));
+            seen.push(see(problem, model, channel, span_s, setting, feels));
+        }
         let phases = phases(&seen);
         let count = COURSES.min(phases.1 / BINS_A_COURSE).max(1);
         let open = open_columns(problem, model, errors, &seen);
@@ -214,7 +223,15 @@ fn phases(seen: &[Seen]) -> (Vec<f64>, usize) {
     (phases.collect(), there)
 }
 
-fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setting: &Setting) -> Seen {
+/// What a channel has; what the unit does at its samples may be known.
+fn see(
+    problem: &Problem,
+    model: &Model,
+    channel: usize,
+    span_s: [f64; 2],
+    setting: &Setting,
+    feels: Option<Arc<[Feel]>>,
+) -> Seen {
     let frame = &problem.frames[channel];
     let own = &problem.twin.unit().channels[channel];
     let mut binned = Binned::of(problem, channel, span_s, setting.louder[channel]);
@@ -239,7 +256,10 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
         let others: Vec<_> = others.map(|at| model.components[at].clone()).collect();
         left(&problem.predict(channel, &others))
     }));
-    let feels = problem.true_twin().feels(channel);
+    let feels = feels.unwrap_or_else(|| {
+        let feels = problem.true_twin().feels(channel);
+        rows.iter().map(|row| feels[*row as usize]).collect()
+    });
     let by_instant = problem.true_twin().by_instant(channel);
     let at = |series: &[f64], zero: f64| rows.iter().map(|row| series[*row as usize] - zero).collect();
     Seen {
@@ -257,7 +277,7 @@ fn see(problem: &Problem, model: &Model, channel: usize, span_s: [f64; 2], setti
                 }
             })
             .collect(),
-        feels: rows.iter().map(|row| feels[*row as usize]).collect(),
+        feels,
         binned,
     }
 }
