@@ -27,8 +27,8 @@ pub struct Products {
     columns: Vec<Column>,
     /// For each column and channel `L^-1 N'e`, so that `e'P f = e'f - open_e'open_f`.
     open: Vec<Entries>,
-    /// Of each column with itself and those before it; NaN for not yet.
-    known: RefCell<Vec<Vec<f64>>>,
+    /// Of each column with itself and those before it, as far as they were asked for: a thousandth.
+    known: RefCell<Vec<Vec<(usize, f64)>>>,
 }
 
 impl Products {
@@ -36,7 +36,7 @@ impl Products {
     pub fn push(&mut self, problem: &Problem, column: Column) -> usize {
         self.open.push(open_part(problem, &column.entries()));
         self.columns.push(column);
-        self.known.get_mut().push(vec![f64::NAN; self.columns.len()]);
+        self.known.get_mut().push(Vec::new());
         self.columns.len() - 1
     }
 
@@ -45,8 +45,9 @@ impl Products {
         self.open[place] = open_part(problem, &column);
         self.columns[place] = Column::Held(column);
         let known = self.known.get_mut();
-        known[place].fill(f64::NAN);
-        known.iter_mut().skip(place).for_each(|row| row[place] = f64::NAN);
+        known[place].clear();
+        let after = known.iter_mut().skip(place);
+        after.for_each(|row| row.retain(|(before, _)| *before != place));
     }
 
     /// After the problem's frames were these.
@@ -74,7 +75,7 @@ impl Products {
         for (open, column) in self.open.iter_mut().zip(&self.columns) {
             *open = open_part(problem, &column.entries());
         }
-        self.known.get_mut().iter_mut().for_each(|row| row.fill(f64::NAN));
+        self.known.get_mut().iter_mut().for_each(Vec::clear);
     }
 
     /// The same of what waves carry: a course that many columns have in common stays one.
@@ -124,12 +125,11 @@ impl Products {
     /// `e'P f`.
     pub fn product(&self, one: usize, other: usize) -> f64 {
         let (before, after) = (one.min(other), one.max(other));
-        let known = self.known.borrow()[after][before];
-        if !known.is_nan() {
-            return known;
+        if let Some((_, value)) = self.known.borrow()[after].iter().find(|(own, _)| *own == before) {
+            return *value;
         }
         let value = self.columns[one].dot(&self.columns[other]) - inner(&self.open[one], &self.open[other]);
-        self.known.borrow_mut()[after][before] = value;
+        self.known.borrow_mut()[after].push((before, value));
         value
     }
 
