@@ -50,8 +50,11 @@ impl Scene {
     /// `motion` in `environment`, from `from_s` to `to_s` at steps of `step_s`.
     pub fn new(motion: &dyn Motion, environment: &Environment, from_s: f64, to_s: f64, step_s: f64) -> Self {
         let last = (((to_s - from_s) / step_s).round() as usize).max(1);
-        let [mut rates, mut fields] = [const { Vec::new() }; 2].map(|v: Vec<Vector3<f64>>| v);
-        let (mut forces, mut temperatures, mut poses, mut headings) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        // As long as they get: a vector that grows ends up to twice as long.
+        let nodes = last + 1;
+        let [mut rates, mut fields] = [nodes; 2].map(Vec::with_capacity);
+        let (mut forces, mut poses) = (Vec::with_capacity(nodes), Vec::with_capacity(nodes));
+        let [mut temperatures, mut headings] = [nodes; 2].map(Vec::with_capacity);
         let mut heading = Heading::default();
         let (earth_n, gravity_n) = (environment.earth_rate_n(), environment.gravity_n());
         let mut sign = 1.0;
