@@ -122,7 +122,7 @@ fn errors(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usi
     }
     let fitted = &model.fitted;
     let about_zero: Vec<DVector<f64>> = (model.joint.columns().zip(&fitted.rest).zip(&fitted.nuisance))
-        .map(|((columns, rest), nuisance)| rest + &columns.nuisance * nuisance + &columns.effects * &fitted.parameters)
+        .map(|((columns, rest), nuisance)| rest + &*columns.nuisance * nuisance + &columns.effects * &fitted.parameters)
         .collect();
     let part = |block: usize, is_left_out: bool| -> (Vec<Columns>, Vec<DVector<f64>>) {
         let channels = model.joint.columns().zip(&about_zero).zip(blocks);
@@ -131,7 +131,7 @@ fn errors(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usi
                 .filter(|at| (blocks[*at] == block) == is_left_out)
                 .collect();
             let columns = Columns {
-                nuisance: columns.nuisance.select_rows(&rows),
+                nuisance: columns.nuisance.select_rows(&rows).into(),
                 effects: columns.effects.select_rows(&rows),
             };
             (columns, values.select_rows(&rows))
@@ -145,7 +145,7 @@ fn errors(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usi
         let channels = columns.iter().zip(&values).zip(&found.nuisance);
         channels
             .map(|((columns, values), nuisance)| {
-                values - &columns.nuisance * nuisance - &columns.effects * &found.parameters
+                values - &*columns.nuisance * nuisance - &columns.effects * &found.parameters
             })
             .collect()
     };

@@ -163,7 +163,13 @@ mod tests {
         let effects = DMatrix::from_columns(&[column(0.11), column(0.13)]);
         let beside = column(0.12);
         let nuisance = DMatrix::zeros(ROWS, 0);
-        let joint = Joint::new(vec![Columns { nuisance, effects }], &[2.0, 0.5]);
+        let joint = Joint::new(
+            vec![Columns {
+                nuisance: nuisance.into(),
+                effects,
+            }],
+            &[2.0, 0.5],
+        );
         let fitted = joint.fit(std::slice::from_ref(&beside));
         let variance = 1.0 / (beside.dot(&fitted.rest[0]) + 1.0 / 9.0);
         let found = extended(&joint.covariance(), &-fitted.parameters, variance);

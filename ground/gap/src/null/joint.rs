@@ -4,13 +4,15 @@
 //! the effects' parameters, each channel's calibration over its sigmas, and what is left. The factorisations are made
 //! once, because [`crate::unknown::adequacy`] repeats the fit on hundreds of simulated logs.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// One channel's columns.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// What the calibration leaves open, in units of noise for one prior sigma.
-    pub nuisance: DMatrix<f64>,
+    pub nuisance: Arc<DMatrix<f64>>,
     /// The effects', in units of noise for one unit of the parameter; zero where the channel is not touched.
     pub effects: DMatrix<f64>,
 }
@@ -148,7 +150,7 @@ mod tests {
 
     fn columns(phase: f64) -> Columns {
         Columns {
-            nuisance: DMatrix::from_fn(50, 2, |row, column| ((row * (column + 1)) as f64 * 0.21 + phase).sin()),
+            nuisance: DMatrix::from_fn(50, 2, |row, column| ((row * (column + 1)) as f64 * 0.21 + phase).sin()).into(),
             effects: DMatrix::from_fn(50, 2, |row, column| ((row * (column + 3)) as f64 * 0.13 + phase).cos()),
         }
     }

@@ -1,5 +1,7 @@
 //! A finished model: effects, calibration and reference fitted together, and what it predicts for every row of the log.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::null::{
@@ -66,7 +68,7 @@ impl Model {
             let frame = &problem.frames[*channel];
             let rows: Vec<usize> = frame.series.rows.iter().map(|row| *row as usize).collect();
             let fitted = courses.select_rows(&rows);
-            widen(&mut columns[*channel].nuisance, &frame.whites(fitted));
+            widen(Arc::make_mut(&mut columns[*channel].nuisance), &frame.whites(fitted));
         }
         let of_effect = |(at, value): (usize, &f64)| (are_held && at >= problem.reference.len()).then_some(*value);
         let held: Vec<Option<f64>> = values.iter().enumerate().map(of_effect).collect();

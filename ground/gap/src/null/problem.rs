@@ -13,7 +13,7 @@
 
 mod frame;
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 use twin::{
@@ -104,7 +104,7 @@ impl<'a> Problem<'a> {
                 series: series.clone(),
                 own: weights.map(|weight| channel.sigma() / weight),
                 weights,
-                nuisance: DMatrix::zeros(series.rows.len(), 0),
+                nuisance: DMatrix::zeros(series.rows.len(), 0).into(),
                 nuisance_names: Vec::new(),
             });
         }
@@ -150,10 +150,11 @@ impl<'a> Problem<'a> {
             .map(|channel| calibration(self.true_twin(), self.instrument, channel))
             .collect();
         for (frame, columns) in self.frames.iter_mut().zip(&self.open) {
-            frame.nuisance = DMatrix::from_fn(frame.series.rows.len(), columns.len(), |row, column| {
+            let nuisance = DMatrix::from_fn(frame.series.rows.len(), columns.len(), |row, column| {
                 let column = &columns[column];
                 column.entries[0].1[frame.series.rows[row] as usize] * column.sigma / frame.weights[row]
             });
+            frame.nuisance = nuisance.into();
             frame.factorise();
             let names = columns.iter().map(|column| (column.name.clone(), column.sigma));
             frame.nuisance_names = names.collect();
@@ -380,7 +381,7 @@ impl<'a> Problem<'a> {
     /// Columns of every channel for some parameters, given as [`Problem::slopes`] gives them.
     pub fn columns(&self, parameters: &[Vec<(usize, DVector<f64>)>]) -> Vec<Columns> {
         let empty = |frame: &Frame| Columns {
-            nuisance: frame.nuisance.clone(),
+            nuisance: Arc::clone(&frame.nuisance),
             effects: DMatrix::zeros(frame.series.rows.len(), parameters.len()),
         };
         let mut columns: Vec<Columns> = self.frames.iter().map(empty).collect();

@@ -2,6 +2,8 @@
 //!
 //! In: columns and residuals in units of noise. Out: what the calibration can imitate of them, and what it leaves.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::{
@@ -23,8 +25,8 @@ pub struct Frame {
     pub colour: Option<Colour>,
     /// The sensor's own noise over that, as described.
     pub own: DVector<f64>,
-    /// What the calibration leaves open, in units of noise for one prior sigma.
-    pub nuisance: DMatrix<f64>,
+    /// What the calibration leaves open, in units of noise for one prior sigma. Every fit has it, and most change nothing of it.
+    pub nuisance: Arc<DMatrix<f64>>,
     /// Names and prior sigmas of those columns.
     pub nuisance_names: Vec<(String, f64)>,
     /// `r'Pr` with no effect in.
@@ -93,7 +95,7 @@ impl Frame {
 
     /// Takes its noise for one of this colour, from white: colours do not add up.
     pub fn tint(&mut self, colour: Colour) {
-        self.nuisance = colour.applied(self.nuisance.clone());
+        self.nuisance = colour.applied((*self.nuisance).clone()).into();
         self.colour = Some(colour);
         self.factorise();
     }
@@ -101,7 +103,7 @@ impl Frame {
     /// Weighs its samples anew: the noise of each is so many times what it was taken for.
     pub fn reweigh(&mut self, factors: &DVector<f64>) {
         self.weights.component_mul_assign(factors);
-        for mut column in self.nuisance.column_iter_mut() {
+        for mut column in Arc::make_mut(&mut self.nuisance).column_iter_mut() {
             column.component_div_assign(factors);
         }
         self.factorise();
@@ -109,7 +111,7 @@ impl Frame {
 
     /// Opens further columns of its calibration, in units of noise for one prior sigma.
     pub fn widen(&mut self, columns: &DMatrix<f64>) {
-        widen(&mut self.nuisance, columns);
+        widen(Arc::make_mut(&mut self.nuisance), columns);
         self.factorise();
     }
 

@@ -52,7 +52,7 @@ fn scene_of(channels: usize) -> (Vec<View>, Joint) {
         levels: vec![(0..SAMPLES).map(|row| (row * row / 7 % LEVELS) as u8).collect(); LEVELLED.len()],
     };
     let columns = Columns {
-        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
+        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0).into(),
         effects: DMatrix::zeros(SAMPLES, 0),
     };
     (
@@ -241,7 +241,7 @@ fn a_strength_that_is_fitted_in_each_channel_is_no_leftover() {
     // How much each channel knows of its own strength is another.
     let law = |channel: usize, row: usize| (channel + 1) as f64 * (row as f64 * 0.03).sin();
     let columns = |channel: usize| Columns {
-        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
+        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0).into(),
         effects: DMatrix::from_fn(
             SAMPLES,
             CHANNELS,
@@ -282,7 +282,7 @@ fn what_a_prior_takes_off_a_large_effect_is_no_leftover() {
         false => 0.0,
     };
     let columns = |channel: usize| Columns {
-        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0),
+        nuisance: DMatrix::from_element(SAMPLES, 1, 5.0).into(),
         effects: DMatrix::from_fn(
             SAMPLES,
             CHANNELS,
