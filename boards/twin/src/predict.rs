@@ -33,6 +33,9 @@ use crate::environment::Environment;
 /// Step of the difference quotients, in prior sigmas: rounding is then 1e-12 of a prior effect and curvature 1e-6.
 const STEP: f64 = 1e-3;
 
+/// Of one channel, the places of the parameters that touch it, each with the derivatives of its readings.
+pub type Slopes = Vec<(usize, Vec<f64>)>;
+
 /// The twin along one log.
 pub struct Twin {
     unit: UnitDescription,
@@ -252,35 +255,47 @@ impl Twin {
     /// Derivatives of the readings by the parameters of `active[of]`, one column a parameter: central differences, exact
     /// for what is linear. Channels the effect does not touch are left out.
     pub fn jacobian(&self, active: &[Active], of: usize) -> Vec<Column> {
-        let parameters = active[of].cause.parameters(&self.unit);
-        let touched: Vec<usize> = (0..self.unit.channels.len())
-            .filter(|&channel| active[of].touches(channel, &self.unit))
-            .collect();
-        let (mut moved, mut memory) = (active.to_vec(), Memory::default());
-        let of_parameter = |i: usize| active[of].cause.touched_by(i, &self.unit);
-        let of_parameter: Vec<Vec<usize>> = (0..parameters.len()).map(of_parameter).collect();
+        let mut memory = Memory::default();
+        let touched = active[of].cause.channels(&self.unit).into_iter();
+        let slopes = touched.map(|channel| (channel, self.slopes(active, of, channel, &mut memory)));
+        self.columns(&active[of].cause, slopes.collect())
+    }
+
+    /// The same of one channel.
+    pub fn slopes(&self, active: &[Active], of: usize, channel: usize, memory: &mut Memory) -> Slopes {
+        let cause = &active[of].cause;
+        let mut moved = active.to_vec();
+        let parameters = cause.parameters(&self.unit).into_iter().enumerate();
+        let touching = parameters.filter(|(place, _)| cause.touched_by(*place, &self.unit).contains(&channel));
+        let slope = |(place, parameter): (usize, Parameter)| {
+            let step = STEP * parameter.prior_sigma;
+            let theta = active[of].theta[place];
+            let mut at = |value: f64| {
+                moved[of].theta[place] = value;
+                self.computed(channel, &moved, memory)
+            };
+            let (after, before) = (at(theta + step), at(theta - step));
+            moved[of].theta[place] = theta;
+            let both = after.iter().zip(before);
+            (
+                place,
+                both.map(|(after, before)| (after - before) / (2.0 * step)).collect(),
+            )
+        };
+        touching.map(slope).collect()
+    }
+
+    /// Columns of the parameters of a cause, of the slopes of channels.
+    pub fn columns(&self, cause: &Cause, slopes: Vec<(usize, Slopes)>) -> Vec<Column> {
         let column = |parameter: Parameter| Column {
             name: parameter.name,
             sigma: parameter.prior_sigma,
             entries: Vec::new(),
         };
-        let mut columns: Vec<Column> = parameters.into_iter().map(column).collect();
-        for channel in touched {
-            let own = (columns.iter_mut().zip(&of_parameter)).enumerate();
-            for (i, (column, _)) in own.filter(|(_, (_, channels))| channels.contains(&channel)) {
-                let step = STEP * column.sigma;
-                let theta = active[of].theta[i];
-                let mut at = |value: f64| {
-                    moved[of].theta[i] = value;
-                    self.computed(channel, &moved, &mut memory)
-                };
-                let (after, before) = (at(theta + step), at(theta - step));
-                moved[of].theta[i] = theta;
-                let slopes = after
-                    .iter()
-                    .zip(before)
-                    .map(|(after, before)| (after - before) / (2.0 * step));
-                column.entries.push((channel, slopes.collect()));
+        let mut columns: Vec<Column> = cause.parameters(&self.unit).into_iter().map(column).collect();
+        for (channel, slopes) in slopes {
+            for (place, slopes) in slopes {
+                columns[place].entries.push((channel, slopes));
             }
         }
         columns

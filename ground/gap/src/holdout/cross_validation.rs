@@ -11,6 +11,7 @@
 //! The calibration is refitted in every fold; the model is linear about the parameters found.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 use statrs::function::erf::erfc;
 
 use crate::{
@@ -149,7 +150,7 @@ fn errors(problem: &Problem, library: &Library, model: &Model, blocks: &[Vec<usi
             })
             .collect()
     };
-    (0..BLOCKS).map(error).collect()
+    (0..BLOCKS).into_par_iter().map(error).collect()
 }
 
 #[cfg(test)]

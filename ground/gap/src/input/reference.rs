@@ -9,7 +9,7 @@
 //! and not of the log, which may have one row in that time. How much there is below, the log tells ([`super::level`]): at most
 //! [`BELOW`] times as much for rates, no more than as much for specific forces.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use twin::predict::{Accuracy, Kind, Twin};
 
@@ -39,7 +39,7 @@ pub struct Reference {
     /// reference that is exact.
     fast: Vec<Vec<f64>>,
     /// What the octave above holds, channel by channel, of unit variance everywhere.
-    records: Vec<Rc<[f64]>>,
+    records: Vec<Arc<[f64]>>,
     /// \[s\] between its samples.
     step_s: f64,
 }
@@ -74,7 +74,7 @@ impl Reference {
             }
         }
         let starts_s = close[0].starts_s();
-        let record = |channel: usize| -> Rc<[f64]> {
+        let record = |channel: usize| -> Arc<[f64]> {
             let octave = octave(channel, close);
             let local = Local::of(starts_s, &octave);
             let even = octave.iter().zip(starts_s);
@@ -96,9 +96,9 @@ impl Reference {
 
     /// A record of such errors in a channel, an octave too fast and of unit variance, and the seconds between its samples; none
     /// of an exact reference.
-    pub fn record(&self, channel: usize) -> Option<(Rc<[f64]>, f64)> {
+    pub fn record(&self, channel: usize) -> Option<(Arc<[f64]>, f64)> {
         let record = self.records.get(channel)?;
-        (!record.is_empty()).then(|| (Rc::clone(record), self.step_s))
+        (!record.is_empty()).then(|| (Arc::clone(record), self.step_s))
     }
 
     /// [physical unit] standard deviation that it puts into the prediction of a channel at a row, of errors that do not stay

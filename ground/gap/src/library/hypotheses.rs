@@ -6,7 +6,8 @@
 //! by its places and variants (half to the widest places); so looking in more places costs what it should.
 
 use nalgebra::DVector;
-use twin::effect::{Active, Cause, LIBRARY, Locality, Nature, Page, Parameter, onsets};
+use rayon::prelude::*;
+use twin::effect::{Active, Cause, Effect, LIBRARY, Locality, Nature, Page, Parameter, onsets};
 
 use crate::{
     library::{
@@ -19,6 +20,9 @@ use crate::{
         problem::{Component, Problem},
     },
 };
+
+/// Effects whose columns are made at once, by all cores; then it is told how far it is.
+const AT_ONCE: usize = 8;
 
 /// An effect at a place.
 #[derive(Clone, Debug)]
@@ -102,7 +106,6 @@ impl Library {
     /// Makes the columns; `withheld` names effects to leave out; `progress` is told how far it is, from 0 to 1.
     pub fn new(problem: &Problem, withheld: &[String], progress: &dyn Fn(f64)) -> Self {
         let unit = problem.twin.unit();
-        let starts_s = problem.twin.starts_s();
         let mut library = Library {
             hypotheses: Vec::new(),
             products: Products::default(),
@@ -121,63 +124,26 @@ impl Library {
             .iter()
             .filter(|effect| effect.page().nature != Nature::Spread && is_offered(effect.page()))
             .collect();
-        for (done, effect) in offered.iter().enumerate() {
-            let (localities, mut variants) = (effect.localities(unit), effect.variants(starts_s));
-            // Of each healthy recording beside an optical system (BROAD 05, 09, 18, and a twin's flight) such a law explains 10 to 1,300 nats.
-            variants.retain(|variant| is_exact || !effect.is_like_a_reference(*variant));
-            let widest = localities.iter().filter(|locality| is_wide(locality)).count();
-            let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
-            for locality in &localities {
-                let mut carrier = None;
-                for variant in &variants {
-                    let places = if widest == 0 || widest == localities.len() {
-                        localities.len()
-                    } else if is_wide(locality) {
-                        2 * widest
-                    } else {
-                        2 * (localities.len() - widest)
-                    };
-                    let log_prior = -((LIBRARY.len() * places * variants.len()).max(1) as f64).ln();
-                    let cause = Cause {
-                        effect: **effect,
-                        locality: locality.clone(),
-                        variant: *variant,
-                    };
-                    let parameters = cause.parameters(unit);
-                    let width = effect.page().parameters.len().max(1);
-                    let find = |index: usize, known: &[(Vec<usize>, usize, f64, usize)]| {
-                        let touched = cause.touched_by(index, unit);
-                        let same = |entry: &&(Vec<usize>, usize, f64, usize)| {
-                            entry.0 == touched && entry.1 == index % width && entry.2 == *variant
-                        };
-                        known.iter().find(same).map(|entry| entry.3)
-                    };
-                    let all_known = (0..parameters.len()).all(|index| find(index, &known).is_some());
-                    if !all_known {
-                        let carrier = carrier.get_or_insert_with(|| Carrier::of(problem, &cause));
-                        for (index, (column, sigma)) in columns(problem, &cause, carrier).into_iter().enumerate() {
-                            if find(index, &known).is_none() {
-                                let place = library.products.push(problem, column);
-                                known.push((cause.touched_by(index, unit), index % width, *variant, place));
-                                library.prior_sigmas.push(sigma);
-                            }
-                        }
-                    }
-                    let places: Vec<usize> = (0..parameters.len()).filter_map(|index| find(index, &known)).collect();
-                    if !places.is_empty() || effect.page().nature == Nature::Discrete {
-                        library.hypotheses.push(Hypothesis {
-                            cause,
-                            parameters,
-                            places,
-                            log_prior,
-                            span: None,
-                        });
-                    }
-                }
-            }
-            progress((done + 1) as f64 / offered.len() as f64);
+        for (done, effects) in offered.chunks(AT_ONCE).enumerate() {
+            let made: Vec<Made> = (effects.par_iter())
+                .map(|effect| Made::of(problem, **effect, is_exact))
+                .collect();
+            made.into_iter().for_each(|made| library.take(problem, made));
+            progress(((done + 1) * AT_ONCE).min(offered.len()) as f64 / offered.len() as f64);
         }
         library
+    }
+
+    fn take(&mut self, problem: &Problem, made: Made) {
+        let first = self.products.len();
+        let (columns, sigmas): (Vec<Column>, Vec<f64>) = made.columns.into_iter().unzip();
+        self.products.extend(problem, columns);
+        self.prior_sigmas.extend(sigmas);
+        self.hypotheses
+            .extend(made.hypotheses.into_iter().map(|mut hypothesis| {
+                hypothesis.places.iter_mut().for_each(|place| *place += first);
+                hypothesis
+            }));
     }
 
     /// Takes what is open anew: the problem's motion is another.
@@ -196,6 +162,76 @@ impl Library {
     /// Whether a hypothesis is there or not, whatever its parameters.
     pub fn is_discrete(&self, hypothesis: usize) -> bool {
         self.hypotheses[hypothesis].cause.effect.page().nature == Nature::Discrete
+    }
+}
+
+/// The hypotheses of one effect, and the columns they need, each with the sigma of its parameter. Places count from the first of these.
+struct Made {
+    hypotheses: Vec<Hypothesis>,
+    columns: Vec<(Column, f64)>,
+}
+
+impl Made {
+    fn of(problem: &Problem, effect: &'static dyn Effect, is_exact: bool) -> Self {
+        let mut made = Self {
+            hypotheses: Vec::new(),
+            columns: Vec::new(),
+        };
+        let unit = problem.twin.unit();
+        let (localities, mut variants) = (effect.localities(unit), effect.variants(problem.twin.starts_s()));
+        // Of each healthy recording beside an optical system (BROAD 05, 09, 18, and a twin's flight) such a law explains 10 to 1,300 nats.
+        variants.retain(|variant| is_exact || !effect.is_like_a_reference(*variant));
+        let widest = localities.iter().filter(|locality| is_wide(locality)).count();
+        let mut known: Vec<(Vec<usize>, usize, f64, usize)> = Vec::new();
+        for locality in &localities {
+            let mut carrier = None;
+            for variant in &variants {
+                let places = if widest == 0 || widest == localities.len() {
+                    localities.len()
+                } else if is_wide(locality) {
+                    2 * widest
+                } else {
+                    2 * (localities.len() - widest)
+                };
+                let log_prior = -((LIBRARY.len() * places * variants.len()).max(1) as f64).ln();
+                let cause = Cause {
+                    effect,
+                    locality: locality.clone(),
+                    variant: *variant,
+                };
+                let parameters = cause.parameters(unit);
+                let width = effect.page().parameters.len().max(1);
+                let find = |index: usize, known: &[(Vec<usize>, usize, f64, usize)]| {
+                    let touched = cause.touched_by(index, unit);
+                    let same = |entry: &&(Vec<usize>, usize, f64, usize)| {
+                        entry.0 == touched && entry.1 == index % width && entry.2 == *variant
+                    };
+                    known.iter().find(same).map(|entry| entry.3)
+                };
+                let all_known = (0..parameters.len()).all(|index| find(index, &known).is_some());
+                if !all_known {
+                    let carrier = carrier.get_or_insert_with(|| Carrier::of(problem, &cause));
+                    for (index, column) in columns(problem, &cause, carrier).into_iter().enumerate() {
+                        if find(index, &known).is_none() {
+                            let place = made.columns.len();
+                            known.push((cause.touched_by(index, unit), index % width, *variant, place));
+                            made.columns.push(column);
+                        }
+                    }
+                }
+                let places: Vec<usize> = (0..parameters.len()).filter_map(|index| find(index, &known)).collect();
+                if !places.is_empty() || effect.page().nature == Nature::Discrete {
+                    made.hypotheses.push(Hypothesis {
+                        cause,
+                        parameters,
+                        places,
+                        log_prior,
+                        span: None,
+                    });
+                }
+            }
+        }
+        made
     }
 }
 

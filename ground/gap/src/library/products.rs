@@ -3,9 +3,13 @@
 //! In: columns in units of noise, channel by channel. Out: `e'P f` and `e'P r`. A screen needs each hypothesis' own products
 //! and those with what is already chosen, which is a thousandth of all pairs of a library of two thousand columns.
 
-use std::{borrow::Cow, cell::RefCell, sync::Arc};
+use std::{
+    borrow::Cow,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::{
     library::column::Column,
@@ -22,13 +26,23 @@ const BLOCK: usize = 32;
 pub type Entries = Vec<(usize, DVector<f64>)>;
 
 /// Columns and the products known so far.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Products {
     columns: Vec<Column>,
     /// For each column and channel `L^-1 N'e`, so that `e'P f = e'f - open_e'open_f`.
     open: Vec<Entries>,
     /// Of each column with itself and those before it, as far as they were asked for: a thousandth.
-    known: RefCell<Vec<Vec<(usize, f64)>>>,
+    known: Mutex<Vec<Vec<(usize, f64)>>>,
+}
+
+impl Clone for Products {
+    fn clone(&self) -> Self {
+        Self {
+            columns: self.columns.clone(),
+            open: self.open.clone(),
+            known: Mutex::new(self.known.lock().unwrap_or_else(PoisonError::into_inner).clone()),
+        }
+    }
 }
 
 impl Products {
@@ -36,18 +50,31 @@ impl Products {
     pub fn push(&mut self, problem: &Problem, column: Column) -> usize {
         self.open.push(open_part(problem, &column.entries()));
         self.columns.push(column);
-        self.known.get_mut().push(Vec::new());
+        self.known_mut().push(Vec::new());
         self.columns.len() - 1
+    }
+
+    /// Adds columns.
+    pub fn extend(&mut self, problem: &Problem, columns: Vec<Column>) {
+        let open = columns.par_iter().map(|column| open_part(problem, &column.entries()));
+        self.open.par_extend(open);
+        self.columns.extend(columns);
+        let count = self.columns.len();
+        self.known_mut().resize_with(count, Vec::new);
     }
 
     /// Replaces a column.
     pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
         self.open[place] = open_part(problem, &column);
         self.columns[place] = Column::Held(column);
-        let known = self.known.get_mut();
+        let known = self.known_mut();
         known[place].clear();
         let after = known.iter_mut().skip(place);
         after.for_each(|row| row.retain(|(before, _)| *before != place));
+    }
+
+    fn known_mut(&mut self) -> &mut Vec<Vec<(usize, f64)>> {
+        self.known.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// After the problem's frames were these.
@@ -66,16 +93,15 @@ impl Products {
             let own = columns.flatten().filter(|(of, _)| *of == channel);
             let own = own.map(|(_, values)| values);
             let mut own: Vec<&mut DVector<f64>> = own.collect();
-            for block in own.chunks_mut(BLOCK) {
+            own.par_chunks_mut(BLOCK).for_each(|block| {
                 let white = DMatrix::from_fn(frame.weights.len(), block.len(), |row, at| block[at][row]);
                 let anew = frame.whites(before.physical(white));
                 (block.iter_mut().zip(anew.column_iter())).for_each(|(own, anew)| own.copy_from(&anew));
-            }
+            });
         }
-        for (open, column) in self.open.iter_mut().zip(&self.columns) {
-            *open = open_part(problem, &column.entries());
-        }
-        self.known.get_mut().iter_mut().for_each(Vec::clear);
+        let columns = self.columns.par_iter();
+        self.open = columns.map(|column| open_part(problem, &column.entries())).collect();
+        self.known_mut().iter_mut().for_each(Vec::clear);
     }
 
     /// The same of what waves carry: a course that many columns have in common stays one.
@@ -125,11 +151,15 @@ impl Products {
     /// `e'P f`.
     pub fn product(&self, one: usize, other: usize) -> f64 {
         let (before, after) = (one.min(other), one.max(other));
-        if let Some((_, value)) = self.known.borrow()[after].iter().find(|(own, _)| *own == before) {
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, value)) = known()[after].iter().find(|(own, _)| *own == before) {
             return *value;
         }
         let value = self.columns[one].dot(&self.columns[other]) - inner(&self.open[one], &self.open[other]);
-        self.known.borrow_mut()[after].push((before, value));
+        let row = &mut known()[after];
+        if row.iter().all(|(own, _)| *own != before) {
+            row.push((before, value));
+        }
         value
     }
 
@@ -138,7 +168,7 @@ impl Products {
         let all: Entries = residuals.iter().cloned().enumerate().collect();
         let open = open_part(problem, &all);
         let score = |(column, own): (&Column, &Entries)| column.dot_entries(&all) - inner(own, &open);
-        self.columns.iter().zip(&self.open).map(score).collect()
+        (self.columns.par_iter().zip(&self.open)).map(score).collect()
     }
 
     /// Normal equations of some columns.

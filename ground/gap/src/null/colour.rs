@@ -18,7 +18,7 @@
 //! Channels are whitened one by one: what they share of a slow error each has for itself. Refuses nothing: a channel too short for a spectrum has
 //! the level of its rest, and one that is all zero stays as it is.
 
-use std::{f64::consts::TAU, fmt, ops::Range, rc::Rc};
+use std::{f64::consts::TAU, fmt, ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -49,7 +49,7 @@ const GAP: f64 = 1.5;
 #[derive(Clone)]
 pub struct Colour {
     autoregression: Autoregression,
-    slow: Rc<Whitening>,
+    slow: Arc<Whitening>,
 }
 
 impl fmt::Debug for Colour {
@@ -95,7 +95,7 @@ impl Colour {
             level.iter_mut().zip(more).for_each(|(level, more)| *level *= more);
         }
         Colour {
-            slow: Rc::new(whitening(&level)),
+            slow: Arc::new(whitening(&level)),
             autoregression,
         }
     }

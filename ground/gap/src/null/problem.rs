@@ -16,6 +16,7 @@ mod frame;
 use std::{collections::BTreeSet, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use twin::{
     effect::{Active, Cause},
     predict::{Accuracy, Column, Kind, Memory, Twin},
@@ -224,10 +225,13 @@ impl<'a> Problem<'a> {
 
     /// The same of every channel.
     pub fn predictions(&self, model: &[Component]) -> Vec<Vec<f64>> {
-        let mut memory = Memory::default();
-        (0..self.frames.len())
-            .map(|channel| self.predict_with(channel, model, &mut memory))
-            .collect()
+        self.each_channel(|channel, memory| self.predict_with(channel, model, memory))
+    }
+
+    /// Asks of every channel, on all cores, with what is kept from others of the same core.
+    pub fn each_channel<T: Send>(&self, ask: impl Fn(usize, &mut Memory) -> T + Sync) -> Vec<T> {
+        let channels: Vec<usize> = (0..self.frames.len()).collect();
+        each(&channels, ask)
     }
 
     /// The same of one channel, with what is kept from others.
@@ -277,10 +281,7 @@ impl<'a> Problem<'a> {
 
     /// The same of every channel.
     pub fn residuals(&self, model: &[Component]) -> Vec<DVector<f64>> {
-        let mut memory = Memory::default();
-        (0..self.frames.len())
-            .map(|channel| self.residual_with(channel, model, &mut memory))
-            .collect()
+        self.each_channel(|channel, memory| self.residual_with(channel, model, memory))
     }
 
     /// The same of one channel, with what is kept from others.
@@ -356,8 +357,12 @@ impl<'a> Problem<'a> {
     pub fn slopes(&self, model: &[Component], of: usize) -> Vec<Vec<(usize, DVector<f64>)>> {
         let span = model[of].span;
         let actives: Vec<Active> = model.iter().map(|component| component.active.clone()).collect();
-        let columns = self.twin.jacobian(&actives, of);
-        columns.into_iter().map(|column| self.in_noise(&column, span)).collect()
+        let cause = &actives[of].cause;
+        let slopes = each(&cause.channels(self.twin.unit()), |channel, memory| {
+            (channel, self.twin.slopes(&actives, of, channel, memory))
+        });
+        let columns = self.twin.columns(cause, slopes);
+        columns.par_iter().map(|column| self.in_noise(column, span)).collect()
     }
 
     /// A column at the rows that are fitted, in units of noise.
@@ -400,6 +405,16 @@ impl<'a> Problem<'a> {
             .map(|column| self.in_noise(column, None))
             .collect()
     }
+}
+
+/// Asks of some channels on all cores. What is kept from one to the next is kept by neighbours, which are a sensor's axes, so a core has as
+/// many as it can.
+fn each<T: Send>(channels: &[usize], ask: impl Fn(usize, &mut Memory) -> T + Sync) -> Vec<T> {
+    let share = channels.len().div_ceil(rayon::current_num_threads()).max(1);
+    let asked = channels.par_iter().with_min_len(share);
+    asked
+        .map_init(Memory::default, |memory, channel| ask(*channel, memory))
+        .collect()
 }
 
 /// What a reference that errs slowly puts into the readings of a kind of sensor.

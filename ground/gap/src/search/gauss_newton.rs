@@ -159,8 +159,8 @@ impl Point {
             );
         }
         let mut screen = Screen::zeros(sigmas);
-        let (mut energy, mut memory) = (0.0, Memory::default());
-        for (channel, frame) in problem.frames.iter().enumerate() {
+        let of_channel = |channel: usize, memory: &mut Memory| {
+            let frame = &problem.frames[channel];
             let entries = slopes.iter().enumerate().filter_map(|(place, entries)| {
                 entries
                     .iter()
@@ -168,23 +168,28 @@ impl Point {
                     .map(|(_, values)| (place, values))
             });
             let (places, columns): (Vec<usize>, Vec<&DVector<f64>>) = entries.unzip();
-            if model
-                .iter()
-                .all(|component| !component.active.touches(channel, problem.twin.unit()))
-                && places.is_empty()
-            {
-                energy += frame.quiet_energy;
-                continue;
+            let is_touched = |component: &Component| component.active.touches(channel, problem.twin.unit());
+            if !model.iter().any(is_touched) && places.is_empty() {
+                return None;
             }
-            let mut about_zero = problem.residual_with(channel, &model, &mut memory);
+            let mut about_zero = problem.residual_with(channel, &model, memory);
             let mut effects = DMatrix::zeros(about_zero.len(), places.len());
             for (index, (place, column)) in places.iter().zip(columns).enumerate() {
                 effects.set_column(index, column);
                 about_zero.axpy(values[*place], column, 1.0);
             }
             let normal = frame.normal(&effects, &about_zero);
-            energy += normal.energy;
-            screen.add(&places, &normal);
+            Some((places, normal))
+        };
+        let mut energy = 0.0;
+        for (frame, own) in problem.frames.iter().zip(problem.each_channel(of_channel)) {
+            match own {
+                Some((places, normal)) => {
+                    energy += normal.energy;
+                    screen.add(&places, &normal);
+                }
+                None => energy += frame.quiet_energy,
+            }
         }
         let all: Vec<usize> = (0..values.len()).collect();
         let of_any_size = screen.of_any_size(parts);

@@ -10,6 +10,7 @@
 
 use nalgebra::DVector;
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+use rayon::prelude::*;
 
 use crate::{
     null::joint::{Fitted, Joint},
@@ -37,6 +38,7 @@ use codes::{Counts, rarities};
 pub use instrument::Instrument;
 use label::Label;
 pub use simulated::Disturb;
+use simulated::Simulated;
 pub(crate) use simulated::simulate;
 pub use uniformity::Suspect;
 use view::SEED;
@@ -51,6 +53,9 @@ const FITTED: f64 = 0.3;
 
 /// Normal numbers drawn in all, so that long logs take bounded time.
 const DRAWS: usize = 20_000_000;
+
+/// Logs that are held at once, and as many that are drawn meanwhile.
+const BATCH: usize = 4;
 
 /// One aspect of a residual.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,14 +230,21 @@ impl Sizes {
         let count = (DRAWS / samples.max(1)).clamp(SIMULATIONS[0], SIMULATIONS[1]);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
         let parameters = unshrunk(joint, &fitted.parameters);
-        let mut counts: Vec<Vec<Counts>> = Vec::new();
-        let mut simulated: Vec<Vec<f64>> = (0..count)
-            .map(|_| {
-                let log = simulate(views, joint, &parameters, disturb, &mut random);
-                counts.push(log.counts);
-                sights.sums(&joint.fit(&log.residuals))
-            })
-            .collect();
+        // Logs are drawn one after the other, for one case gives one verdict; what is looked at in some of them is meanwhile.
+        let mut draw = |left: usize| -> Vec<Simulated> {
+            let batch = (0..left.min(BATCH)).map(|_| simulate(views, joint, &parameters, disturb, &mut random));
+            batch.collect()
+        };
+        let mut counts: Vec<Vec<Counts>> = Vec::with_capacity(count);
+        let mut simulated: Vec<Vec<f64>> = Vec::with_capacity(count);
+        let mut logs = draw(count);
+        while !logs.is_empty() {
+            let left = count - simulated.len() - logs.len();
+            let look = |log: &Simulated| sights.sums(&joint.fit(&log.residuals));
+            let (next, sums): (_, Vec<Vec<f64>>) = rayon::join(|| draw(left), || logs.par_iter().map(look).collect());
+            simulated.extend(sums);
+            counts.extend(std::mem::replace(&mut logs, next).into_iter().map(|log| log.counts));
+        }
         let mut observed = observed;
         for (coded, view) in coded(views).enumerate() {
             let logged = view.codes.as_ref().map_or_else(Counts::default, Codes::counts);

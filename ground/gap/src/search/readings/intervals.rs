@@ -4,6 +4,7 @@
 //! which it would explain most ([`once`]), and sets refined with a member that is on in a stretch only.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::{
     columns::{always, renew},
@@ -61,7 +62,7 @@ pub(super) fn stretches(
         };
         found.map(|(span, _)| span)
     };
-    library.hypotheses.iter().zip(gains).map(stretch).collect()
+    library.hypotheses.par_iter().zip(gains).map(stretch).collect()
 }
 
 /// A set whose last member was added, refined: on in a stretch of time if it has one, with the onset that suits it best. The

@@ -4,6 +4,8 @@
 
 use std::{iter::once, ops::Range};
 
+use rayon::prelude::*;
+
 use super::variant::is_any_same;
 use crate::{
     library::hypotheses::{Hypothesis, Library},
@@ -58,7 +60,7 @@ pub(super) fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &
         let after = larger.log_evidence().unwrap_or(f64::NEG_INFINITY);
         after + of_other_sizes - before + hypothesis.log_prior
     };
-    library.hypotheses.iter().enumerate().map(gain).collect()
+    library.hypotheses.par_iter().enumerate().map(gain).collect()
 }
 
 /// Whether parameters that cannot be negative are not, beyond twice their sigma.

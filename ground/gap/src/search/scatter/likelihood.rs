@@ -4,6 +4,7 @@
 //! model's calibration; of those that come near the best, the calibration that goes with them is then found by expectation
 //! and maximisation ([`crate::search::recalibrated`]), also in channels where only the wrong one hid them.
 
+use rayon::prelude::*;
 use twin::effect::{Beneath, Effect, LIBRARY, Nature, Texture, View, logged_step, most_likely};
 
 use super::{
@@ -27,24 +28,28 @@ pub fn scatters(problem: &Problem, model: &Model, withheld: &[String]) -> Vec<Sc
         let page = effect.page();
         page.nature == Nature::Spread && withheld.iter().all(|name| name != page.name)
     };
-    let mut found: Vec<Scatter> = Vec::new();
     // What is not white is no effect that stands for white noise, unless a calibration of its own makes it so.
-    let mut hidden: Vec<Scatter> = Vec::new();
-    for effect in LIBRARY.iter().filter(is_offered) {
+    let sought = |effect: &&'static dyn Effect| {
         let variants = effect.variants(problem.twin.starts_s());
         let price = -((LIBRARY.len() * variants.len()) as f64).ln();
         let seek = |variant: f64, is_strict: bool| search.seek(*effect, variant, price, is_strict);
-        for scatter in variants.iter().filter_map(|variant| seek(*variant, true)) {
+        let strictly = |variant: &f64| {
+            let scatter = seek(*variant, true)?;
             let views = search.views(&scatter.channels, |channel| &search.near[channel]);
             // Where channels agree on a variant that each alone had to average over, more of them show it.
             let settled = effect.settled(&views).and_then(|variant| seek(variant, true));
-            found.push(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter));
-        }
-        let is_found = found.iter().any(|own| own.effect.page().name == effect.page().name);
-        if effect.page().texture.is_white() && !is_found {
-            hidden.extend(variants.iter().filter_map(|variant| seek(*variant, false)));
-        }
-    }
+            Some(settled.filter(|settled| settled.gain > scatter.gain).unwrap_or(scatter))
+        };
+        let found: Vec<Scatter> = variants.par_iter().filter_map(strictly).collect();
+        let is_hidden = effect.page().texture.is_white() && found.is_empty();
+        let hidden = variants.par_iter().filter(|_| is_hidden);
+        let hidden: Vec<Scatter> = hidden.filter_map(|variant| seek(*variant, false)).collect();
+        (found, hidden)
+    };
+    let offered: Vec<&&dyn Effect> = LIBRARY.iter().filter(is_offered).collect();
+    let (found, hidden): (Vec<_>, Vec<_>) = offered.into_par_iter().map(sought).unzip();
+    let [mut found, mut hidden] =
+        [found, hidden].map(|of_effects| of_effects.into_iter().flatten().collect::<Vec<_>>());
     by_gain(&mut found);
     by_gain(&mut hidden);
     let least = found.first().map_or(0.0, |best| SCATTER_NEAR * best.gain);
@@ -296,7 +301,7 @@ impl<'a> Search<'a> {
         effect: &'static dyn Effect,
         variant: f64,
         price: f64,
-        judged: impl Fn(&[usize]) -> Option<Block>,
+        judged: impl Fn(&[usize]) -> Option<Block> + Sync,
     ) -> Option<Scatter> {
         let mut blocks = blocks::own(self.problem, effect);
         let of = blocks.len();
@@ -323,7 +328,7 @@ impl<'a> Search<'a> {
         effect: &'static dyn Effect,
         variant: f64,
         price: f64,
-        judged: impl Fn(&[usize]) -> Option<Block>,
+        judged: impl Fn(&[usize]) -> Option<Block> + Sync,
     ) -> Option<Scatter> {
         let mut scatter = Scatter {
             effect,
@@ -333,8 +338,9 @@ impl<'a> Search<'a> {
             gain: price,
             beneath: Vec::new(),
         };
-        for block in blocks {
-            let Some(found) = judged(block) else {
+        let found: Vec<Option<Block>> = blocks.par_iter().map(|block| judged(block)).collect();
+        for (block, found) in blocks.iter().zip(found) {
+            let Some(found) = found else {
                 continue;
             };
             let samples_of = |index: &usize| self.problem.frames[*index].series.rows.len();

@@ -5,7 +5,7 @@
 //! reference; at a quarter the next, with half the variance, and so on ([`OCTAVES`]). It keeps the tails that markers lost and
 //! found again give, and played from the same place in every channel what channels have in common. Where it starts is drawn.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -19,7 +19,7 @@ pub struct Instrument {
     /// The channel's own noise over all that it scatters, at each sample.
     pub own: Vec<f64>,
     /// The record.
-    pub record: Rc<[f64]>,
+    pub record: Arc<[f64]>,
     /// Place of each sample in the record, were it played as fast as it is.
     pub places: Vec<f64>,
 }
@@ -89,10 +89,10 @@ mod tests {
 
     #[test]
     fn it_is_of_unit_variance_and_an_octave_slower_than_the_record() {
-        let record: Rc<[f64]> = (0..4000).map(|k| 2f64.sqrt() * (f64::from(k) * 1.3).sin()).collect();
+        let record: Arc<[f64]> = (0..4000).map(|k| 2f64.sqrt() * (f64::from(k) * 1.3).sin()).collect();
         let instrument = Instrument {
             own: vec![0.0; 4000],
-            record: Rc::clone(&record),
+            record: Arc::clone(&record),
             places: (0..4000).map(f64::from).collect(),
         };
         let played = Played::draw(&mut Xoshiro256PlusPlus::seed_from_u64(3));

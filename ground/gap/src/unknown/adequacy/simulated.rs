@@ -25,7 +25,7 @@ pub struct Disturb<'a> {
     /// The channels it is in.
     pub channels: &'a [usize],
     /// What it makes of noise, given as residuals a channel in units of noise; drawn from a seed.
-    pub of: &'a dyn Fn(&mut [DVector<f64>], u64),
+    pub of: &'a (dyn Fn(&mut [DVector<f64>], u64) + Sync),
 }
 
 /// One log.

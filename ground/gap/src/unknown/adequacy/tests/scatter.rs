@@ -3,7 +3,7 @@
 use super::*;
 
 /// What is left of these residuals if they are held to a law of the scatter of some channels.
-fn held_to(channels: &[usize], of: &dyn Fn(&mut [DVector<f64>], u64), residuals: &[DVector<f64>]) -> Leftover {
+fn held_to(channels: &[usize], of: &(dyn Fn(&mut [DVector<f64>], u64) + Sync), residuals: &[DVector<f64>]) -> Leftover {
     let (views, joint) = scene();
     judge(
         &views,
