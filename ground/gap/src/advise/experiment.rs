@@ -159,7 +159,7 @@ fn separation(subject: &Subject, pair: &Pair, motion: &dyn Motion) -> Option<(f6
             .iter()
             .map(|column| {
                 sigmas.push(column.sigma);
-                products.push(&problem, Column::Held(problem.in_noise(column, None)))
+                products.push(&problem, Column::of(problem.in_noise(column, None)))
             })
             .collect()
     };

@@ -113,7 +113,7 @@ impl Library {
             reference: problem.reference.len(),
         };
         for column in problem.reference_columns() {
-            library.products.push(problem, Column::Held(column));
+            library.products.push(problem, Column::of(column));
         }
         let is_exact = problem.instrument.accuracy.attitude_sigma_rad <= 0.0;
         let is_offered = |page: &Page| {
@@ -246,7 +246,7 @@ fn columns(problem: &Problem, cause: &Cause, carrier: &Option<Carrier>) -> Vec<(
     };
     let columns = problem.twin.jacobian(&[zero], 0).into_iter();
     columns
-        .map(|column| (Column::Held(problem.in_noise(&column, None)), column.sigma))
+        .map(|column| (Column::of(problem.in_noise(&column, None)), column.sigma))
         .collect()
 }
 

@@ -5,7 +5,7 @@
 
 use std::{
     borrow::Cow,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
 };
 
 use nalgebra::{DMatrix, DVector};
@@ -48,7 +48,7 @@ impl Clone for Products {
 impl Products {
     /// Adds a column; returns its place.
     pub fn push(&mut self, problem: &Problem, column: Column) -> usize {
-        self.open.push(open_part(problem, &column.entries()));
+        self.open.push(open_part(problem, &column));
         self.columns.push(column);
         self.known_mut().push(Vec::new());
         self.columns.len() - 1
@@ -56,7 +56,7 @@ impl Products {
 
     /// Adds columns.
     pub fn extend(&mut self, problem: &Problem, columns: Vec<Column>) {
-        let open = columns.par_iter().map(|column| open_part(problem, &column.entries()));
+        let open = columns.par_iter().map(|column| open_part(problem, column));
         self.open.par_extend(open);
         self.columns.extend(columns);
         let count = self.columns.len();
@@ -65,8 +65,9 @@ impl Products {
 
     /// Replaces a column.
     pub fn renew(&mut self, problem: &Problem, place: usize, column: Entries) {
+        let column = Column::of(column);
         self.open[place] = open_part(problem, &column);
-        self.columns[place] = Column::Held(column);
+        self.columns[place] = column;
         let known = self.known_mut();
         known[place].clear();
         let after = known.iter_mut().skip(place);
@@ -79,52 +80,33 @@ impl Products {
 
     /// After the problem's frames were these.
     pub fn reframe(&mut self, problem: &Problem, before: &[Frame]) {
-        if (problem.frames.iter().chain(before)).any(|frame| frame.colour.is_some()) {
-            for column in &mut self.columns {
-                *column = Column::Held(column.entries().into_owned());
-            }
+        let is_coloured = |frame: &Frame| frame.colour.is_some();
+        if problem.frames.iter().chain(before).any(is_coloured) {
+            self.recolour(problem, before);
+        } else {
+            Column::reframe(&mut self.columns, problem, before);
         }
-        self.reframe_courses(problem, before);
-        for (channel, (frame, before)) in problem.frames.iter().zip(before).enumerate() {
-            let columns = self.columns.iter_mut().filter_map(|column| match column {
-                Column::Held(entries) => Some(entries),
-                Column::Carried(_) => None,
-            });
-            let own = columns.flatten().filter(|(of, _)| *of == channel);
-            let own = own.map(|(_, values)| values);
-            let mut own: Vec<&mut DVector<f64>> = own.collect();
+        let columns = self.columns.par_iter();
+        self.open = columns.map(|column| open_part(problem, column)).collect();
+        self.known_mut().iter_mut().for_each(Vec::clear);
+    }
+
+    /// Takes the columns from colour to colour.
+    fn recolour(&mut self, problem: &Problem, before: &[Frame]) {
+        let mut of_channels: Vec<Vec<&mut DVector<f64>>> = before.iter().map(|_| Vec::new()).collect();
+        let columns = self.columns.iter_mut().flat_map(Column::whole);
+        columns.for_each(|(channel, values)| of_channels[channel].push(values));
+        for ((frame, before), mut own) in problem.frames.iter().zip(before).zip(of_channels) {
             own.par_chunks_mut(BLOCK).for_each(|block| {
                 let white = DMatrix::from_fn(frame.weights.len(), block.len(), |row, at| block[at][row]);
                 let anew = frame.whites(before.physical(white));
                 (block.iter_mut().zip(anew.column_iter())).for_each(|(own, anew)| own.copy_from(&anew));
             });
         }
-        let columns = self.columns.par_iter();
-        self.open = columns.map(|column| open_part(problem, &column.entries())).collect();
-        self.known_mut().iter_mut().for_each(Vec::clear);
-    }
-
-    /// The same of what waves carry: a course that many columns have in common stays one.
-    fn reframe_courses(&mut self, problem: &Problem, before: &[Frame]) {
-        let mut renewed: Vec<(Arc<DVector<f64>>, Arc<DVector<f64>>)> = Vec::new();
-        let carried = self.columns.iter_mut().filter_map(|column| match column {
-            Column::Held(_) => None,
-            Column::Carried(parts) => Some(parts),
-        });
-        for (channel, course, _) in carried.flatten() {
-            let known = renewed.iter().find(|(old, _)| Arc::ptr_eq(old, course));
-            let anew = known.map(|(_, anew)| Arc::clone(anew)).unwrap_or_else(|| {
-                let physical = course.component_mul(&before[*channel].weights);
-                let anew = Arc::new(problem.frames[*channel].white(physical));
-                renewed.push((Arc::clone(course), Arc::clone(&anew)));
-                anew
-            });
-            *course = anew;
-        }
     }
 
     /// A column's values.
-    pub fn column(&self, place: usize) -> Cow<'_, Entries> {
+    pub fn column(&self, place: usize) -> Entries {
         self.columns[place].entries()
     }
 
@@ -166,7 +148,8 @@ impl Products {
     /// `e'P r` of every column, for one residual a channel.
     pub fn scores(&self, problem: &Problem, residuals: &[DVector<f64>]) -> Vec<f64> {
         let all: Entries = residuals.iter().cloned().enumerate().collect();
-        let open = open_part(problem, &all);
+        let own = |(channel, values): &(usize, DVector<f64>)| (*channel, problem.frames[*channel].open_part(values));
+        let open: Entries = all.iter().map(own).collect();
         let score = |(column, own): (&Column, &Entries)| column.dot_entries(&all) - inner(own, &open);
         (self.columns.par_iter().zip(&self.open)).map(score).collect()
     }
@@ -184,11 +167,9 @@ impl Products {
     }
 }
 
-fn open_part(problem: &Problem, column: &Entries) -> Entries {
-    column
-        .iter()
-        .map(|(channel, values)| (*channel, problem.frames[*channel].open_part(values)))
-        .collect()
+fn open_part(problem: &Problem, column: &Column) -> Entries {
+    let own = |channel: usize| Some((channel, problem.frames[channel].open_part(&*column.values(channel)?)));
+    column.channels().into_iter().filter_map(own).collect()
 }
 
 fn inner(one: &Entries, other: &Entries) -> f64 {

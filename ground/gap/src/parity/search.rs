@@ -98,7 +98,7 @@ impl Offered {
     pub fn of(problem: &Problem, library: &Library) -> Self {
         let own = 0..library.products.len();
         let mut offered = Self {
-            columns: own.map(|place| library.products.column(place).into_owned()).collect(),
+            columns: own.map(|place| library.products.column(place)).collect(),
             sets: Vec::new(),
         };
         let mut memory = Memory::default();
@@ -363,7 +363,7 @@ pub fn choose(
             break;
         }
         let places = library.hypotheses[next.hypothesis].small().iter();
-        let columns = places.clone().map(|place| library.products.column(*place).into_owned());
+        let columns = places.clone().map(|place| library.products.column(*place));
         let sigmas = places.map(|place| library.prior_sigmas[*place]);
         taken.push(Taken::of(space, columns.collect(), sigmas.collect()));
         chosen.push(next);

@@ -61,7 +61,7 @@ pub fn offer(problem: &Problem, library: &mut Library, withheld: &[String]) {
                     let own: Vec<usize> = own
                         .map(|(column, sigma)| {
                             library.prior_sigmas.push(sigma);
-                            library.products.push(problem, Column::Held(column))
+                            library.products.push(problem, Column::of(column))
                         })
                         .collect();
                     known.push((channel, own.clone()));

@@ -13,8 +13,6 @@
 //! None of them leaves the calibration open, knows "none of these", or has a probability: what they state is a share.
 //! The oracle, which knows the effect, is the diagnosis with a library of nothing else ([`oracle_withholds`]).
 
-use std::borrow::Cow;
-
 use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::LIBRARY;
 
@@ -87,7 +85,7 @@ pub fn largest_residual(problem: &Problem, library: &Library) -> Vec<Named> {
 
 /// One global least squares with an l1 penalty.
 pub fn lasso(problem: &Problem, library: &Library) -> Vec<Named> {
-    let columns: Vec<(Cow<'_, Entries>, f64)> = (library.reference..library.products.len())
+    let columns: Vec<(Entries, f64)> = (library.reference..library.products.len())
         .map(|place| {
             let column = library.products.column(place);
             let energy = column.iter().map(|(_, values)| values.norm_squared()).sum();
@@ -132,7 +130,7 @@ pub fn lasso(problem: &Problem, library: &Library) -> Vec<Named> {
 }
 
 /// Coordinate descent; `left` becomes what the columns leave. Penalties are in units of each column's norm.
-fn descend(columns: &[(Cow<'_, Entries>, f64)], left: &mut [DVector<f64>], penalty: f64) -> Vec<f64> {
+fn descend(columns: &[(Entries, f64)], left: &mut [DVector<f64>], penalty: f64) -> Vec<f64> {
     let mut sizes = vec![0.0; columns.len()];
     for _ in 0..SWEEPS {
         let mut moved: f64 = 0.0;
@@ -199,7 +197,7 @@ pub fn best_subset(problem: &Problem, library: &Library) -> Vec<Named> {
 
 /// By how much least squares on these columns alone makes the energy fall, and their parameters.
 fn fall(library: &Library, places: &[usize], residuals: &[DVector<f64>]) -> Option<(f64, DVector<f64>)> {
-    let columns: Vec<Cow<'_, Entries>> = places.iter().map(|place| library.products.column(*place)).collect();
+    let columns: Vec<Entries> = places.iter().map(|place| library.products.column(*place)).collect();
     let inner = |one: &Entries, other: &Entries| -> f64 {
         let on = |channel: usize| other.iter().find(|(index, _)| *index == channel);
         one.iter()
@@ -241,11 +239,7 @@ mod tests {
         };
         let (first, second) = (column(0, 2.0), column(1, 1.0));
         let mut left = vec![DVector::from_column_slice(&[10.0, 0.5, 0.0, 0.0])];
-        let sizes = descend(
-            &[(Cow::Borrowed(&first), 4.0), (Cow::Borrowed(&second), 1.0)],
-            &mut left,
-            1.0,
-        );
+        let sizes = descend(&[(first, 4.0), (second, 1.0)], &mut left, 1.0);
         // 10 along a column of norm 2: (10 * 2 - 1 * 2) / 4; 0.5 is below the penalty.
         assert_eq!(sizes, [4.5, 0.0]);
         assert_eq!(left[0][0], 1.0);

@@ -62,7 +62,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         .flat_map(|hypothesis| library.hypotheses[*hypothesis].places.iter().copied());
     let mut slopes: Vec<Entries> = (0..library.reference)
         .chain(own)
-        .map(|place| library.products.column(place).into_owned())
+        .map(|place| library.products.column(place))
         .collect();
     let mut best: Option<Refined> = None;
     for step in 0..STEPS {

@@ -54,17 +54,15 @@ fn both(problem: &Problem, hz: f64) -> (Vec<Column>, Vec<Column>) {
         cause,
     };
     let columns = problem.twin.jacobian(&[zero], 0);
-    let held = columns
-        .iter()
-        .map(|column| Column::Held(problem.in_noise(column, None)));
+    let held = columns.iter().map(|column| Column::of(problem.in_noise(column, None)));
     (carried.into_iter().map(|(column, _)| column).collect(), held.collect())
 }
 
 fn is_near(one: &Entries, other: &Entries) -> bool {
-    let is_one = |((channel, own), (other, others)): (&(usize, DVector<f64>), &(usize, DVector<f64>))| {
-        channel == other && (own - others).amax() < ROUNDING * others.amax().max(1.0)
-    };
-    one.len() == other.len() && one.iter().zip(other).all(is_one)
+    one.len() == other.len()
+        && one.iter().zip(other).all(|((channel, own), (other, others))| {
+            channel == other && (own - others).amax() < ROUNDING * others.amax().max(1.0)
+        })
 }
 
 #[test]
@@ -128,4 +126,23 @@ fn a_course_of_other_noise_stays_one_course() {
             assert!(is_near(&carried.column(place), &held.column(place)), "{place}");
         }
     });
+}
+
+/// Of fifteen instants most begin late, and some after all samples.
+#[test]
+fn a_column_that_begins_late_is_what_it_would_be_as_a_whole() {
+    let late = |first: usize| DVector::from_fn(101, |row, _| if row < first { 0.0 } else { (row as f64).sin() });
+    let held = |first: usize| Column::of(vec![(3, late(first))]);
+    for first in [0, 7, 50, 51, 63, 64, 99, 101] {
+        assert_eq!(held(first).entries(), [(3, late(first))], "{first}");
+        for other in [0, 52, 80, 101] {
+            let expected = late(first).dot(&late(other));
+            assert_eq!(held(first).dot(&held(other)), expected, "{first} {other}");
+            assert_eq!(
+                held(first).dot_entries(&vec![(3, late(other))]),
+                expected,
+                "{first} {other}"
+            );
+        }
+    }
 }

@@ -134,7 +134,7 @@ fn an_inner_product_is_that_of_the_dense_marginal_covariance() {
         let own = |place: usize| library.products.column(place);
         let places = [0, library.products.len() / 3, library.products.len() - 1];
         let columns = places.map(own);
-        let columns = columns.each_ref().map(AsRef::as_ref);
+        let columns = columns.each_ref();
         let (among, opened) = Space::among(space.problem, space.motion, Vec::new(), &columns);
         // Sets that have columns in common, and one that names them in another order.
         let sets = [vec![0, 1, 2], vec![2, 1]];
@@ -162,7 +162,7 @@ fn eliminated(check: impl Fn(&str, &Problem, &dyn Elimination, &[&Entries])) {
         let columns: Vec<_> = (0..library.products.len())
             .map(|place| library.products.column(place))
             .collect();
-        let columns: Vec<&Entries> = columns.iter().map(AsRef::as_ref).collect();
+        let columns: Vec<&Entries> = columns.iter().collect();
         // More than are solved together, and no multiple.
         assert!(columns.len() > LANES && !columns.len().is_multiple_of(LANES));
         check("packet by packet", problem, &Motion::of(problem, course), &columns);

@@ -45,7 +45,7 @@ pub(super) fn stretches(
             return None;
         }
         let places = hypothesis.places.iter();
-        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place).into_owned()).collect();
+        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place)).collect();
         let sigmas: Vec<f64> = (hypothesis.parameters.iter())
             .map(|parameter| parameter.prior_sigma)
             .collect();
