@@ -16,6 +16,7 @@
 //! and columns that nothing sees are left out of it, so that a packet with lost samples eliminates no more than it must.
 
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 use twin::predict::{Feel, Kind};
 
 use crate::{
@@ -96,21 +97,25 @@ impl Elimination for Motion {
     /// `Q'[u; 0]`, packet by packet.
     fn parts(&self, columns: &[&Entries]) -> DMatrix<f64> {
         let mut parts = DMatrix::zeros(UNKNOWNS * self.packets, columns.len());
-        for (at, column) in columns.iter().enumerate() {
-            let mut part = parts.column_mut(at);
-            let (own, _) = part.as_mut_slice().as_chunks_mut::<UNKNOWNS>();
+        if self.packets == 0 {
+            return parts;
+        }
+        let of_columns = parts.as_mut_slice().par_chunks_mut(UNKNOWNS * self.packets);
+        of_columns.zip(columns).for_each(|(part, column)| {
+            let (own, _) = part.as_chunks_mut::<UNKNOWNS>();
             for (channel, values) in *column {
                 let rows = self.rows[*channel].as_chunks::<UNKNOWNS>().0;
                 for ((packet, row), value) in self.packet[*channel].iter().zip(rows).zip(values.iter()) {
                     own[*packet].iter_mut().zip(row).for_each(|(sum, q)| *sum += q * value);
                 }
             }
-        }
+        });
         parts
     }
 
     fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
-        for ((packets, rows), from) in self.packet.iter().zip(&self.rows).zip(from) {
+        let channels = self.packet.par_iter().zip(&self.rows).zip(from);
+        channels.for_each(|((packets, rows), from)| {
             let rows = rows.as_chunks::<UNKNOWNS>().0;
             for (mut from, part) in from.column_iter_mut().zip(parts.column_iter()) {
                 let own = part.as_slice().as_chunks::<UNKNOWNS>().0;
@@ -118,7 +123,7 @@ impl Elimination for Motion {
                     *value -= own[*packet].iter().zip(row).map(|(part, q)| part * q).sum::<f64>();
                 }
             }
-        }
+        });
     }
 
     fn free(&self, channel: usize) -> f64 {

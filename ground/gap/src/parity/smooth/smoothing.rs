@@ -9,9 +9,10 @@
 //!
 //! The temperature of a row is free, as it is in [`crate::parity::packet`].
 
-use std::{array::from_fn, cell::OnceCell};
+use std::{array::from_fn, sync::OnceLock};
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use twin::predict::{Feel, Kind};
 
 use crate::{
@@ -47,7 +48,7 @@ pub struct Smoothing {
     pub knots: Knots,
     rows: Vec<Rows>,
     factor: Factor,
-    inverse: OnceCell<Inverse>,
+    inverse: OnceLock<Inverse>,
     priors: Vec<Prior>,
     tie: Option<(Tie, DVector<f64>)>,
     /// Rows of the log, and of each thermometer the row of every sample and its part of the temperature.
@@ -93,7 +94,7 @@ impl Smoothing {
         Self {
             knots,
             rows,
-            inverse: OnceCell::new(),
+            inverse: OnceLock::new(),
             factor: normal.factor(),
             priors,
             tie: None,
@@ -204,23 +205,20 @@ impl Elimination for Smoothing {
     fn parts(&self, columns: &[&Entries]) -> DMatrix<f64> {
         let size = self.factor.size();
         let mut parts = DMatrix::zeros(size + self.log_rows, columns.len());
-        let mut panel = vec![[0.0; LANES]; size];
-        for (block, columns) in columns.chunks(LANES).enumerate() {
-            for (lane, column) in columns.iter().enumerate() {
+        let rows = size + self.log_rows;
+        let blocks = parts.as_mut_slice().par_chunks_mut(LANES * rows);
+        blocks.zip(columns.par_chunks(LANES)).for_each(|(parts, columns)| {
+            let mut panel = vec![[0.0; LANES]; size];
+            for (lane, (column, part)) in columns.iter().zip(parts.chunks_exact_mut(rows)).enumerate() {
                 let seen = self.seen(column);
                 panel.iter_mut().zip(&seen).for_each(|(row, own)| row[lane] = *own);
-                let mut part = parts.column_mut(LANES * block + lane);
-                part.as_mut_slice()[size..].copy_from_slice(&seen[size..]);
+                part[size..].copy_from_slice(&seen[size..]);
             }
             self.factor.forward(&mut panel);
-            for lane in 0..columns.len() {
-                let mut part = parts.column_mut(LANES * block + lane);
-                part.as_mut_slice()
-                    .iter_mut()
-                    .zip(&panel)
-                    .for_each(|(own, row)| *own = row[lane]);
+            for (lane, part) in parts.chunks_exact_mut(rows).enumerate() {
+                part.iter_mut().zip(&panel).for_each(|(own, row)| *own = row[lane]);
             }
-        }
+        });
         if let Some((tie, _)) = &self.tie {
             tie.apply(&mut parts.view_mut((0, 0), (size, columns.len())));
         }
@@ -246,7 +244,8 @@ impl Elimination for Smoothing {
                     .for_each(|(row, own)| row[lane] = *own);
             }
             self.factor.backward(&mut panel);
-            for ((own, warm), from) in self.rows.iter().zip(&self.warm).zip(&mut *from) {
+            let channels = self.rows.par_iter().zip(&self.warm).zip(&mut *from);
+            channels.for_each(|((own, warm), from)| {
                 for (sample, (row, share)) in warm.iter().enumerate() {
                     (lanes.clone()).for_each(|at| from[(sample, at)] -= share * parts[(size + row, at)]);
                 }
@@ -254,7 +253,7 @@ impl Elimination for Smoothing {
                     let values = own.of(sample, &panel[UNKNOWNS * first..]);
                     (lanes.clone().zip(values)).for_each(|(at, value)| from[(sample, at)] -= value);
                 }
-            }
+            });
         }
     }
 

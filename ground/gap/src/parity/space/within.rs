@@ -6,6 +6,7 @@
 //! channels that it touches, while `(I - Q Q')u` has samples in all.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::{
     library::products::Entries,
@@ -95,23 +96,37 @@ impl Space<'_> {
         // Every block goes through all columns that are asked for.
         let block = if columns.is_empty() { LEAST } else { BLOCK };
         self.each_apart(block, &mut |from, apart| {
-            let mut known = 0;
-            for ((frame, touching), apart) in frames.iter().zip(&touching).zip(apart) {
-                let apart = apart.transpose();
+            let before = frames.iter().scan(0, |known, frame| {
+                *known += frame.nuisance.ncols();
+                Some(*known - frame.nuisance.ncols())
+            });
+            let before: Vec<usize> = before.collect();
+            let of_channel = |channel: usize| {
+                let (frame, known) = (&frames[channel], before[channel]);
+                let apart = apart[channel].transpose();
                 // What is right of the diagonal is known from below it.
-                if known < from + apart.nrows() {
-                    let mut own = inner.view_mut((from, known), (apart.nrows(), frame.nuisance.ncols()));
+                let own = (known < from + apart.nrows()).then(|| {
+                    let own = inner.view((from, known), (apart.nrows(), frame.nuisance.ncols()));
+                    let mut own = own.into_owned();
                     own.gemm(1.0, &apart, &frame.nuisance, 1.0);
-                }
-                known += frame.nuisance.ncols();
-                for touching in touching.chunks(HELD) {
+                    own
+                });
+                let products = touching[channel].chunks(HELD).map(|touching| {
                     let mut values = DMatrix::zeros(apart.ncols(), touching.len());
                     (touching.iter().enumerate()).for_each(|(at, (_, own))| values.set_column(at, own));
-                    let product = &apart * values;
-                    for ((place, _), product) in touching.iter().zip(product.column_iter()) {
-                        let mut sum = open.view_mut((from, *place), (product.len(), 1));
-                        sum += product;
-                    }
+                    &apart * values
+                });
+                (own, products.collect::<Vec<DMatrix<f64>>>())
+            };
+            let of_channels: Vec<_> = (0..frames.len()).into_par_iter().map(of_channel).collect();
+            for (channel, (own, products)) in of_channels.into_iter().enumerate() {
+                if let Some(own) = own {
+                    inner.view_mut((from, before[channel]), own.shape()).copy_from(&own);
+                }
+                let products = products.iter().flat_map(|product| product.column_iter());
+                for ((place, _), product) in touching[channel].iter().zip(products) {
+                    let mut sum = open.view_mut((from, *place), (product.len(), 1));
+                    sum += product;
                 }
             }
             let width = apart.first().map_or(0, DMatrix::ncols);
