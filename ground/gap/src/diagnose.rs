@@ -31,7 +31,7 @@ use crate::{
         problem::{Component, Frame, Problem},
     },
     probability::{
-        cause::{Cause, STALE, cause_of_repeats, share_out},
+        cause::{Cause, STALE, VIBRATION, cause_of_line, cause_of_repeats, share_out},
         doubt::Promised,
         importance::setting,
         outcome::{Outcome, is_unexplained},
@@ -123,9 +123,11 @@ impl Diagnosis {
 /// Diagnoses a case. `progress` is told what goes on and how far it is, 0 to 1.
 pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Diagnosis {
     let mut withheld = withheld.to_vec();
-    let repeats: Vec<Cause> = (subject.repeats.iter().flatten())
-        .filter(|_| withheld.iter().all(|name| name != STALE))
+    let is_asked = |effect: &str| withheld.iter().all(|name| name != effect);
+    let by_rows: Vec<Cause> = (subject.repeats.iter().flatten())
+        .filter(|_| is_asked(STALE))
         .filter_map(|repeats| cause_of_repeats(subject, repeats))
+        .chain((subject.line.iter().filter(|_| is_asked(VIBRATION))).filter_map(|line| cause_of_line(subject, line)))
         .collect();
     withheld.extend(subject.repeats.as_ref().map(|_| STALE.to_owned()));
     let withheld = &withheld[..];
@@ -256,9 +258,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         false => left_beneath(&believed.causes),
     };
     // What rows say of themselves says nothing of the others.
-    believed
-        .causes
-        .extend(repeats.into_iter().filter(|cause| cause.probability >= SAID));
+    let is_new = |cause: &Cause| believed.causes.iter().all(|other| other.effect != cause.effect);
+    let by_rows = by_rows
+        .into_iter()
+        .filter(|cause| cause.probability >= SAID && is_new(cause));
+    let by_rows: Vec<Cause> = by_rows.collect();
+    believed.causes.extend(by_rows);
     let mut alternatives = believed.alternatives(&library, &explanation);
     let is_named = !believed.causes.is_empty();
     if !is_named && !believed.unnamed.is_empty() {

@@ -10,6 +10,7 @@ pub mod case;
 pub mod gross;
 pub mod hold;
 pub mod level;
+pub mod line;
 pub mod log;
 pub mod reference;
 pub mod repeats;

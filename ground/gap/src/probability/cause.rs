@@ -6,7 +6,7 @@
 use twin::effect::Parameter;
 
 use crate::{
-    input::{case::Subject, repeats::Repeats},
+    input::{case::Subject, line::Line, repeats::Repeats},
     library::hypotheses::Library,
     null::problem::Problem,
     probability::regime,
@@ -18,8 +18,11 @@ use crate::{
     thresholds::{COUNTED_PART, STANDS_OUT, SUSPICIOUS, TEMPERATURE},
 };
 
-/// The effect that rows alone show.
+/// An effect that rows alone show.
 pub const STALE: &str = "stale-sample";
+
+/// Another.
+pub const VIBRATION: &str = "vibration";
 
 /// One parameter of a cause.
 #[derive(Clone, Debug)]
@@ -191,6 +194,52 @@ pub fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
         share: 2.0 * repeats.nats,
         when: "throughout".to_owned(),
         which: Some("all its axes repeat the row before together, oftener than by chance".to_owned()),
+        confirm_by: page.confirm_by,
+        physics: page.physics,
+        is_suspicious: excess > SUSPICIOUS,
+    })
+}
+
+/// A vibration as a cause, by the rows of a log alone; its share is still an energy.
+pub fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
+    let page = twin::effect::by_name(VIBRATION)?.page();
+    let symbol = page.parameters.first()?;
+    let channels: Vec<usize> = line.sizes.iter().map(|(channel, _)| *channel).collect();
+    let size = |(channel, size): &(usize, [f64; 2])| {
+        let own = &subject.twin.unit().channels[*channel];
+        let [value, sigma] = size.map(|size| size / own.sigma());
+        Sized {
+            parameter: Parameter {
+                name: format!("{}_{}", symbol.name, own.name),
+                unit: symbol.unit,
+                prior_sigma: symbol.prior_sigma,
+                signed: symbol.signed,
+            },
+            value,
+            sigma,
+        }
+    };
+    let parameters: Vec<Sized> = line.sizes.iter().map(size).collect();
+    let excess = parameters
+        .iter()
+        .map(|sized| sized.value / symbol.prior_sigma)
+        .fold(0.0, f64::max)
+        / page.largest;
+    Some(Cause {
+        effect: page.name,
+        locality: subject.names(channels.iter().copied()).join(" "),
+        channels,
+        probability: named(line.nats / TEMPERATURE, excess),
+        of_any: 1.0,
+        gain: line.nats,
+        explained: 2.0 * line.nats,
+        parameters,
+        share: 2.0 * line.nats,
+        when: "throughout".to_owned(),
+        which: Some(format!(
+            "a line at {:.2} Hz, or folded to it, which the reference is too slow for",
+            line.hz
+        )),
         confirm_by: page.confirm_by,
         physics: page.physics,
         is_suspicious: excess > SUSPICIOUS,

@@ -17,6 +17,7 @@ use super::{
 use crate::input::{
     gross::{Gross, put_right},
     hold::Held,
+    line::{Line, line},
     log::{Column, Log, Masked, Stream},
     reference::{Reference, SPREAD_S},
     repeats::{Repeats, by_axes, repeats},
@@ -64,6 +65,8 @@ pub struct Subject {
     pub repeats: Option<Vec<Repeats>>,
     /// Parts of any kind that did, whoever sees them.
     pub repeated: Vec<Repeats>,
+    /// A vibration too fast for the reference; `None` also where the reference is exact, and the search for effects on the scatter sees it.
+    pub line: Option<Line>,
     /// What was grossly wrong and is put right; in tables only.
     pub gross: Gross,
 }
@@ -108,6 +111,7 @@ impl Subject {
         log = within_windows(log, &opened);
         let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
         let repeats = repeats(&log, &unit).filter(|_| !is_exact);
+        let line = if is_exact { None } else { line(&log, &unit) };
         let repeated = by_axes(&log, &unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
@@ -173,6 +177,7 @@ impl Subject {
             thinned,
             repeats,
             repeated,
+            line,
             gross: Gross::default(),
         })
     }
@@ -223,6 +228,7 @@ impl Subject {
             thinned: 1,
             repeats: None,
             repeated: Vec::new(),
+            line: None,
             gross,
         })
     }
