@@ -328,10 +328,10 @@ thresholds! {
         larger: "units with little redundancy are refused",
         smaller: "one plate is judged by its thermometers",
         Derived("one plate has none, two have three or more");
-    /// Probability of so many repeated samples, or of so high a line, by chance, below which they are old samples, or a vibration.
-    REPEATS_CHANCE: f64 = 1e-4, in "probability",
-        larger: "chance is taken for old samples and for vibration",
-        smaller: "few old samples and weak vibrations are not found",
+    /// Probability by chance below which what the rows of a log say by themselves is believed: old samples, damaged ones, a line.
+    ROWS_CHANCE: f64 = 1e-4, in "probability",
+        larger: "chance is taken for old samples, damage and vibration",
+        smaller: "few old samples, little damage and weak vibrations are not found",
         Convention("one healthy log in ten thousand");
     /// Probability below which what is told of a motion is not of this flight, and is not used.
     NOT_OF_THIS_FLIGHT: f64 = 1e-3, in "probability",

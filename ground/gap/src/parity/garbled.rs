@@ -10,7 +10,7 @@
 //!
 //! Far samples alone are no damage: a blow makes them. What a reversed bit makes is a power of two in codes. Of samples
 //! that are off by any size, however large, one in [`ODDS`] comes as near to one as noise lets it; more than chance allows
-//! ([`REPEATS_CHANCE`]) are damage. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own
+//! ([`ROWS_CHANCE`]) are damage. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own
 //! neighbours by as much. They have no say in whether there is damage.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
@@ -20,7 +20,7 @@ use twin::predict::{Channel, Kind, UnitDescription};
 use crate::{
     input::log::Log,
     parity::codes::{Finding, sends_codes},
-    thresholds::REPEATS_CHANCE,
+    thresholds::ROWS_CHANCE,
 };
 
 /// Standard deviations from which a sample is left out: noise has one in 1e15, and what is nearer bends no motion by more than noise.
@@ -69,7 +69,7 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Option<Finding> {
     let reversed: Vec<&Off> = far.iter().filter(|own| own.is_reversed_bit()).collect();
     let before = (reversed.len() as u64).checked_sub(1)?;
     let chance = Binomial::new(ODDS.recip(), far.len() as u64).map_or(1.0, |law| law.sf(before));
-    if chance >= REPEATS_CHANCE {
+    if chance >= ROWS_CHANCE {
         return None;
     }
     let mut channels: Vec<usize> = reversed.iter().map(|own| own.channel).collect();
