@@ -1,16 +1,17 @@
 //! A vibration that is too fast for the reference, by the rows of a log alone.
 //!
-//! In: a log of physical units before it is thinned, and its unit. Out: [`Line`], the frequency at which the accelerometers of a part have a line
-//! above [`FASTER_HZ`], and how large it is in each sensor of their group.
+//! In: a log of physical units before it is thinned, and its unit. Out: [`Line`], the frequency at which the accelerometers of a group have a line
+//! above [`FASTER_HZ`], and how large it is in each of them and of the group's gyros.
 //!
 //! What is faster than a reference is used for needs no prediction, and what is thinned folds it under the reference's errors. The
 //! periodogram of each axis (Hann's window) over its level, the median of [`LEVEL`] bins over ln 2, is exponential where there is noise. Summed over
 //! `m` axes it is above `x` with the probability `exp(-x) (1 + x + ... + x^(m-1)/(m-1)!)`, and the largest of `n` bins with at most `n`
-//! times that. A line stands alone: beyond [`WIDTH_HZ`] no other bin is half as high, as they are in the comb of samples that a neighbour sends twice
-//! and in what is loud up to half the rate of the rows.
+//! times that. A line stands alone: no bin is half as high that is farther from it than [`WIDTH_HZ`]. Two things on real recordings are high
+//! and do not: the comb of a part that sends samples twice, and noise that is loud up to half the rate of the rows.
 //!
 //! Says nothing of rows that are not even, or too slow; of accelerometers that send codes (the search for effects on the scatter sees all of
-//! their samples); and of a line that wanders. Samples that are missing are taken for the mean of the others.
+//! their samples); and of a line that wanders, or has a harmonic half as high. Samples that are missing are taken for the mean of the others,
+//! which makes an amplitude too small by their share.
 
 use std::ops::Range;
 
@@ -20,15 +21,16 @@ use twin::{
     predict::{Kind, UnitDescription},
 };
 
-use crate::{input::log::Log, thresholds::REPEATS_CHANCE};
+use crate::{input::log::Log, thresholds::ROWS_CHANCE};
 
-/// \[Hz\] from which a line is looked for. References are used up to 20 Hz.
+/// \[Hz\] from which a line is looked for: references are used up to 20 Hz ([`twin::motion::Recorded::used`]), and their smoothing ends a little above.
 const FASTER_HZ: f64 = 25.0;
 
-/// \[Hz\] to either side to which a line is blurred by what drives it.
+/// \[Hz\] to either side to which a line is blurred by what drives it: motors keep their speed to some parts in a thousand. Lines that were dealt
+/// into recordings are within 0.04 Hz.
 const WIDTH_HZ: f64 = 0.25;
 
-/// Bins of which the median is the level.
+/// Bins of which the median is the level: known to a twelfth, `1/sqrt(n) / ln 2`.
 const LEVEL: usize = 256;
 
 /// Part of a step by which rows may be off an even pace.
@@ -67,9 +69,9 @@ pub fn line(log: &Log, unit: &UnitDescription) -> Option<Line> {
         let near = steps.near(peak, bins.len());
         let is_alone = (0..sums.len()).all(|bin| near.contains(&bin) || 2.0 * sums[bin] < highest);
         let nats = -tail(highest, accelerometers.len()) - (bins.len() as f64).ln();
-        (is_alone && nats > -REPEATS_CHANCE.ln()).then(|| {
+        (is_alone && nats > -ROWS_CHANCE.ln()).then(|| {
             let all = accelerometers.into_iter().chain(own(Kind::Gyro).map(spectrum));
-            let is_in = |(_, own): &(usize, Spectrum)| tail(own.over_level[peak], 1) < REPEATS_CHANCE.ln();
+            let is_in = |(_, own): &(usize, Spectrum)| tail(own.over_level[peak], 1) < ROWS_CHANCE.ln();
             let size = |(channel, own): (usize, Spectrum)| (channel, own.amplitude(near.clone()));
             Line {
                 hz: (bins.start + peak) as f64 * steps.bin_hz(),
