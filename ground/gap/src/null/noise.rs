@@ -176,3 +176,55 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of gyros declared with 1, a level and what the reference puts in, both in that.
+    fn gyros(seen: f64, by_reference: f64) -> Noise {
+        Noise {
+            kind: Kind::Gyro,
+            declared: 1.0,
+            seen,
+            by_reference,
+            range: [seen; 2],
+            colour: 0.0,
+            repeated: 0.0,
+            chance: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_reference_that_errs_more_hides_all_but_what_is_beyond_both_or_beneath_the_sensor() {
+        assert_eq!(gyros(30.0, 30.0).words(), [""; 0]);
+        assert!(gyros(30.0, 30.0).is_at_most() && !gyros(1.0, 0.1).is_at_most());
+        assert_eq!(gyros(40.0, 30.0).words(), ["louder"]);
+        assert_eq!(gyros(0.7, 30.0).words(), ["quieter"]);
+        let coloured = |by_reference: f64| Noise {
+            colour: -0.5,
+            ..gyros(1.0, by_reference)
+        };
+        assert_eq!(coloured(0.1).words(), ["coloured"]);
+        assert_eq!(coloured(30.0).words(), [""; 0]);
+    }
+
+    #[test]
+    fn what_chance_may_do_is_as_declared() {
+        let few = Noise {
+            chance: 0.5,
+            ..gyros(1.5, 0.0)
+        };
+        assert_eq!(few.words(), [""; 0]);
+        assert_eq!(gyros(1.5, 0.0).words(), ["louder"]);
+    }
+
+    #[test]
+    fn samples_that_were_sent_twice_are_said_beside_the_level() {
+        let repeated = Noise {
+            repeated: 0.25,
+            ..gyros(1.5, 0.0)
+        };
+        assert_eq!(repeated.words(), ["louder", "repeated"]);
+    }
+}

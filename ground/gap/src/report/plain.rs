@@ -90,11 +90,12 @@ pub fn rows(subject: &Subject, diagnosis: &Diagnosis, advice: &str) -> Vec<(Stri
     let noise: Vec<String> = (diagnosis.noise.iter())
         .filter(|own| !own.words().is_empty())
         .map(|own| {
-            let seen_over_declared = own.seen / own.declared;
             format!(
-                "{}: {} ({seen_over_declared:.2} times what is declared)",
+                "{}: {} ({}{:.2} times what is declared)",
                 own.kind.plural(),
-                own.words().join(", ")
+                own.words().join(", "),
+                if own.is_at_most() { "at most " } else { "" },
+                own.seen / own.declared
             )
         })
         .collect();
