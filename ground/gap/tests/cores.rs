@@ -26,6 +26,7 @@ fn a_table_is_judged_alike_on_one_core_and_on_several() {
     check("../../data/cases/siqueira-table-7-4");
 }
 
+/// What takes more than six seconds of a core.
 mod long {
     #[test]
     #[ignore = "takes more than six seconds: cargo host-test-long runs it"]

@@ -3,7 +3,7 @@
 //! In: an [`Attribution`] or a [`Scatter`]. Out: [`Cause`]s with the channels that hold their energy, when they show, their
 //! parameters with sigmas, and their probability against everything that could stand in their place.
 
-use twin::effect::Parameter;
+use twin::effect::{Parameter, Symbol};
 
 use crate::{
     input::{case::Subject, line::Line, repeats::Repeats},
@@ -18,10 +18,10 @@ use crate::{
     thresholds::{COUNTED_PART, STANDS_OUT, SUSPICIOUS, TEMPERATURE},
 };
 
-/// An effect that rows alone show.
+/// The effect of samples that were sent twice, which rows alone show.
 pub const STALE: &str = "stale-sample";
 
-/// Another.
+/// The effect of a line, which they show too.
 pub const VIBRATION: &str = "vibration";
 
 /// One parameter of a cause.
@@ -132,14 +132,8 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
     let mut parameters = Vec::new();
     for (channel, (theta, sigmas)) in (scatter.channels.iter()).zip(scatter.thetas.iter().zip(sigmas)) {
         for (symbol, (value, sigma)) in page.parameters.iter().zip(theta.iter().zip(sigmas)) {
-            let parameter = Parameter {
-                name: format!("{}_{}", symbol.name, unit.channels[*channel].name),
-                unit: symbol.unit,
-                prior_sigma: symbol.prior_sigma,
-                signed: symbol.signed,
-            };
             parameters.push(Sized {
-                parameter,
+                parameter: parameter(symbol, format!("{}_{}", symbol.name, unit.channels[*channel].name)),
                 value: *value,
                 sigma: *sigma,
             });
@@ -182,12 +176,7 @@ pub fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
         gain: repeats.nats,
         explained: 2.0 * repeats.nats,
         parameters: vec![Sized {
-            parameter: Parameter {
-                name: symbol.name.to_owned(),
-                unit: symbol.unit,
-                prior_sigma: symbol.prior_sigma,
-                signed: symbol.signed,
-            },
+            parameter: parameter(symbol, symbol.name.to_owned()),
             value: repeats.share,
             sigma: repeats.sigma,
         }],
@@ -209,12 +198,7 @@ pub fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
         let own = &subject.twin.unit().channels[*channel];
         let [value, sigma] = size.map(|size| size / own.sigma());
         Sized {
-            parameter: Parameter {
-                name: format!("{}_{}", symbol.name, own.name),
-                unit: symbol.unit,
-                prior_sigma: symbol.prior_sigma,
-                signed: symbol.signed,
-            },
+            parameter: parameter(symbol, format!("{}_{}", symbol.name, own.name)),
             value,
             sigma,
         }
@@ -244,6 +228,16 @@ pub fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
         physics: page.physics,
         is_suspicious: excess > SUSPICIOUS,
     })
+}
+
+/// A parameter of an effect that is sized without its places in the library.
+fn parameter(symbol: &Symbol, name: String) -> Parameter {
+    Parameter {
+        name,
+        unit: symbol.unit,
+        prior_sigma: symbol.prior_sigma,
+        signed: symbol.signed,
+    }
 }
 
 /// Probability of an effect on the scatter with this evidence [nats, tempered] and so many times its largest size: beyond that it
