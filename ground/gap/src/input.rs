@@ -3,7 +3,7 @@
 //! In: the folder of a case. Out: [`case::Subject`]: the twin along the log, how well the reference knows, what may be fitted
 //! ([`windows::Fit`]) and what only judges ([`hold::Held`], locked away). Gross errors of a table are put right on the way
 //! ([`gross`]). What rows say by themselves is asked before a long log is thinned: samples that were sent twice ([`repeats`]), and a
-//! vibration that is too fast for the reference ([`line`]).
+//! vibration that is too fast for the reference ([`mod@line`]).
 //!
 //! Refuses, naming file and key, whatever cannot be read or does not fit the rest ([`case::CaseError`]).
 
