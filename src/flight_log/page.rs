@@ -172,9 +172,12 @@ fn version_and_kind(kind: PageKind) -> u8 {
     FORMAT << 4 | kind as u8
 }
 
+/// Bits that are zero. A word at a time: without an instruction that counts them, it takes as long as a byte.
 fn zeros(bytes: &[u8]) -> u32 {
-    let each = bytes.iter().map(|byte| byte.count_zeros());
-    each.fold(0, u32::wrapping_add)
+    let (words, rest) = bytes.as_chunks();
+    let words = words.iter().map(|word| u32::from_ne_bytes(*word).count_zeros());
+    let rest = rest.iter().map(|byte| byte.count_zeros());
+    words.chain(rest).fold(0, u32::wrapping_add)
 }
 
 fn flipped(mut bytes: [u8; TAG.len()], bit: usize) -> [u8; TAG.len()] {
