@@ -1,6 +1,8 @@
 //! S19: a magnetic disturbance for seconds and for minutes, of a unit with noise and biases. The heading stays right or its
 //! covariance says what it is, and both come back when the disturbance has gone.
 
+extern crate std;
+
 use super::*;
 
 /// \[s\] undisturbed before.
@@ -188,39 +190,48 @@ fn sites() -> [Params; 2] {
 
 #[test]
 fn a_disturbance_of_any_length_leaves_the_heading_right_or_said_to_be_wrong() {
-    let mut seed = 0;
-    for (site, params) in sites().into_iter().enumerate() {
-        for moves in [Moves::Rests, Moves::Yaws, Moves::Tumbles, Moves::Handled] {
-            for disturbance in DISTURBANCES {
-                // For ever, too.
-                for lasts_s in [10, 30, 60, 90, 120, u32::MAX] {
-                    seed += 1;
-                    let case = (site, moves, disturbance, lasts_s, seed);
-                    let (mut before, mut last) = (None, None);
-                    let (mut nees, mut seconds) = (0.0, 0.0);
-                    through(params, disturbance, moves, lasts_s, seed, &mut |looked| {
-                        if looked.second >= 10 {
-                            assert!(looked.off_deg < 3.0 * looked.sd_deg, "{case:?}: {looked:?}");
-                        }
-                        if looked.second < BEFORE_S {
-                            before = Some(*looked);
-                        } else {
-                            nees += looked.nees;
-                            seconds += 1.0;
-                        }
-                        last = Some(*looked);
-                    });
-                    let (before, last) = (before.unwrap(), last.unwrap());
-                    assert!(nees < 1.5 * seconds, "{case:?}: NEES {}", nees / seconds);
-                    if lasts_s < u32::MAX {
-                        assert!(last.off_deg < 2.0, "{case:?}: {last:?}");
-                        // Iron on the unit may have been learnt, and is known less well than none is.
-                        let beside = !matches!(disturbance, Attached(_) | RoundOnUnit(..));
-                        assert!(
-                            !beside || last.sd_deg < 1.2 * before.sd_deg,
-                            "{case:?}: {before:?} {last:?}"
-                        );
+    std::thread::scope(|scope| {
+        for site in 0..sites().len() {
+            scope.spawn(move || disturbed_in_all_ways(site));
+        }
+    });
+}
+
+fn disturbed_in_all_ways(site: usize) {
+    const MOVES: [Moves; 4] = [Moves::Rests, Moves::Yaws, Moves::Tumbles, Moves::Handled];
+    // [s]; for ever, too.
+    const LASTS_S: [u32; 6] = [10, 30, 60, 90, 120, u32::MAX];
+    let params = sites()[site];
+    let mut seed = (site * MOVES.len() * DISTURBANCES.len() * LASTS_S.len()) as u64;
+    for moves in MOVES {
+        for disturbance in DISTURBANCES {
+            for lasts_s in LASTS_S {
+                seed += 1;
+                let case = (site, moves, disturbance, lasts_s, seed);
+                let (mut before, mut last) = (None, None);
+                let (mut nees, mut seconds) = (0.0, 0.0);
+                through(params, disturbance, moves, lasts_s, seed, &mut |looked| {
+                    if looked.second >= 10 {
+                        assert!(looked.off_deg < 3.0 * looked.sd_deg, "{case:?}: {looked:?}");
                     }
+                    if looked.second < BEFORE_S {
+                        before = Some(*looked);
+                    } else {
+                        nees += looked.nees;
+                        seconds += 1.0;
+                    }
+                    last = Some(*looked);
+                });
+                let (before, last) = (before.unwrap(), last.unwrap());
+                assert!(nees < 1.5 * seconds, "{case:?}: NEES {}", nees / seconds);
+                if lasts_s < u32::MAX {
+                    assert!(last.off_deg < 2.0, "{case:?}: {last:?}");
+                    // Iron on the unit may have been learnt, and is known less well than none is.
+                    let beside = !matches!(disturbance, Attached(_) | RoundOnUnit(..));
+                    assert!(
+                        !beside || last.sd_deg < 1.2 * before.sd_deg,
+                        "{case:?}: {before:?} {last:?}"
+                    );
                 }
             }
         }
