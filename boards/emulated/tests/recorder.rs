@@ -93,19 +93,23 @@ fn a_failing_supply_begins_no_operation() {
         fault: Fault::SupplyFailing(failing),
     };
     let faults = [at(fails, true), at(returns, false)];
-    let (_, before) = flown(&faults, fails + MS);
-    let (tape, during) = flown(&faults, returns);
+    let until_back = || (flown(&faults, fails + MS).1, flown(&faults, returns));
+    // It looks again every 2 s.
+    let ((before, (tape, during)), (looked_again, after)) = std::thread::scope(|scope| {
+        let until_back = scope.spawn(until_back);
+        let afterwards = flown(&faults, returns + 3_000 * MS);
+        (until_back.join().expect("it flies"), afterwards)
+    });
     assert!(
         tape.said().contains("recorder: the supply is failing"),
         "{}",
         tape.said()
     );
     assert_eq!(during.cells.operations, before.cells.operations);
-    // It looks again every 2 s.
-    let (tape, after) = flown(&faults, returns + 3_000 * MS);
     let late = |at: &&Nanos| **at > returns + 2_200 * MS;
-    let missing = missing(&tape, &logged(&after));
-    assert_eq!(missing.iter().filter(late).count(), 0, "{missing:?} {}", tape.said());
+    let missing = missing(&looked_again, &logged(&after));
+    let said = looked_again.said();
+    assert_eq!(missing.iter().filter(late).count(), 0, "{missing:?} {said}");
 }
 
 /// One flight with [`CUTS_A_RUN`] cuts. What telemetry has sent whole is in the log: a record is durable 2 ms after its

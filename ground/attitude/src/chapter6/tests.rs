@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use packets::channel::{ACC_LSB, GYRO_LSB, MAG_LSB_UT};
 use twin::{
     motion::{Motion, RotationTest},
@@ -7,6 +9,13 @@ use twin::{
 use super::*;
 
 const SEED: u64 = 7;
+
+/// The sets of LMS EC and of MV SEC.
+static CALIBRATED: LazyLock<[Set; 2]> = LazyLock::new(|| {
+    let lms_ec = std::thread::spawn(|| calibrated::lms_ec(SEED).expect("LMS EC"));
+    let mv_sec = calibrated::mv_sec(SEED).expect("MV SEC");
+    [lms_ec.join().expect("a set"), mv_sec]
+});
 
 /// Tests with their poses.
 const TESTS: [(usize, &[Pose]); 2] = [(1, &TEST_1), (2, &TEST_2)];
@@ -43,10 +52,7 @@ fn mean(errors: &flown::Errors) -> f64 {
 
 #[test]
 fn a_calibrated_unit_errs_less_than_one_by_mt() {
-    let (lms_ec, mv_sec) = (
-        calibrated::lms_ec(SEED).expect("LMS EC"),
-        calibrated::mv_sec(SEED).expect("MV SEC"),
-    );
+    let [lms_ec, mv_sec] = *CALIBRATED;
     for (test, poses) in TESTS {
         let flown = Flown::of(test, SEED);
         let [mt, lms_ec, mv_sec] = [mt(), lms_ec, mv_sec].map(|set| {
@@ -74,10 +80,7 @@ const BIAS_COUNTS: f64 = 0.41;
 
 #[test]
 fn both_methods_find_the_biases_the_parts_were_made_with() {
-    let (lms_ec, mv_sec) = (
-        calibrated::lms_ec(SEED).expect("LMS EC"),
-        calibrated::mv_sec(SEED).expect("MV SEC"),
-    );
+    let [lms_ec, mv_sec] = *CALIBRATED;
     let same = |name: &str, found: f32, made: f64| {
         let off = f64::from(found) - made;
         assert!(off.abs() < BIAS_COUNTS, "{name}: {found} counts, made with {made}");
