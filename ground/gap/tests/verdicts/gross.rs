@@ -1,10 +1,9 @@
 //! Logs without a reference of a unit in which something is wrong that bends the motion itself: plates that are exchanged, axes in another order,
 //! digits that are garbled, bits that are stuck; and a zero that walks, which is taken for what has a shape.
 
-mod twin_case;
-
 use std::fs;
 
+use crate::twin_case::Log;
 use gap::{
     parity::{codes::Finding, findings::Findings, flight::Flight},
     probability::outcome::Outcome,
@@ -16,7 +15,6 @@ use twin::{
     motion,
     predict::{Kind, UnitDescription, emems, thesis_slot_s},
 };
-use twin_case::Log;
 
 const WINDOWS: &str = "[motion_known]\nnone = true\n[windows]\nfit = [[20.0, 100.0]]\nhold = [[100.0, 140.0]]\n";
 

@@ -1,16 +1,14 @@
 //! A small case made here, with and without an effect in it: the way from files to a verdict.
 
-mod gyros;
-
 use std::fs;
 
+use crate::gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use gap::{
     command::taught,
     diagnose::Diagnosis,
     input::case::Subject,
     report::{terminal, verdict::Verdict},
 };
-use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;

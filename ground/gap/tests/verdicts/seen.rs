@@ -1,10 +1,9 @@
 //! A unit that is moved by hand before an optical system: a reference that errs more than the unit, and a magnet that is brought
 //! and taken away.
 
-mod written;
-
 use std::fmt::Write;
 
+use crate::written::written;
 use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
@@ -14,7 +13,6 @@ use gap::{
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
-use written::written;
 
 /// \[s\] of the log.
 const SECONDS: usize = 120;

@@ -1,9 +1,7 @@
 //! Codes of a gyro that do not come as they should: a bit that sticks, bits that are cut off, digits that are garbled.
 
-mod gyros;
-
+use crate::gyros::{diagnosed_in, erring, rewritten};
 use gap::report::terminal;
-use gyros::{diagnosed_in, erring, rewritten};
 use tempfile::TempDir;
 use twin::effect::kin;
 

@@ -1,15 +1,13 @@
 //! Several effects that have nothing in common, in the readings of one unit: each is named, however many there are. A patchwork for one effect
 //! that the library does not have is where that is.
 
-mod written;
-
 use std::{fmt::Write, fs, path::Path};
 
+use crate::written::written;
 use gap::{diagnose::diagnose, input::case::Subject};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use twin::effect::{Active, Cause, Locality, by_name};
-use written::written;
 
 /// Iron is ten sigmas of a magnetometer's zero, so that calibration takes it up but for those.
 const WRONG: [(&str, Option<&str>, &[f64]); 4] = [

@@ -1,12 +1,8 @@
 //! Three gyros on a table, as files: what the cases made here have in common.
 
-#![allow(dead_code, reason = "each of the tests uses a part of it")]
-
-#[path = "../written/mod.rs"]
-mod written;
-
 use std::{fmt::Write, fs};
 
+use crate::written::written;
 use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
@@ -14,7 +10,6 @@ use gap::{
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
-use written::written;
 
 /// \[s\] of the log, at [`RATE_HZ`].
 pub const SECONDS: usize = 240;

@@ -1,7 +1,6 @@
 //! What of an effect is no parameter: a time constant, an onset, when it comes again; and which of those that are the same here.
 
-mod gyros;
-
+use crate::gyros::{diagnosed_in, erring, erring_in, rate};
 use gap::{
     holdout::fit_error::FitError,
     input::case::Subject,
@@ -10,7 +9,6 @@ use gap::{
     report::terminal,
     search::{periodic::again, readings::attribute},
 };
-use gyros::{diagnosed_in, erring, erring_in, rate};
 
 #[test]
 fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {

@@ -1,9 +1,8 @@
 //! Names beside a reference that errs slowly: three gyros whose table is told to 3 mrad.
 
-mod gyros;
-
 use std::{f64::consts::TAU, fs};
 
+use crate::gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate};
 use gap::{
     input::case::Subject,
     library::hypotheses::Library,
@@ -11,7 +10,6 @@ use gap::{
     search::readings::Chosen,
     unknown::{fast::within_stretches, recognised::recognised, remainder::Setting},
 };
-use gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;

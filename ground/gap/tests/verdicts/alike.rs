@@ -1,11 +1,9 @@
 //! Noise that is louder than described, beside a reference that errs slowly: in all of six gyros it is the description's, in one it is not.
 
-mod gyros;
-
 use std::{fmt::Write, fs};
 
+use crate::gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate};
 use gap::{diagnose::Diagnosis, probability::outcome::Outcome};
-use gyros::{NOISE, RATE_HZ, SECONDS, diagnosed_in, erring, rate};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 

@@ -1,16 +1,14 @@
 //! Phases of a flight, found and told: the twin's sounding rocket, and a recording by hand.
 
-mod twin_case;
-
 use std::path::PathBuf;
 
+use crate::twin_case::Log;
 use gap::parity::{
     flight::Flight,
     phases::{Phase, is_begun_in_flight},
 };
 use tempfile::TempDir;
 use twin::motion;
-use twin_case::Log;
 
 /// \[s\] of lift-off.
 const LIFT_OFF_S: f64 = 30.0;

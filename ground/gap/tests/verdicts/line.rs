@@ -1,8 +1,5 @@
 //! A vibration at 82 Hz in accelerometers at 250 Hz, beside a reference that is used up to 20 Hz: named, and not where it is not there.
 
-#[path = "written/mod.rs"]
-mod written;
-
 use std::fmt::Write;
 
 use gap::{diagnose::diagnose, input::case::Subject};
@@ -56,7 +53,7 @@ fn named(shaken: f64, withheld: &[&str]) -> Vec<(&'static str, Vec<f64>)> {
         );
         let _ = writeln!(measured, "{t_s:.3},{x:.6},{y:.6},{z:.6}");
     }
-    let folder = written::written("shaken", CASE, &unit, &motion, &measured);
+    let folder = crate::written::written("shaken", CASE, &unit, &motion, &measured);
     let subject = Subject::open(folder.path()).expect("opens");
     let withheld: Vec<String> = withheld.iter().map(|name| (*name).to_owned()).collect();
     let diagnosis = diagnose(&subject, &withheld, &|_, _| {});

@@ -1,9 +1,8 @@
 //! Two magnetometers, one read four milliseconds after the other: a fifth of a cycle of the mains.
 
-mod written;
-
 use std::{f64::consts::TAU, fmt::Write};
 
+use crate::written::written;
 use gap::{
     diagnose::{Diagnosis, diagnose},
     input::case::Subject,
@@ -11,7 +10,6 @@ use gap::{
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
-use written::written;
 
 /// \[s\] of the log, at [`RATE_HZ`].
 const SECONDS: usize = 400;

@@ -1,8 +1,6 @@
 //! Several logs of one unit in one call: simulated along motions of the twin, with the calibration off by what the description allows,
 //! once for the unit and not once a log.
 
-mod twin_case;
-
 use std::{fs, path::PathBuf};
 
 use gap::together::analysed;
@@ -16,7 +14,7 @@ use twin::{
     predict::{UnitDescription, emems, thesis_slot_s},
 };
 
-use twin_case::Log;
+use crate::twin_case::Log;
 
 /// \[s\] of a log, and of its fit window.
 const SECONDS: f64 = 90.0;

@@ -1,9 +1,8 @@
 //! What is known of a motion that nobody recorded: a track on a clock of its own, and a trajectory that was simulated.
 
-mod twin_case;
-
 use std::{fmt::Write, fs, path::Path};
 
+use crate::twin_case::Log;
 use gap::parity::{
     analysed, codes,
     flight::Flight,
@@ -20,7 +19,6 @@ use twin::{
     environment::Environment,
     kinematics::{Attitude, Motion, Pose, Profile},
 };
-use twin_case::Log;
 
 /// \[s\] of a log.
 const SECONDS: f64 = 100.0;

@@ -1,7 +1,6 @@
 //! A boost without a reference: gyros at their stops, and an effect that one phase alone shows.
 
-mod twin_case;
-
+use crate::twin_case::Log;
 use gap::parity::analysed;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,7 +13,6 @@ use twin::{
     kinematics::{Attitude, Motion, Pose, Profile},
     motion::SoundingRocket,
 };
-use twin_case::Log;
 
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
