@@ -14,7 +14,8 @@ use crate::{
     search::gauss_newton::{Refined, refine},
 };
 
-/// \[nats\] behind the chosen effect from which a rival is not worth an exact fit.
+/// \[nats\] behind the chosen effect from which a rival is not worth an exact fit, where the screen is right. It takes effects for linear: a
+/// delay of 1.5 ms that was worth 3,276 nats had 3,065 there, and one that was worth 3,279 had 3,013.
 const FAR: f64 = 50.0;
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
@@ -49,7 +50,10 @@ pub(super) fn compare(
         });
     }
     let mut linear = gains(problem, library, scores, &others);
-    linear[own] = f64::NEG_INFINITY;
+    let by_screen = std::mem::replace(&mut linear[own], f64::NEG_INFINITY);
+    // By how much the screen is wrong; of an effect that is there or not it says nothing.
+    let error = Some((own_gain - by_screen).abs()).filter(|error| error.is_finite());
+    let far = own_gain - FAR - 2.0 * error.unwrap_or(0.0);
     let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
     let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
     let candidates = leading(&linear, CANDIDATES);
@@ -67,7 +71,7 @@ pub(super) fn compare(
             || library.hypotheses[rival]
                 .values_between(problem.twin.starts_s())
                 .is_none();
-        if is_settled && linear[rival] < own_gain - FAR {
+        if is_settled && linear[rival] < far {
             rivals.push(with_gain(linear[rival]));
             continue;
         }
