@@ -5,7 +5,7 @@
 //! gap, they say whether it is there too.
 
 use nalgebra::DVector;
-use twin::effect::Texture;
+use twin::effect::{Texture, WANDERS};
 
 use crate::{
     advise::{
@@ -127,7 +127,14 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let by_rows: Vec<Cause> = (subject.repeats.iter().flatten())
         .filter(|_| is_asked(STALE))
         .filter_map(|repeats| cause_of_repeats(subject, repeats))
-        .chain((subject.line.iter().filter(|_| is_asked(VIBRATION))).filter_map(|line| cause_of_line(subject, line)))
+        .chain(
+            (subject
+                .fast
+                .iter()
+                .flat_map(|fast| &fast.line)
+                .filter(|_| is_asked(VIBRATION)))
+            .filter_map(|line| cause_of_line(subject, line)),
+        )
         .collect();
     withheld.extend(subject.repeats.as_ref().map(|_| STALE.to_owned()));
     let withheld = &withheld[..];
@@ -200,7 +207,9 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let mut withdrawn = Vec::new();
     if shrink.refutes_the_effect() || is_doubtful && !is_inexact {
         withdrawn = explanation.withdraw(&library);
-    } else if is_doubtful && let Some(name) = explanation.withdraw_scatter(&mut problem, &mut library) {
+    } else if (is_doubtful || is_belied(subject, explanation.scatter.as_ref()))
+        && let Some(name) = explanation.withdraw_scatter(&mut problem, &mut library)
+    {
         withdrawn.push(name);
     }
     let is_changed = recognise(subject, &problem, &library, &mut explanation, &quiet)
@@ -351,6 +360,27 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         causes,
         withdrawn,
     }
+}
+
+/// Whether rows belie a vibration that wanders, on for half of the time: beside a reference that follows what is slower, half of it at least has to
+/// be faster. A line speaks for itself, wherever it is folded to.
+fn is_belied(subject: &Subject, scatter: Option<&Scatter>) -> bool {
+    let is_it = |scatter: &&Scatter| scatter.effect.page().name == VIBRATION && scatter.variant == WANDERS;
+    let vibration = scatter.filter(is_it);
+    let Some((scatter, fast)) = vibration.zip(subject.fast.as_ref()) else {
+        return false;
+    };
+    let channels = scatter.channels.iter().zip(&scatter.thetas);
+    let of_channel = |(channel, theta): (&usize, &Vec<f64>)| {
+        let own = &subject.twin.unit().channels[*channel];
+        Some([
+            0.25 * theta[0].powi(2),
+            fast.mean_squares[*channel]? / own.sigma().powi(2),
+        ])
+    };
+    let [said, seen] =
+        (channels.filter_map(of_channel)).fold([0.0; 2], |[said, seen], [own, rows]| [said + own, seen + rows]);
+    said > 2.0 * seen
 }
 
 /// Takes in what is recognised beneath what an explanation leaves, where the reference is not exact; whether anything was.

@@ -3,15 +3,15 @@
 //! In: the folder of a case. Out: [`case::Subject`]: the twin along the log, how well the reference knows, what may be fitted
 //! ([`windows::Fit`]) and what only judges ([`hold::Held`], locked away). Gross errors of a table are put right on the way
 //! ([`gross`]). What rows say by themselves is asked before a long log is thinned: samples that were sent twice ([`repeats`]), and a
-//! vibration that is too fast for the reference ([`mod@line`]).
+//! vibration that is too fast for the reference ([`faster`]).
 //!
 //! Refuses, naming file and key, whatever cannot be read or does not fit the rest ([`case::CaseError`]).
 
 pub mod case;
+pub mod faster;
 pub mod gross;
 pub mod hold;
 pub mod level;
-pub mod line;
 pub mod log;
 pub mod reference;
 pub mod repeats;

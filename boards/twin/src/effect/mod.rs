@@ -87,6 +87,7 @@ pub use cause::{Active, Cause, Locality, Parameter, UnknownEffect};
 pub use page::{CorrectedAs, Nature, Needs, Page, Scope, Symbol, Texture};
 pub use site::Site;
 pub use spread::{Beneath, View, logged_step, most_likely, sigma_of};
+pub use vibration::WANDERS;
 
 use crate::channel::{Chain, Feel, UnitDescription};
 use crate::environment::Environment;

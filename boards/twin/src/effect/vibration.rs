@@ -18,8 +18,8 @@ use crate::part::signal::Noise;
 /// Steps a bin in which the frequency is sought: between two of them a line loses a hundredth of its power.
 const FINE: usize = 8;
 
-/// The variant of a sine whose frequency is any at any time.
-const WANDERS: f64 = -1.0;
+/// The variant of [`Vibration`] that is a sine whose frequency is any at any time.
+pub const WANDERS: f64 = -1.0;
 
 /// Sigmas that such a sine reaches at least, and what sizes are sought in multiples of.
 const LEAST: f64 = 5.0;

@@ -1,7 +1,7 @@
 //! A vibration that is too fast for the reference, by the rows of a log alone.
 //!
-//! In: a log of physical units before it is thinned, and its unit. Out: [`Line`], the frequency at which the accelerometers of a group have a line
-//! above [`FASTER_HZ`], and how large it is in each of them and of the group's gyros.
+//! In: a log of physical units before it is thinned, and its unit. Out: [`Fast`], what each channel does above [`FASTER_HZ`], and [`Line`], the
+//! frequency at which the accelerometers of a group have a line there, and how large it is in each of them and of the group's gyros.
 //!
 //! What is faster than a reference is used for needs no prediction, and what is thinned folds it under the reference's errors. The
 //! periodogram of each axis (Hann's window) over its level, the median of [`LEVEL`] bins over ln 2, is exponential where there is noise. Summed over
@@ -11,7 +11,7 @@
 //!
 //! Says nothing of rows that are not even, or too slow; of accelerometers that send codes (the search for effects on the scatter sees all of
 //! their samples); and of a line that wanders, or has a harmonic half as high. Samples that are missing are taken for the mean of the others,
-//! which makes an amplitude too small by their share.
+//! which makes an amplitude too small by their share and puts as much of what is slow among the fast.
 
 use std::ops::Range;
 
@@ -39,6 +39,31 @@ const UNEVEN: f64 = 0.25;
 /// Steps at most, of rows with gaps between them: two hours at 285 Hz.
 const MOST: usize = 1 << 21;
 
+/// What is faster than a reference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fast {
+    /// Per channel, its mean square in physical units; none of a channel that sends codes.
+    pub mean_squares: Vec<Option<f64>>,
+    /// A vibration.
+    pub line: Option<Line>,
+}
+
+impl Fast {
+    /// Of a log; none where its rows are not even, or too slow.
+    pub fn of(log: &Log, unit: &UnitDescription) -> Option<Self> {
+        let steps = Steps::of(&log.start_s)?;
+        let bins = steps.bins(FASTER_HZ)?;
+        let spectra = unit.channels.iter().enumerate();
+        let spectra = spectra.map(|(channel, own)| own.bits.is_none().then(|| steps.spectrum(log, channel, &bins)));
+        let spectra: Vec<Option<Spectrum>> = spectra.collect();
+        let mean_square = |own: &Option<Spectrum>| own.as_ref().map(Spectrum::mean_square);
+        Some(Self {
+            mean_squares: spectra.iter().map(mean_square).collect(),
+            line: line(unit, &steps, &bins, &spectra),
+        })
+    }
+}
+
 /// A line in the readings of a group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
@@ -51,17 +76,14 @@ pub struct Line {
 }
 
 /// The plainest line of a log's accelerometers.
-pub fn line(log: &Log, unit: &UnitDescription) -> Option<Line> {
-    let steps = Steps::of(&log.start_s)?;
-    let bins = steps.bins(FASTER_HZ)?;
+fn line(unit: &UnitDescription, steps: &Steps, bins: &Range<usize>, spectra: &[Option<Spectrum>]) -> Option<Line> {
     let of_group = |group: &str| {
         let own = |kind: Kind| {
-            let channels = unit.channels.iter().enumerate();
-            let own = channels.filter(move |(_, own)| own.sensor == kind && own.group == group && own.bits.is_none());
-            own.map(|(channel, _)| channel)
+            let channels = unit.channels.iter().zip(spectra).enumerate();
+            let own = channels.filter(move |(_, (own, _))| own.sensor == kind && own.group == group);
+            own.filter_map(|(channel, (_, spectrum))| Some((channel, spectrum.as_ref()?)))
         };
-        let spectrum = |channel: usize| (channel, steps.spectrum(log, channel, &bins));
-        let accelerometers: Vec<(usize, Spectrum)> = own(Kind::Accelerometer).map(spectrum).collect();
+        let accelerometers: Vec<(usize, &Spectrum)> = own(Kind::Accelerometer).collect();
         let sums = accelerometers
             .iter()
             .fold(DVector::zeros(bins.len()), |sums, (_, own)| sums + &own.over_level);
@@ -70,9 +92,9 @@ pub fn line(log: &Log, unit: &UnitDescription) -> Option<Line> {
         let is_alone = (0..sums.len()).all(|bin| near.contains(&bin) || 2.0 * sums[bin] < highest);
         let nats = -tail(highest, accelerometers.len()) - (bins.len() as f64).ln();
         (is_alone && nats > -ROWS_CHANCE.ln()).then(|| {
-            let all = accelerometers.into_iter().chain(own(Kind::Gyro).map(spectrum));
-            let is_in = |(_, own): &(usize, Spectrum)| tail(own.over_level[peak], 1) < ROWS_CHANCE.ln();
-            let size = |(channel, own): (usize, Spectrum)| (channel, own.amplitude(near.clone()));
+            let all = accelerometers.into_iter().chain(own(Kind::Gyro));
+            let is_in = |(_, own): &(usize, &Spectrum)| tail(own.over_level[peak], 1) < ROWS_CHANCE.ln();
+            let size = |(channel, own): (usize, &Spectrum)| (channel, own.amplitude(near.clone()));
             Line {
                 hz: (bins.start + peak) as f64 * steps.bin_hz(),
                 sizes: all.filter(is_in).map(size).collect(),
@@ -115,6 +137,11 @@ struct Spectrum {
 }
 
 impl Spectrum {
+    /// Of all bins together; of a sine they sum to the square of its amplitude.
+    fn mean_square(&self) -> f64 {
+        0.5 * self.over_level.dot(&self.level)
+    }
+
     /// Amplitude of a line in these bins, and its standard deviation: of `n` exponentials with an energy `e` above them the variance is `n + 2 e`.
     fn amplitude(&self, bins: Range<usize>) -> [f64; 2] {
         let many = bins.len() as f64;
@@ -199,8 +226,12 @@ mod tests {
     const ROWS: u32 = 16_384;
     const NOISE: f64 = 0.06;
 
-    /// An accelerometer and a gyro of noise, which have `added` [sigma] of the time \[s\] more; one row in seven is missing for a while.
     fn found(rate_hz: f64, added: impl Fn(f64) -> f64) -> Option<Line> {
+        fast(rate_hz, added)?.line
+    }
+
+    /// An accelerometer and a gyro of noise, which have `added` [sigma] of the time \[s\] more; one row in seven is missing for a while.
+    fn fast(rate_hz: f64, added: impl Fn(f64) -> f64) -> Option<Fast> {
         let mut text = "name = \"x\"\ncycle_s = 0.004\n".to_owned();
         for (index, sensor) in ["accelerometer", "gyro"]
             .into_iter()
@@ -232,7 +263,7 @@ mod tests {
                 series.values.push(9.8 + NOISE * (noise + shaken));
             }
         }
-        line(&log, &unit)
+        Fast::of(&log, &unit)
     }
 
     fn sine(hz: f64) -> impl Fn(f64) -> f64 {
@@ -251,6 +282,22 @@ mod tests {
                 "{line:?}"
             );
         }
+    }
+
+    /// Four fifths of white noise at 250 Hz are above 25 Hz, and half the square of a sine's amplitude, wherever it wanders. Of what is slow a
+    /// hundredth is there by the rows that are missing.
+    #[test]
+    fn what_is_fast_has_its_mean_square_and_what_is_slow_has_none() {
+        let of = |added: &dyn Fn(f64) -> f64| {
+            let fast = fast(RATE_HZ, added).expect("even rows");
+            [0, 5].map(|channel| fast.mean_squares[channel].expect("no codes") / NOISE.powi(2))
+        };
+        let is_near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 0.1;
+        let wanders = |t_s: f64| 10.0 * (std::f64::consts::TAU * 82.0 * t_s + 3.0 * (1.7 * t_s).sin()).sin();
+        let [with, without] = of(&wanders);
+        assert!(is_near(with, 50.8) && is_near(without, 0.8), "{with} {without}");
+        let [slow, _] = of(&|t_s| 500.0 * sine(3.0)(t_s));
+        assert!(slow < 0.8 + 0.01 * 5_000.0, "{slow}");
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use twin::effect::{Parameter, Symbol};
 
 use crate::{
-    input::{case::Subject, line::Line, repeats::Repeats},
+    input::{case::Subject, faster::Line, repeats::Repeats},
     library::hypotheses::Library,
     null::problem::Problem,
     probability::regime,

@@ -1,4 +1,5 @@
-//! A vibration at 82 Hz in accelerometers at 250 Hz, beside a reference that is used up to 20 Hz: named, and not where it is not there.
+//! A vibration at 82 Hz in accelerometers at 250 Hz, beside a reference that is used up to 20 Hz: named, and not where it is not there, nor where
+//! what wanders is slow.
 
 use std::fmt::Write;
 
@@ -15,8 +16,13 @@ const NOISE: f64 = 0.05;
 const CASE: &str = "[environment]\ngravity_m_s2 = 9.8\n[reference]\nattitude_sigma_rad = 0.003\nattitude_correlation_s = 20.0\n\
                     [windows]\nfit = [[0.0, 30.0]]\nhold = [[30.0, 60.0]]\n";
 
-/// Effects that are named of three accelerometers that turn slowly and are shaken by so many sigmas, with their sizes.
-fn named(shaken: f64, withheld: &[&str]) -> Vec<(&'static str, Vec<f64>)> {
+/// A sine at 82 Hz of so many sigmas.
+fn sine(sigmas: f64) -> impl Fn(f64) -> f64 {
+    move |t_s| sigmas * (std::f64::consts::TAU * 82.33 * t_s).sin()
+}
+
+/// Effects that are named of three accelerometers that turn slowly and are shaken by `shaken` \[sigma\] of the time \[s\], with their sizes.
+fn named(shaken: impl Fn(f64) -> f64, withheld: &[&str]) -> Vec<(&'static str, Vec<f64>)> {
     let mut unit = "name = \"three accelerometers\"\n".to_owned();
     for (name, axis) in [
         ("ax", "1.0, 0.0, 0.0"),
@@ -41,10 +47,10 @@ fn named(shaken: f64, withheld: &[&str]) -> Vec<(&'static str, Vec<f64>)> {
             (0.5 * roll).cos(),
             (0.5 * roll).sin()
         );
-        let sine = shaken * (std::f64::consts::TAU * 82.33 * t_s).sin();
+        let shaken = shaken(t_s);
         let mut felt = |value: f64, part: f64| {
             let noise: f64 = StandardNormal.sample(&mut random);
-            value + NOISE * (noise + part * sine)
+            value + NOISE * (noise + part * shaken)
         };
         let (x, y, z) = (
             felt(0.0, 1.0),
@@ -67,7 +73,7 @@ fn named(shaken: f64, withheld: &[&str]) -> Vec<(&'static str, Vec<f64>)> {
 
 #[test]
 fn a_vibration_too_fast_for_the_reference_is_named_with_its_sizes_and_none_is_where_there_is_none() {
-    let shaken = named(0.4, &[]);
+    let shaken = named(sine(0.4), &[]);
     let [("vibration", sizes)] = &shaken[..] else {
         panic!("{shaken:?}");
     };
@@ -75,6 +81,23 @@ fn a_vibration_too_fast_for_the_reference_is_named_with_its_sizes_and_none_is_wh
     for (size, part) in sizes.iter().zip([1.0, 0.5, 0.8]) {
         assert!((size / (0.4 * part) - 1.0).abs() < 0.1, "{sizes:?}");
     }
-    assert_eq!(named(0.0, &[]), []);
-    assert_eq!(named(0.4, &["vibration"]), []);
+    assert_eq!(named(sine(0.0), &[]), []);
+    assert_eq!(named(sine(0.4), &["vibration"]), []);
+}
+
+/// As a smoothed reference leaves it: some hertz, large, in half of the seconds.
+#[test]
+fn what_wanders_slowly_is_no_vibration() {
+    let wanders = |hz: f64| {
+        move |t_s: f64| {
+            let phase = std::f64::consts::TAU * hz * (t_s + 0.2 * (0.9 * t_s).sin() + 0.1 * (2.3 * t_s).cos());
+            if (0.61 * t_s).sin() > 0.0 {
+                30.0 * phase.sin()
+            } else {
+                0.0
+            }
+        }
+    };
+    assert!(named(wanders(7.0), &[]).iter().all(|(name, _)| *name != "vibration"));
+    assert!(named(wanders(60.0), &[]).iter().any(|(name, _)| *name == "vibration"));
 }

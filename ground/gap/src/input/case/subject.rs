@@ -15,9 +15,9 @@ use super::{
     Bars, CaseError, Opened, Position, SlowErrors, allowance::allowance, environment::environment, read_table,
 };
 use crate::input::{
+    faster::Fast,
     gross::{Gross, put_right},
     hold::Held,
-    line::{Line, line},
     log::{Column, Log, Masked, Stream},
     reference::{Reference, SPREAD_S},
     repeats::{Repeats, by_axes, repeats},
@@ -65,8 +65,9 @@ pub struct Subject {
     pub repeats: Option<Vec<Repeats>>,
     /// Parts of any kind that did, whoever sees them.
     pub repeated: Vec<Repeats>,
-    /// A vibration too fast for the reference; `None` also where the reference is exact, and the search for effects on the scatter sees it.
-    pub line: Option<Line>,
+    /// What is too fast for the reference, a vibration among it; `None` also where the reference is exact, and the search for effects on the scatter
+    /// sees it.
+    pub fast: Option<Fast>,
     /// What was grossly wrong and is put right; in tables only.
     pub gross: Gross,
 }
@@ -111,7 +112,7 @@ impl Subject {
         log = within_windows(log, &opened);
         let is_exact = opened.text.reference.attitude_sigma_rad == 0.0;
         let repeats = repeats(&log, &unit).filter(|_| !is_exact);
-        let line = if is_exact { None } else { line(&log, &unit) };
+        let fast = if is_exact { None } else { Fast::of(&log, &unit) };
         let repeated = by_axes(&log, &unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
@@ -177,7 +178,7 @@ impl Subject {
             thinned,
             repeats,
             repeated,
-            line,
+            fast,
             gross: Gross::default(),
         })
     }
@@ -228,7 +229,7 @@ impl Subject {
             thinned: 1,
             repeats: None,
             repeated: Vec::new(),
-            line: None,
+            fast: None,
             gross,
         })
     }
