@@ -31,11 +31,12 @@ use crate::{
         problem::{Component, Frame, Problem},
     },
     probability::{
-        cause::{Cause, STALE, VIBRATION, cause_of_line, cause_of_repeats, share_out},
+        cause::{Cause, share_out},
         doubt::Promised,
         importance::setting,
         outcome::{Outcome, is_unexplained},
         posterior::Believed,
+        rows::{STALE, VIBRATION, causes_of_rows},
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
     thresholds::{MOST_EFFECTS, SAID},
@@ -124,17 +125,8 @@ impl Diagnosis {
 pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Diagnosis {
     let mut withheld = withheld.to_vec();
     let is_asked = |effect: &str| withheld.iter().all(|name| name != effect);
-    let by_rows: Vec<Cause> = (subject.repeats.iter().flatten())
-        .filter(|_| is_asked(STALE))
-        .filter_map(|repeats| cause_of_repeats(subject, repeats))
-        .chain(
-            (subject
-                .fast
-                .iter()
-                .flat_map(|fast| &fast.line)
-                .filter(|_| is_asked(VIBRATION)))
-            .filter_map(|line| cause_of_line(subject, line)),
-        )
+    let by_rows: Vec<Cause> = (causes_of_rows(subject).into_iter())
+        .filter(|cause| is_asked(cause.effect))
         .collect();
     withheld.extend(subject.repeats.as_ref().map(|_| STALE.to_owned()));
     let withheld = &withheld[..];

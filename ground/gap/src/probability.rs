@@ -2,7 +2,7 @@
 //!
 //! In: an explanation, what it leaves, and what the held-out windows say. Out: [`posterior::Believed`]: [`cause`]s with their
 //! [`contribution`]s and the [`regime`] in which they show, each believed less where something speaks against it ([`doubt`])
-//! or it does not matter ([`importance`]), and what it all comes to ([`outcome`]).
+//! or it does not matter ([`importance`]), what [`rows`] say by themselves, and what it all comes to ([`outcome`]).
 
 pub mod cause;
 pub mod contribution;
@@ -11,3 +11,4 @@ pub mod importance;
 pub mod outcome;
 pub mod posterior;
 pub mod regime;
+pub mod rows;

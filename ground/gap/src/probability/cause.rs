@@ -6,7 +6,7 @@
 use twin::effect::{Parameter, Symbol};
 
 use crate::{
-    input::{case::Subject, faster::Line, repeats::Repeats},
+    input::case::Subject,
     library::hypotheses::Library,
     null::problem::Problem,
     probability::regime,
@@ -17,12 +17,6 @@ use crate::{
     },
     thresholds::{COUNTED_PART, STANDS_OUT, SUSPICIOUS, TEMPERATURE},
 };
-
-/// The effect of samples that were sent twice, which rows alone show.
-pub const STALE: &str = "stale-sample";
-
-/// The effect of a line, which they show too.
-pub const VIBRATION: &str = "vibration";
 
 /// One parameter of a cause.
 #[derive(Clone, Debug)]
@@ -162,76 +156,8 @@ pub fn cause_of_scatter(subject: &Subject, scatter: &Scatter, sigmas: &[Vec<f64>
     }
 }
 
-/// Parts that send samples twice as causes, by their rows alone; a share is still an energy.
-pub fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
-    let page = twin::effect::by_name(STALE)?.page();
-    let symbol = page.parameters.first()?;
-    let excess = repeats.share / symbol.prior_sigma / page.largest;
-    Some(Cause {
-        effect: page.name,
-        locality: subject.names(repeats.channels.iter().copied()).join(" "),
-        channels: repeats.channels.clone(),
-        probability: named(repeats.nats / TEMPERATURE, excess),
-        of_any: 1.0,
-        gain: repeats.nats,
-        explained: 2.0 * repeats.nats,
-        parameters: vec![Sized {
-            parameter: parameter(symbol, symbol.name.to_owned()),
-            value: repeats.share,
-            sigma: repeats.sigma,
-        }],
-        share: 2.0 * repeats.nats,
-        when: "throughout".to_owned(),
-        which: Some("all its axes repeat the row before together, oftener than by chance".to_owned()),
-        confirm_by: page.confirm_by,
-        physics: page.physics,
-        is_suspicious: excess > SUSPICIOUS,
-    })
-}
-
-/// A vibration as a cause, by the rows of a log alone; its share is still an energy.
-pub fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
-    let page = twin::effect::by_name(VIBRATION)?.page();
-    let symbol = page.parameters.first()?;
-    let channels: Vec<usize> = line.sizes.iter().map(|(channel, _)| *channel).collect();
-    let size = |(channel, size): &(usize, [f64; 2])| {
-        let own = &subject.twin.unit().channels[*channel];
-        let [value, sigma] = size.map(|size| size / own.sigma());
-        Sized {
-            parameter: parameter(symbol, format!("{}_{}", symbol.name, own.name)),
-            value,
-            sigma,
-        }
-    };
-    let parameters: Vec<Sized> = line.sizes.iter().map(size).collect();
-    let excess = parameters
-        .iter()
-        .map(|sized| sized.value / symbol.prior_sigma)
-        .fold(0.0, f64::max)
-        / page.largest;
-    Some(Cause {
-        effect: page.name,
-        locality: subject.names(channels.iter().copied()).join(" "),
-        channels,
-        probability: named(line.nats / TEMPERATURE, excess),
-        of_any: 1.0,
-        gain: line.nats,
-        explained: 2.0 * line.nats,
-        parameters,
-        share: 2.0 * line.nats,
-        when: "throughout".to_owned(),
-        which: Some(format!(
-            "a line at {:.2} Hz, or folded to it, which the reference is too slow for",
-            line.hz
-        )),
-        confirm_by: page.confirm_by,
-        physics: page.physics,
-        is_suspicious: excess > SUSPICIOUS,
-    })
-}
-
 /// A parameter of an effect that is sized without its places in the library.
-fn parameter(symbol: &Symbol, name: String) -> Parameter {
+pub(super) fn parameter(symbol: &Symbol, name: String) -> Parameter {
     Parameter {
         name,
         unit: symbol.unit,
@@ -242,7 +168,7 @@ fn parameter(symbol: &Symbol, name: String) -> Parameter {
 
 /// Probability of an effect on the scatter with this evidence [nats, tempered] and so many times its largest size: beyond that it
 /// stands for something else, as the others do.
-fn named(gain: f64, excess: f64) -> f64 {
+pub(super) fn named(gain: f64, excess: f64) -> f64 {
     itself(excess) / (1.0 + (-gain).exp())
 }
 

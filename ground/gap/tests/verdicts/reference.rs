@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, fs};
 
-use crate::gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate};
+use crate::gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use gap::{
     input::case::Subject,
     library::hypotheses::Library,
@@ -142,4 +142,25 @@ fn a_zero_that_walks_is_named_and_a_slow_wave_is_no_walk() {
     );
     assert!(!named_in_turns(|t_s| 0.02 * (TAU * t_s / 55.0).sin()).contains(&"gyro-bias-walk"));
     assert_eq!(named_in_turns(walk(5, 0.00002)), Vec::<&str>::new());
+}
+
+/// Its largest rates are short by what the reference may err by.
+#[test]
+fn a_gyro_that_stops_inside_its_range_is_named() {
+    let named = |most: f64, withheld: &[&str]| {
+        let stopped = rewritten(beside_reference(|_| 0.0), |cells| {
+            let rate: f64 = cells[3].parse().expect("a number");
+            cells[3] = format!("{:.7}", rate.clamp(-most, most));
+        });
+        let (subject, diagnosis) = diagnosed_in(&stopped, withheld);
+        let named: Vec<_> = diagnosis
+            .causes
+            .iter()
+            .map(|cause| (cause.effect, cause.channels.clone()))
+            .collect();
+        (named, subject.masked[2].clipped > 0)
+    };
+    assert_eq!(named(0.448, &[]), (vec![("gyro-saturation", vec![2])], true));
+    assert_eq!(named(0.448, &["gyro-saturation"]), (Vec::new(), true));
+    assert_eq!(named(0.6, &[]), (Vec::new(), false));
 }

@@ -21,6 +21,7 @@ use crate::input::{
     log::{Column, Log, Masked, Stream},
     reference::{Reference, SPREAD_S},
     repeats::{Repeats, by_axes, repeats},
+    stops::{Stop, beneath, stops},
     windows::{Fit, Span},
 };
 
@@ -68,6 +69,8 @@ pub struct Subject {
     /// What is too fast for the reference, a vibration among it; `None` also where the reference is exact, and the search for effects on the scatter
     /// sees it.
     pub fast: Option<Fast>,
+    /// Where gyros stop before the end of their range; none where the reference is exact, and the search has their limits.
+    pub stops: Vec<Stop>,
     /// What was grossly wrong and is put right; in tables only.
     pub gross: Gross,
 }
@@ -114,6 +117,8 @@ impl Subject {
         let repeats = repeats(&log, &unit).filter(|_| !is_exact);
         let fast = if is_exact { None } else { Fast::of(&log, &unit) };
         let repeated = by_axes(&log, &unit, &[Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer]);
+        let stops = if is_exact { Vec::new() } else { stops(&log, &unit) };
+        beneath(&mut log, &stops);
         let thinned = log.start_s.len().div_ceil(MOST_ROWS).max(1);
         log = keep_rows(log, |row, _| row % thinned == 0);
         let overlap_s = seen_share(&log, (from_s, to_s));
@@ -179,6 +184,7 @@ impl Subject {
             repeats,
             repeated,
             fast,
+            stops,
             gross: Gross::default(),
         })
     }
@@ -230,6 +236,7 @@ impl Subject {
             repeats: None,
             repeated: Vec::new(),
             fast: None,
+            stops: Vec::new(),
             gross,
         })
     }
