@@ -3,6 +3,8 @@
 //! In: what was asked of the rows before they were thinned ([`crate::input`]). Out: [`Cause`]s, whose shares are still energies. Nothing of a model is in
 //! them: what a name explains otherwise and what is left say nothing against them.
 
+use twin::effect::Page;
+
 use crate::{
     input::{case::Subject, faster::Line, repeats::Repeats, stops::Stop},
     probability::cause::{Cause, Sized, named, parameter},
@@ -30,34 +32,43 @@ pub fn causes_of_rows(subject: &Subject) -> Vec<Cause> {
         .collect()
 }
 
-/// Parts that send samples twice as causes.
+/// One on this evidence \[nats\] against chance, of so many times its largest size.
+fn cause(subject: &Subject, page: &'static Page, channels: Vec<usize>, nats: f64, excess: f64) -> Cause {
+    Cause {
+        effect: page.name,
+        locality: subject.names(channels.iter().copied()).join(" "),
+        channels,
+        probability: named(nats / TEMPERATURE, excess),
+        of_any: 1.0,
+        gain: nats,
+        explained: 2.0 * nats,
+        parameters: Vec::new(),
+        share: 2.0 * nats,
+        when: "throughout".to_owned(),
+        which: None,
+        confirm_by: page.confirm_by,
+        physics: page.physics,
+        is_suspicious: excess > SUSPICIOUS,
+    }
+}
+
+/// Parts that send samples twice.
 fn cause_of_repeats(subject: &Subject, repeats: &Repeats) -> Option<Cause> {
     let page = twin::effect::by_name(STALE)?.page();
     let symbol = page.parameters.first()?;
     let excess = repeats.share / symbol.prior_sigma / page.largest;
     Some(Cause {
-        effect: page.name,
-        locality: subject.names(repeats.channels.iter().copied()).join(" "),
-        channels: repeats.channels.clone(),
-        probability: named(repeats.nats / TEMPERATURE, excess),
-        of_any: 1.0,
-        gain: repeats.nats,
-        explained: 2.0 * repeats.nats,
         parameters: vec![Sized {
             parameter: parameter(symbol, symbol.name.to_owned()),
             value: repeats.share,
             sigma: repeats.sigma,
         }],
-        share: 2.0 * repeats.nats,
-        when: "throughout".to_owned(),
         which: Some("all its axes repeat the row before together, oftener than by chance".to_owned()),
-        confirm_by: page.confirm_by,
-        physics: page.physics,
-        is_suspicious: excess > SUSPICIOUS,
+        ..cause(subject, page, repeats.channels.clone(), repeats.nats, excess)
     })
 }
 
-/// A vibration as a cause.
+/// A vibration.
 fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
     let page = twin::effect::by_name(VIBRATION)?.page();
     let symbol = page.parameters.first()?;
@@ -72,54 +83,29 @@ fn cause_of_line(subject: &Subject, line: &Line) -> Option<Cause> {
         }
     };
     let parameters: Vec<Sized> = line.sizes.iter().map(size).collect();
-    let excess = parameters
-        .iter()
-        .map(|sized| sized.value / symbol.prior_sigma)
-        .fold(0.0, f64::max)
-        / page.largest;
+    let sizes = parameters.iter().map(|sized| sized.value / symbol.prior_sigma);
+    let excess = sizes.fold(0.0, f64::max) / page.largest;
     Some(Cause {
-        effect: page.name,
-        locality: subject.names(channels.iter().copied()).join(" "),
-        channels,
-        probability: named(line.nats / TEMPERATURE, excess),
-        of_any: 1.0,
-        gain: line.nats,
-        explained: 2.0 * line.nats,
         parameters,
-        share: 2.0 * line.nats,
-        when: "throughout".to_owned(),
         which: Some(format!(
             "a line at {:.2} Hz, or folded to it, which the reference is too slow for",
             line.hz
         )),
-        confirm_by: page.confirm_by,
-        physics: page.physics,
-        is_suspicious: excess > SUSPICIOUS,
+        ..cause(subject, page, channels, line.nats, excess)
     })
 }
 
-/// Gyros that stop as a cause.
+/// Gyros that stop.
 fn cause_of_stops(subject: &Subject, stops: &[Stop]) -> Option<Cause> {
     let page = twin::effect::by_name(STOPPED)?.page();
     let nats: f64 = stops.iter().map(|stop| stop.nats).sum();
     let mut channels: Vec<usize> = stops.iter().map(|stop| stop.channel).collect();
     channels.dedup();
-    let name = |stop: &Stop| format!("{} at {:.4} rad/s", subject.names([stop.channel]).join(""), stop.at);
-    let which: Vec<String> = stops.iter().map(name).collect();
+    let told = |stop: &Stop| format!("{} at {:.4} rad/s", subject.names([stop.channel]).join(""), stop.at);
+    let which: Vec<String> = stops.iter().map(told).collect();
     (!stops.is_empty()).then(|| Cause {
-        effect: page.name,
-        locality: subject.names(channels.iter().copied()).join(" "),
-        channels,
-        probability: named(nats / TEMPERATURE, 0.0),
-        of_any: 1.0,
-        gain: nats,
-        explained: 2.0 * nats,
-        parameters: Vec::new(),
-        share: 2.0 * nats,
         when: "at the largest rates".to_owned(),
         which: Some(which.join(", ")),
-        confirm_by: page.confirm_by,
-        physics: page.physics,
-        is_suspicious: false,
+        ..cause(subject, page, channels, nats, 0.0)
     })
 }
