@@ -258,7 +258,8 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         true => believed.held_against(left_beneath),
         false => left_beneath(&believed.causes),
     };
-    // What rows say of themselves says nothing of the others.
+    // What rows say by themselves is in no model: what a model leaves and how it shrinks the gap is told of the others alone.
+    let is_modelled = !believed.causes.is_empty();
     let is_new = |cause: &Cause| believed.causes.iter().all(|other| other.effect != cause.effect);
     let by_rows = by_rows
         .into_iter()
@@ -266,13 +267,12 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let by_rows: Vec<Cause> = by_rows.collect();
     believed.causes.extend(by_rows);
     let mut alternatives = believed.alternatives(&library, &explanation);
-    let is_named = !believed.causes.is_empty();
-    if !is_named && !believed.unnamed.is_empty() {
+    if !is_modelled && !believed.unnamed.is_empty() {
         // What is not likely enough to be said may be there, or something else.
         (left, shrink) = all_there_was();
     }
     let said = said(&explanation, &believed.causes);
-    if !is_named && is_inexact {
+    if !is_modelled && is_inexact {
         // Of a log in which nothing matters they are what every real recording has.
         alternatives
             .iter_mut()
@@ -289,14 +289,14 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     share_out(&mut causes);
 
     let mut once = model.components.iter().filter_map(|component| component.span);
-    if is_named && let Some(on) = once.find(|on| on.every_s.is_none()) {
+    if is_modelled && let Some(on) = once.find(|on| on.every_s.is_none()) {
         // What the calibration takes up of a cause that comes and goes blurs the edges of the gap.
         place.passage = Some(Passage::of(&problem, on.stretch));
     }
-    let correction = (is_named && is_decided)
+    let correction = (is_modelled && is_decided)
         .then(|| Correction::of(&subject.twin, &said))
         .flatten();
-    let finished = if is_named {
+    let finished = if is_modelled {
         Finished {
             after: &model.predicted,
             louder: &explanation.louder,
@@ -309,7 +309,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let responses = correction.as_ref().map(|correction| correction.responses.as_slice());
     progress("attitude", 0.0);
     let stages = subject.held.stages(&subject.twin, finished, responses);
-    let ceiling = is_named.then(|| {
+    let ceiling = is_modelled.then(|| {
         let parameters = causes.iter().map(|cause| cause.parameters.len()).sum();
         ceiling_percent(
             [shrink.before, shrink.floor],
