@@ -45,6 +45,11 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// \[s\] between the samples of its record; 0 without one.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
     /// Of a case without a record, or with an exact one.
     pub fn stated(accuracy: Accuracy) -> Self {
         Self {

@@ -25,7 +25,11 @@ use twin::{
 pub use self::frame::Frame;
 use crate::{
     input::{reference::Reference, windows::Fit},
-    null::{calibration::calibration, interval::Interval, joint::Columns},
+    null::{
+        calibration::{calibration, stamps},
+        interval::Interval,
+        joint::Columns,
+    },
     thresholds::{REFERENCE_CORRELATION_S, REFERENCE_LIMITED},
 };
 
@@ -161,6 +165,7 @@ impl<'a> Problem<'a> {
             frame.nuisance_names = names.collect();
         }
         self.reference = self.true_twin().field_columns(&self.instrument.accuracy);
+        self.reference.extend(stamps(self.true_twin(), self.instrument));
         self.settle();
     }
 

@@ -20,7 +20,10 @@ mod variant;
 use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
 
-pub use self::chosen::{Chosen, Rival};
+pub use self::{
+    chosen::{Chosen, Rival},
+    screen::are_physical,
+};
 use self::{
     columns::always,
     intervals::{bounded, fitted, stretches, taken},

@@ -19,7 +19,7 @@ use crate::{
     null::{model::Model, problem::Problem},
     search::{
         odds::by_effect,
-        readings::{Chosen, Rival},
+        readings::{Chosen, Rival, are_physical},
     },
     thresholds::{EFFECT_MARGIN, SAID},
 };
@@ -54,11 +54,17 @@ pub fn recognised(
             continue;
         }
         let width = screen.prior_sigmas.len();
-        let Some(evidence) = screen.of_any_size(once(0..width)) else {
+        let of_other_sizes = screen.settle(once(0..width));
+        let all: Vec<usize> = (0..width).collect();
+        let Some((evidence, estimate)) = screen.log_evidence().zip(screen.estimate(&all)) else {
             continue;
         };
         let own = &library.hypotheses[hypothesis];
-        let gain = evidence + own.log_prior;
+        let sigmas = estimate.covariance.diagonal().map(f64::sqrt);
+        if !are_physical(&own.parameters, estimate.parameters.iter().zip(sigmas.iter())) {
+            continue;
+        }
+        let gain = evidence + of_other_sizes + own.log_prior;
         rivals.push(Rival {
             hypothesis,
             gain,
@@ -66,8 +72,6 @@ pub fn recognised(
             is_named: true,
         });
         if best.as_ref().is_none_or(|best| gain > best.gain) {
-            screen.settle(once(0..width));
-            let estimate = screen.estimate(&(0..width).collect::<Vec<_>>())?;
             best = Some(Chosen {
                 hypothesis,
                 theta: estimate.parameters,

@@ -164,3 +164,47 @@ fn a_gyro_that_stops_inside_its_range_is_named() {
     assert_eq!(named(0.448, &["gyro-saturation"]), (Vec::new(), true));
     assert_eq!(named(0.6, &[]), (Vec::new(), false));
 }
+
+/// What the stamps of the record leave open, with an accelerometer so far [m] from the centre.
+fn open_beside(folder: &TempDir, lever_m: Option<f64>) -> Vec<String> {
+    let path = |name: &str| folder.path().join(name);
+    let read = |name: &str| fs::read_to_string(path(name)).expect("a file");
+    if let Some(lever_m) = lever_m {
+        let accelerometer = format!(
+            "\n[[channel]]\nname = \"ax\"\nsensor = \"accelerometer\"\ngroup = \"unit\"\naxis_b = [1.0, 0.0, 0.0]\nlsb = 1.0\n\
+             noise_sigma = 0.01\nrange = [-60.0, 60.0]\nlever_m = [{lever_m}, 0.0, 0.0]\n"
+        );
+        fs::write(path("unit.toml"), read("unit.toml") + &accelerometer).expect("a file");
+        let rows = read("measured.csv").replace('\n', ",0.0\n").replacen(",0.0", ",ax", 1);
+        fs::write(path("measured.csv"), rows).expect("a file");
+        let case = read("case.toml").replace("[environment]\n", "[environment]\ngravity_m_s2 = 9.8\n");
+        fs::write(path("case.toml"), case).expect("a file");
+    }
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let open = problem.reference.iter().map(|column| column.name.clone());
+    open.collect()
+}
+
+/// An accelerometer at the centre of a unit that turns about the vertical feels nothing of it; one at 1 m does, and sees when.
+#[test]
+fn stamps_are_open_where_gyros_alone_see_the_motion() {
+    let beside = |lever_m| open_beside(&beside_reference(|_| 0.0), lever_m);
+    assert_eq!(beside(None), ["reference_instant"]);
+    assert_eq!(beside(Some(0.0)), ["reference_instant"]);
+    assert_eq!(beside(Some(1.0)), Vec::<String>::new());
+    assert_eq!(open_beside(&erring(|_| 0.0, ""), None), Vec::<String>::new());
+}
+
+/// Half a row of the record, which is one of 20 ms.
+#[test]
+fn gyros_alone_are_not_late_by_less_than_a_row_of_the_record() {
+    let late = |late_s: f64| {
+        let causes = diagnosed_in(&beside_reference(|t_s| rate(t_s - late_s) - rate(t_s)), &[])
+            .1
+            .causes;
+        causes.iter().map(|cause| cause.effect).collect::<Vec<_>>()
+    };
+    assert_eq!(late(0.01), Vec::<&str>::new());
+    assert!(!late(0.1).is_empty());
+}

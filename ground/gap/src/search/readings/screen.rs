@@ -5,6 +5,7 @@
 use std::{iter::once, ops::Range};
 
 use rayon::prelude::*;
+use twin::effect::Parameter;
 
 use super::variant::is_any_same;
 use crate::{
@@ -63,18 +64,40 @@ pub(super) fn gains(problem: &Problem, library: &Library, scores: &[f64], set: &
     library.hypotheses.par_iter().enumerate().map(gain).collect()
 }
 
-/// Whether parameters that cannot be negative are not, beyond twice their sigma.
+/// Whether parameters of a set that cannot be negative are not.
 pub(super) fn is_physical(library: &Library, set: &[usize], refined: &Refined) -> bool {
-    let mut at = library.reference;
+    let sigmas = refined.estimate.covariance.diagonal().map(f64::sqrt);
+    let mut sigmas = sigmas.iter().skip(library.reference);
     set.iter().zip(&refined.thetas).all(|(hypothesis, theta)| {
-        library.hypotheses[*hypothesis]
-            .parameters
-            .iter()
-            .zip(theta.iter())
-            .all(|(parameter, value)| {
-                let sigma = refined.estimate.covariance[(at, at)].sqrt();
-                at += 1;
-                parameter.signed || *value > -2.0 * sigma
-            })
+        are_physical(
+            &library.hypotheses[*hypothesis].parameters,
+            theta.iter().zip(&mut sigmas),
+        )
     })
+}
+
+/// Whether parameters that cannot be negative are not, beyond twice their sigma: of values and sigmas.
+pub fn are_physical<'a>(parameters: &[Parameter], found: impl Iterator<Item = (&'a f64, &'a f64)>) -> bool {
+    let mut found = parameters.iter().zip(found);
+    found.all(|(parameter, (value, sigma))| parameter.signed || *value > -2.0 * sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_one_sign_is_not_of_the_other_beyond_its_error() {
+        let of = |signed: bool, value: f64| {
+            let parameter = Parameter {
+                name: "tau".to_owned(),
+                unit: "s",
+                prior_sigma: 0.02,
+                signed,
+            };
+            are_physical(&[parameter], once((&value, &1e-3)))
+        };
+        assert!(of(false, 1.0) && of(false, -1.9e-3) && !of(false, -2.1e-3));
+        assert!(of(true, -1.0));
+    }
 }
