@@ -90,7 +90,7 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
         stretch,
         every_s: Some(every_s),
     };
-    // What comes again is there at all times: a few damaged samples are in some cycles of some period.
+    // What comes again is there in each third as far as the fitted samples show it: a few damaged samples are in some cycles of some period.
     let third_s = span_s / 3.0;
     let parts = (0..3).map(|third| {
         let from = from_s + third_s * f64::from(third);
@@ -98,7 +98,11 @@ pub fn again(problem: &Problem, rest: &[DVector<f64>], slopes: &[Entries], sigma
         folded.within(on, Span { from, to })
     });
     let gains = folded.gains(parts.collect())?;
-    let is_there = gains.iter().all(|own| *own > LEAST_PART * gains.iter().sum::<f64>());
+    let expected: f64 = gains.iter().map(|[_, expected]| expected).sum();
+    let is_in = |[own, expected_there]: &[f64; 2]| {
+        *own > LEAST_PART * expected_there && *expected_there > LEAST_PART * expected / gains.len() as f64
+    };
+    let is_there = gains.iter().all(is_in);
     (gain > STRETCH_MARGIN + price && is_there).then_some((on, gain - price))
 }
 
@@ -193,8 +197,8 @@ impl<'a> Folded<'a> {
         self.screen(&piece)
     }
 
-    /// \[nats\] what parameters that are fitted to some parts together explain of each.
-    fn gains(&self, parts: Vec<Screen>) -> Option<Vec<f64>> {
+    /// \[nats\] what parameters that are fitted to some parts together explain of each, and what they would if they were as large there.
+    fn gains(&self, parts: Vec<Screen>) -> Option<Vec<[f64; 2]>> {
         let mut whole = Screen::zeros(self.sigmas.to_vec());
         for part in &parts {
             whole.information += &part.information;
@@ -202,8 +206,11 @@ impl<'a> Folded<'a> {
         }
         let all: Vec<usize> = (0..self.sigmas.len()).collect();
         let theta = whole.estimate(&all)?.parameters;
-        let gain = |part: &Screen| theta.dot(&part.score) - 0.5 * theta.dot(&(&part.information * &theta));
-        Some(parts.iter().map(gain).collect())
+        let gains = parts.iter().map(|part| {
+            let expected = 0.5 * theta.dot(&(&part.information * &theta));
+            [theta.dot(&part.score) - expected, expected]
+        });
+        Some(gains.collect())
     }
 
     fn evidence(&self, piece: &Piece) -> f64 {
