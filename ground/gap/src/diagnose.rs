@@ -39,7 +39,7 @@ use crate::{
         rows::{STALE, VIBRATION, causes_of_rows},
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
-    thresholds::{MOST_EFFECTS, SAID},
+    thresholds::{CHANCE, MOST_EFFECTS, SAID},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
@@ -318,6 +318,11 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         )
     });
     let is_recalibrated = shrink.before - shrink.recalibrated > subject.bars.gap_sigma;
+    let likely = alternatives
+        .iter()
+        .filter(|(_, probability)| *probability > CHANCE)
+        .map(|(name, _)| *name);
+    let told: Vec<&str> = causes.iter().map(|cause| cause.effect).chain(likely).collect();
     let outcome = Outcome::of(causes.len(), remainder.matters, none_of_these, is_recalibrated);
     Diagnosis {
         place,
@@ -346,7 +351,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
             .filter(|component| is_decided && component.span.is_none())
             .map(|component| component.active.to_known())
             .collect(),
-        rivals: confusion::pair(&library, found),
+        rivals: confusion::pair(&library, found, &told),
         traces: traces(&problem, model),
         cells: cells(&problem, &views),
         causes,

@@ -27,7 +27,7 @@ const PAGE: Page = Page {
     source: "ADIS16265 data sheet: 80, 160, 320 deg/s; Rapp 1991 for the knee",
     excited_by: "rates beyond the range",
     siblings: &["gyro-nonlinearity"],
-    confirm_by: "Read SENS_AVG; the top of the readings is flat.",
+    confirm_by: "Read the register of the range (ADIS16265: SENS_AVG); the top of the readings is flat.",
     nature: Nature::Discrete,
     common: true,
     sensors: &[Kind::Gyro],

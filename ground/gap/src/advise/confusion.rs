@@ -61,8 +61,8 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
     sets
 }
 
-/// The pair most worth telling apart: the likeliest rival of the strongest cause.
-pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
+/// The pair most worth telling apart: the likeliest rival of the strongest cause, of those that are `said`.
+pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pair> {
     let other = |chosen: &crate::search::readings::Chosen| {
         let own = library.hypotheses[chosen.hypothesis].effect();
         chosen
@@ -71,9 +71,9 @@ pub fn pair(library: &Library, found: &Attribution) -> Option<Pair> {
             .find(|rival| library.hypotheses[rival.hypothesis].effect() != own)
             .map(|rival| (rival.hypothesis, chosen.gain - rival.gain))
     };
-    let pairs = found
-        .chosen
-        .iter()
+    let is_said =
+        |chosen: &&crate::search::readings::Chosen| said.contains(&library.hypotheses[chosen.hypothesis].effect());
+    let pairs = (found.chosen.iter().filter(is_said))
         .filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
     let (chosen, rival, _) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
     Some(Pair {

@@ -31,10 +31,15 @@ pub fn sentence(subject: &Subject, diagnosis: &Diagnosis) -> String {
         each.join(", and ")
     };
     let shrink = &diagnosis.shrink;
-    let held_out = format!(
-        "With it in the twin, data that were not used differ by {:.2} instead of {:.2} sigma.",
+    let differ = format!(
+        "data that were not used differ by {:.2} instead of {:.2} sigma.",
         shrink.after, shrink.before
     );
+    // What rows alone show has no ceiling, for nothing of a model could come nearer to it.
+    let held_out = match diagnosis.ceiling_percent {
+        Some(_) => format!("With it in the twin, {differ}"),
+        None => format!("The rows of the log show it, and the twin cannot; with the calibration made anew, {differ}"),
+    };
     let put_right = match subject.gross.contradicted.is_empty() && subject.gross.wiring.is_empty() {
         true => "",
         false => "The table or the wiring is not as it was said; that was put right first. ",
