@@ -36,9 +36,13 @@ pub fn sentence(subject: &Subject, diagnosis: &Diagnosis) -> String {
         shrink.after, shrink.before
     );
     // What rows alone show has no ceiling, for nothing of a model could come nearer to it.
-    let held_out = match diagnosis.ceiling_percent {
-        Some(_) => format!("With it in the twin, {differ}"),
-        None => format!("The rows of the log show it, and the twin cannot; with the calibration made anew, {differ}"),
+    let is_by_rows = diagnosis.ceiling_percent.is_none();
+    let because = |beside: &str| match is_by_rows {
+        false => format!("{gap}, because of {}{beside}. With it in the twin, {differ}", named()),
+        true => format!(
+            "The rows of the log show {}{beside}. {gap}. With the calibration made anew, {differ}",
+            named()
+        ),
     };
     let put_right = match subject.gross.contradicted.is_empty() && subject.gross.wiring.is_empty() {
         true => "",
@@ -47,11 +51,9 @@ pub fn sentence(subject: &Subject, diagnosis: &Diagnosis) -> String {
     let outcome = match diagnosis.outcome {
         Outcome::Clean => format!("Nothing is wrong that this log can show. {gap}: noise and calibration explain it."),
         Outcome::Recalibrate => format!("The calibration has to be made anew, and nothing else is wrong. {gap}."),
-        Outcome::Named => format!("{gap}, because of {}. {held_out}", named()),
-        Outcome::PartlyNamed => format!(
-            "{gap}, because of {}, and of something that is not known. {held_out}",
-            named()
-        ),
+        Outcome::Named => because(""),
+        Outcome::PartlyNamed if is_by_rows => because(", and something that is not known is there too"),
+        Outcome::PartlyNamed => because(", and of something that is not known"),
         Outcome::Undecided => format!("{gap}, but no cause of that is likelier than not."),
         Outcome::Unknown => format!("{gap}, and no effect that is known explains it."),
     };
