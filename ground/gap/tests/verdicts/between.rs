@@ -1,5 +1,7 @@
 //! What of an effect is no parameter: a time constant, an onset, when it comes again; and which of those that are the same here.
 
+use std::fs;
+
 use crate::gyros::{diagnosed_in, erring, erring_in, rate};
 use gap::{
     holdout::fit_error::FitError,
@@ -9,6 +11,7 @@ use gap::{
     report::terminal,
     search::{periodic::again, readings::attribute},
 };
+use tempfile::TempDir;
 
 #[test]
 fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
@@ -91,7 +94,10 @@ fn one_of_a_set_that_cannot_be_told_apart_is_a_cause_and_corrects_nothing() {
 
 /// When a constant error of gz is on, and the nats that gains over always.
 fn when_on(error: impl Fn(f64) -> f64) -> Option<(Interval, f64)> {
-    let folder = erring(error, "");
+    when_on_of(&erring(error, ""))
+}
+
+fn when_on_of(folder: &TempDir) -> Option<(Interval, f64)> {
     let subject = Subject::open(folder.path()).expect("opens");
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let rest: Vec<_> = (0..3).map(|channel| problem.residual(channel, &[])).collect();
@@ -125,6 +131,21 @@ fn what_comes_again_is_found_with_its_period() {
         let none = when_on(error);
         assert!(none.is_none(), "{none:?}");
     }
+}
+
+/// Of what is on in the fitted samples the middle third has two seconds of 32, for windows and period are as they are.
+#[test]
+fn what_comes_again_is_not_asked_where_windows_do_not_show_it() {
+    const EVERY_S: f64 = 17.3;
+    let folder = erring(|t_s| if (t_s / EVERY_S).fract() < 0.35 { 0.006 } else { 0.0 }, "");
+    let file = folder.path().join("case.toml");
+    let case = fs::read_to_string(&file).expect("a file");
+    let few = case.replace("[[0.0, 120.0]]", "[[0.0, 40.0], [52.0, 54.0], [80.0, 120.0]]");
+    assert_ne!(case, few);
+    fs::write(&file, few).expect("a file");
+    let (on, _) = when_on_of(&folder).expect("it comes again");
+    let every_s = on.every_s.expect("a period");
+    assert!((every_s - EVERY_S).abs() < 0.05, "{on}");
 }
 
 #[test]
