@@ -137,7 +137,7 @@ thresholds! {
         larger: "what comes and goes is taken for steady",
         smaller: "what is steady is cut to a stretch",
         Assumed("as decisive as the margin of a name");
-    /// Part of what is explained that each half of a stretch, each third of the time of a periodic effect (of what it would be there, and of an even share of that), and an effect that is to be seen coming and going beside others must bring, and that a calibration must leave of an effect which it does not imitate.
+    /// The least part that counts. Each half of a stretch has to bring it of what is explained, and so has an effect that is to be seen coming and going beside others. Each third of the time has to bring it of what a periodic effect would be there, and to hold it of an even share. A calibration has to leave it of an effect that it does not imitate.
     LEAST_PART: f64 = 0.1, in "part",
         larger: "short strong parts and uneven effects are taken for steady ones",
         smaller: "one blow makes a stretch, and what another law leaves over gets one; iron far beyond a zero's sigma has no name",

@@ -7,7 +7,10 @@
 
 use crate::{
     library::hypotheses::Library,
-    search::{odds::by_effect, readings::Attribution},
+    search::{
+        odds::by_effect,
+        readings::{Attribution, Chosen},
+    },
     thresholds::{CHANCE, SEEN_SNR, SET_APART},
 };
 
@@ -63,7 +66,7 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
 
 /// The pair most worth telling apart: the likeliest rival of the strongest cause, of those that are `said`.
 pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pair> {
-    let other = |chosen: &crate::search::readings::Chosen| {
+    let other = |chosen: &Chosen| {
         let own = library.hypotheses[chosen.hypothesis].effect();
         chosen
             .rivals
@@ -71,8 +74,7 @@ pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pai
             .find(|rival| library.hypotheses[rival.hypothesis].effect() != own)
             .map(|rival| (rival.hypothesis, chosen.gain - rival.gain))
     };
-    let is_said =
-        |chosen: &&crate::search::readings::Chosen| said.contains(&library.hypotheses[chosen.hypothesis].effect());
+    let is_said = |chosen: &&Chosen| said.contains(&library.hypotheses[chosen.hypothesis].effect());
     let pairs = (found.chosen.iter().filter(is_said))
         .filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
     let (chosen, rival, _) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
@@ -86,7 +88,7 @@ pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pai
     })
 }
 
-fn nats_apart(library: &Library, chosen: &crate::search::readings::Chosen, rival: usize) -> Option<f64> {
+fn nats_apart(library: &Library, chosen: &Chosen, rival: usize) -> Option<f64> {
     let own = library.hypotheses[chosen.hypothesis].small();
     let others = library.hypotheses[rival].small();
     if own.is_empty() || others.is_empty() {

@@ -1,8 +1,8 @@
 //! What is open of each channel although the twin is right: its calibration, the instant at which it is read, and how its
 //! reference answers to motion.
 //!
-//! In: the twin and its [`Reference`]. Out: columns with prior sigmas, which every fit takes out first; one of them, the stamps of the reference's record,
-//! is of all channels.
+//! In: the twin and its [`Reference`]. Out: columns with prior sigmas, which every fit takes out first. That of the stamps of the reference's
+//! record is one of all channels; the others are of one channel each.
 
 use twin::predict::{Channel, Column, Kind, Twin};
 
@@ -11,9 +11,9 @@ use crate::input::reference::Reference;
 /// \[s\] between a gyro's conversions, by its own clock (ADIS16265 data sheet, table 1).
 const GYRO_PERIOD_S: f64 = 1.0 / 256.0;
 
-/// Rows of the reference's record by which the instant of a gyro may be off of which nothing says when it converts, a standard deviation. Of twelve
-/// recordings of BROAD without an effect in time (36 gyros, 3.5 ms a row) it is 0.026 and 0.06 at most; of six gyros on a rocket (10 ms a row), about what
-/// all have in common, 0.02 to 0.06.
+/// Standard deviation of the instant of a gyro of which nothing says when it converts, in rows of the reference's record. In twelve recordings of BROAD
+/// without an effect in time (36 gyros, 3.5 ms a row) it is 0.026, and 0.06 at most; of six gyros on a rocket (10 ms a row), about what all have in common,
+/// 0.02 to 0.06.
 const INSTANT_ROWS: f64 = 0.03;
 
 /// \[s\] between a thermometer's, by its own clock (TMP102, SBOS397).
@@ -85,24 +85,28 @@ fn is_without_clock(channel: &Channel) -> bool {
     channel.sensor == Kind::Gyro && channel.bits.is_none() && channel.instant_sigma_s.is_none()
 }
 
-/// What the stamps of a record leave open of all channels: half a row to either side, evenly, where gyros alone see that. Other sensors that would show such a
-/// shift by as much as their noise say whether it is the gyros' or of all.
+/// What the stamps of a record leave open of all channels: half a row to either side, evenly, where gyros alone see the motion. Where other sensors would
+/// show such a shift by as much as their noise, they say whether it is the gyros' or of all, and nothing is open.
 pub fn stamps(twin: &Twin, instrument: &Reference) -> Option<Column> {
     let sigma = instrument.step_s() / 12f64.sqrt();
-    let unit = twin.unit();
-    let is_asked = |channel: &Channel| channel.sensor != Kind::Thermometer;
-    let asked = (0..unit.channels.len()).filter(|index| is_asked(&unit.channels[*index]));
-    let entries: Vec<(usize, Vec<f64>)> = asked.map(|index| (index, twin.by_instant(index))).collect();
-    let shown = |(index, slopes): &(usize, Vec<f64>)| -> f64 {
-        let own = &unit.channels[*index];
-        let is_other = own.sensor != Kind::Gyro;
-        let slopes = slopes.iter().filter(|slope| is_other && slope.is_finite());
-        slopes.map(|slope| (slope * sigma / own.sigma()).powi(2)).sum()
-    };
-    let is_open = sigma > 0.0 && entries.iter().map(shown).sum::<f64>() < 1.0;
-    is_open.then(|| Column {
+    if sigma <= 0.0 {
+        return None;
+    }
+    let channels = &twin.unit().channels;
+    let of = |is_asked: fn(Kind) -> bool| (0..channels.len()).filter(move |index| is_asked(channels[*index].sensor));
+    let mut shown = 0.0;
+    for index in of(|sensor| matches!(sensor, Kind::Accelerometer | Kind::Magnetometer)) {
+        let in_noise = sigma / channels[index].sigma();
+        let slopes = twin.by_instant(index).into_iter().filter(|slope| slope.is_finite());
+        shown += slopes.map(|slope| (slope * in_noise).powi(2)).sum::<f64>();
+        if shown >= 1.0 {
+            return None;
+        }
+    }
+    let seeing = of(|sensor| sensor != Kind::Thermometer);
+    Some(Column {
         name: "reference_instant".to_owned(),
         sigma,
-        entries,
+        entries: seeing.map(|index| (index, twin.by_instant(index))).collect(),
     })
 }

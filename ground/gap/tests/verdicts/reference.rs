@@ -196,6 +196,25 @@ fn stamps_are_open_where_gyros_alone_see_the_motion() {
     assert_eq!(open_beside(&erring(|_| 0.0, ""), None), Vec::<String>::new());
 }
 
+/// A row of the record is 20 ms. Of a gyro with codes the part is known.
+#[test]
+fn a_gyro_is_read_when_its_row_says_and_one_with_codes_when_its_part_converts() {
+    let instant_s = |folder: &TempDir| {
+        let subject = Subject::open(folder.path()).expect("opens");
+        let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+        let column = problem.open(2).iter().find(|column| column.name == "instant_gz");
+        column.expect("an open instant").sigma
+    };
+    let of_part_s = 1.0 / 256.0 / 12f64.sqrt();
+    let recorded = beside_reference(|_| 0.0);
+    assert!((instant_s(&recorded) - 0.03 * 0.02).abs() < 1e-6);
+    assert!((instant_s(&erring(|_| 0.0, "")) - of_part_s).abs() < 1e-9);
+    let file = recorded.path().join("unit.toml");
+    let coded = fs::read_to_string(&file).expect("a file") + "bits = 14\n";
+    fs::write(&file, coded).expect("a file");
+    assert!((instant_s(&recorded) - of_part_s).abs() < 1e-9);
+}
+
 /// Half a row of the record, which is one of 20 ms.
 #[test]
 fn gyros_alone_are_not_late_by_less_than_a_row_of_the_record() {
