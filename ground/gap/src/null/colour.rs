@@ -112,6 +112,11 @@ impl Colour {
         self.slow.whiten(&columns)
     }
 
+    /// `y'dual(u) = applied(y)'u` for every column `y`.
+    pub fn dual(&self, white: &DVector<f64>) -> DVector<f64> {
+        self.autoregression.dual(&self.slow.dual(white))
+    }
+
     /// The columns that are these when they are white.
     pub fn taken_back(&self, white: DMatrix<f64>) -> DMatrix<f64> {
         if white.iter().all(|value| *value == 0.0) {
@@ -151,13 +156,36 @@ impl Autoregression {
 
     fn errors(&self, column: &DVector<f64>) -> DVector<f64> {
         let mut errors = column.clone();
+        let highest = self.orders.len() - 1;
         for stretch in &self.stretches {
-            for at in stretch.clone() {
+            let all_before = (stretch.start + highest).min(stretch.end);
+            for at in stretch.start..all_before {
                 let parts = self.order(at - stretch.start).0.iter().enumerate();
                 errors[at] = parts.map(|(back, part)| part * column[at - back]).sum();
             }
+            if all_before == stretch.end {
+                continue;
+            }
+            // Coefficient by coefficient: a sample's sum then waits for no other's.
+            let own = &mut errors.as_mut_slice()[all_before..stretch.end];
+            own.fill(0.0);
+            for (back, part) in self.orders[highest].0.iter().enumerate() {
+                let before = &column.as_slice()[all_before - back..stretch.end - back];
+                (own.iter_mut().zip(before)).for_each(|(error, before)| *error += part * before);
+            }
         }
         errors
+    }
+
+    fn dual(&self, errors: &DVector<f64>) -> DVector<f64> {
+        let mut dual = DVector::zeros(errors.len());
+        for stretch in &self.stretches {
+            for at in stretch.clone() {
+                let parts = self.order(at - stretch.start).0.iter().enumerate();
+                parts.for_each(|(back, part)| dual[at - back] += part * errors[at]);
+            }
+        }
+        dual
     }
 
     fn taken_back(&self, errors: &DVector<f64>) -> DVector<f64> {

@@ -125,6 +125,16 @@ struct Step {
     weight: f64,
 }
 
+/// Columns that go through the steps side by side: none waits for the sums of another.
+const SIDE: usize = 8;
+
+/// Which way columns go through the steps.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    ToWhite,
+    Back,
+}
+
 /// The gains of a log.
 pub struct Whitening {
     processes: Vec<Process>,
@@ -151,9 +161,9 @@ impl Whitening {
             if over_s > 0.0 {
                 let moves: Vec<_> = processes.iter().map(|process| process.step(over_s)).collect();
                 go = moves.iter().map(|(go, _)| *go).collect();
-                carry(&go, &places, processes, &mut covariance);
+                carry(&go, processes, covariance.as_mut_slice(), states);
                 covariance.transpose_mut();
-                carry(&go, &places, processes, &mut covariance);
+                carry(&go, processes, covariance.as_mut_slice(), states);
                 for ((process, at), (_, new)) in processes.iter().zip(&places).zip(&moves) {
                     let own = 0..process.states();
                     own.clone().for_each(|row| {
@@ -189,49 +199,86 @@ impl Whitening {
 
     /// Whitens columns, one sample a row.
     pub fn whiten(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let (places, _) = places(&self.processes);
-        // A sample a column: what belongs together then lies together.
-        let mut white = columns.transpose();
-        let mut states = DMatrix::<f64>::zeros(self.states, columns.ncols());
-        for (at, step) in self.steps.iter().enumerate() {
-            if !step.go.is_empty() {
-                carry(&step.go, &places, &self.processes, &mut states);
-            }
-            let mut innovation = white.column_mut(at);
-            if step.weight <= 0.0 {
-                innovation.fill(0.0);
-                continue;
-            }
-            for (own, mut state) in innovation.iter_mut().zip(states.column_iter_mut()) {
-                *own -= step.sees.iter().map(|(place, part)| part * state[*place]).sum::<f64>();
-                if *own != 0.0 {
-                    state.axpy(*own, &step.gain, 1.0);
-                }
-            }
-            innovation *= step.weight;
-        }
-        white.transpose()
+        self.through(columns, Way::ToWhite)
     }
 
     /// The columns that are these when they are white; a sample that is passed over is what it is here.
     pub fn taken_back(&self, white: &DMatrix<f64>) -> DMatrix<f64> {
-        let (places, _) = places(&self.processes);
-        let mut columns = white.transpose();
-        let mut states = DMatrix::<f64>::zeros(self.states, white.ncols());
-        for (at, step) in self.steps.iter().enumerate() {
+        self.through(white, Way::Back)
+    }
+
+    /// What of a column each sample's value makes of its inner product with a white one: `y'dual(u) = whiten(y)'u`.
+    pub fn dual(&self, white: &DVector<f64>) -> DVector<f64> {
+        let mut dual = DVector::zeros(white.len());
+        let mut states = vec![0.0; self.states];
+        for (at, step) in self.steps.iter().enumerate().rev() {
+            if step.weight > 0.0 {
+                let of_gain: f64 = states
+                    .iter()
+                    .zip(step.gain.iter())
+                    .map(|(state, gain)| state * gain)
+                    .sum();
+                dual[at] = step.weight * white[at] + of_gain;
+                step.sees
+                    .iter()
+                    .for_each(|(place, part)| states[*place] -= part * dual[at]);
+            }
             if !step.go.is_empty() {
-                carry(&step.go, &places, &self.processes, &mut states);
-            }
-            if step.weight <= 0.0 {
-                continue;
-            }
-            for (own, mut state) in columns.column_mut(at).iter_mut().zip(states.column_iter_mut()) {
-                let innovation = *own / step.weight;
-                *own = innovation + step.sees.iter().map(|(place, part)| part * state[*place]).sum::<f64>();
-                state.axpy(innovation, &step.gain, 1.0);
+                let transposed: Vec<[[f64; 2]; 2]> = (step.go.iter())
+                    .map(|go| [[go[0][0], go[1][0]], [go[0][1], go[1][1]]])
+                    .collect();
+                carry(&transposed, &self.processes, &mut states, 1);
             }
         }
-        columns.transpose()
+        dual
+    }
+
+    fn through(&self, columns: &DMatrix<f64>, way: Way) -> DMatrix<f64> {
+        let mut passed = columns.clone();
+        let samples = columns.nrows().max(1);
+        let mut blocks = passed.as_mut_slice().chunks_exact_mut(SIDE * samples);
+        (&mut blocks).for_each(|block| self.step_through::<SIDE>(block, way));
+        let rest = blocks.into_remainder().chunks_exact_mut(samples);
+        rest.for_each(|column| self.step_through::<1>(column, way));
+        passed
+    }
+
+    /// So many columns, one after the other.
+    fn step_through<const COLUMNS: usize>(&self, columns: &mut [f64], way: Way) {
+        let samples = self.steps.len();
+        let mut states = vec![[0.0; COLUMNS]; self.states];
+        for (at, step) in self.steps.iter().enumerate() {
+            if !step.go.is_empty() {
+                carry(&step.go, &self.processes, states.as_flattened_mut(), COLUMNS);
+            }
+            if step.weight <= 0.0 {
+                if way == Way::ToWhite {
+                    (0..COLUMNS).for_each(|column| columns[column * samples + at] = 0.0);
+                }
+                continue;
+            }
+            let mut expected = [0.0; COLUMNS];
+            for (place, part) in &step.sees {
+                (expected.iter_mut().zip(&states[*place])).for_each(|(sum, state)| *sum += part * state);
+            }
+            let mut innovations = [0.0; COLUMNS];
+            for (column, (innovation, expected)) in innovations.iter_mut().zip(expected).enumerate() {
+                let value = &mut columns[column * samples + at];
+                match way {
+                    Way::ToWhite => {
+                        *innovation = *value - expected;
+                        *value = *innovation * step.weight;
+                    }
+                    Way::Back => {
+                        *innovation = *value / step.weight;
+                        *value = *innovation + expected;
+                    }
+                }
+            }
+            for (state, gain) in states.iter_mut().zip(step.gain.iter()) {
+                (state.iter_mut().zip(innovations)).for_each(|(state, innovation)| *state += gain * innovation);
+            }
+        }
     }
 
     /// `-(sum ln s + u'u + n ln 2 pi) / 2` of a residual.
@@ -242,18 +289,20 @@ impl Whitening {
     }
 }
 
-/// Moves every process' states on, in each column.
-fn carry(go: &[[[f64; 2]; 2]], places: &[usize], processes: &[Process], columns: &mut DMatrix<f64>) {
-    for mut column in columns.column_iter_mut() {
-        for ((process, at), go) in processes.iter().zip(places).zip(go) {
-            let value = column[*at];
-            if process.states() == 2 {
-                let rate = column[at + 1];
-                column[*at] = go[0][0] * value + go[0][1] * rate;
-                column[at + 1] = go[1][0] * value + go[1][1] * rate;
-            } else {
-                column[*at] = go[0][0] * value;
-            }
+/// Moves every process' states on; of each state `width` values, one a column, before those of the next.
+fn carry(go: &[[[f64; 2]; 2]], processes: &[Process], mut states: &mut [f64], width: usize) {
+    for (process, go) in processes.iter().zip(go) {
+        let (own, others) = std::mem::take(&mut states).split_at_mut(process.states() * width);
+        states = others;
+        let (values, rates) = own.split_at_mut(width);
+        if rates.is_empty() {
+            values.iter_mut().for_each(|value| *value *= go[0][0]);
+        }
+        for (value, rate) in values.iter_mut().zip(rates) {
+            (*value, *rate) = (
+                go[0][0] * *value + go[0][1] * *rate,
+                go[1][0] * *value + go[1][1] * *rate,
+            );
         }
     }
 }

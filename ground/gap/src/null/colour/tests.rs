@@ -128,3 +128,14 @@ fn what_is_short_empty_or_nothing_has_no_colour_and_stays_finite() {
         }
     }
 }
+
+#[test]
+fn a_dual_has_the_inner_products_of_what_is_made_white() {
+    let (colour, column) = (colour(&noise(3, 1.0)), noise(4, 1.0));
+    let other = DVector::from_fn(SAMPLES, |at, _| (0.01 * at as f64).cos());
+    let [of_white, of_dual] = [white(&colour, &column).dot(&other), column.dot(&colour.dual(&other))];
+    assert!(
+        (of_white - of_dual).abs() < 1e-9 * of_white.abs(),
+        "{of_white} {of_dual}"
+    );
+}

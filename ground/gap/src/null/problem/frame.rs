@@ -83,6 +83,14 @@ impl Frame {
         }
     }
 
+    /// What each sample of a column in physical units makes of its inner product with one in white noise.
+    pub fn dual(&self, white: &DVector<f64>) -> DVector<f64> {
+        match &self.colour {
+            Some(colour) => colour.dual(white).component_div(&self.weights),
+            None => white.component_div(&self.weights),
+        }
+    }
+
     /// The columns in physical units that these are in white noise.
     pub fn physical(&self, white: DMatrix<f64>) -> DMatrix<f64> {
         let mut columns = match &self.colour {

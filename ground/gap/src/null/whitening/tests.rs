@@ -204,3 +204,18 @@ fn a_reference_whose_error_is_taken_for_faster_than_it_is_is_not_uniform() {
     let off = uniformity(slow);
     assert!(off > ONCE_IN_A_THOUSAND, "{off}");
 }
+
+#[test]
+fn a_dual_has_the_inner_products_of_what_is_whitened() {
+    let (processes, mut samples) = log(0.01, 5.0, 0.5, 1.0);
+    samples[7].variance = 0.0;
+    let whitening = Whitening::new(&processes, &samples);
+    let column = |rate: f64| DVector::from_fn(samples.len(), |at, _| (rate * at as f64).sin());
+    let (one, other) = (column(0.7), column(1.9));
+    let white = whitening.whiten(&DMatrix::from_columns(std::slice::from_ref(&one)));
+    let [of_white, of_dual] = [white.column(0).dot(&other), one.dot(&whitening.dual(&other))];
+    assert!(
+        (of_white - of_dual).abs() < ROUNDING * of_white.abs(),
+        "{of_white} {of_dual}"
+    );
+}
