@@ -10,13 +10,14 @@ use rayon::prelude::*;
 use twin::effect::{Active, Cause, Effect, LIBRARY, Locality, Nature, Page, Parameter, onsets};
 
 use crate::{
+    input::windows::Span,
     library::{
         column::{Carrier, Column},
         products::Products,
     },
     null::{
         evidence::Screen,
-        interval::Interval,
+        interval::{Interval, begins_s},
         problem::{Component, Problem},
     },
 };
@@ -65,19 +66,29 @@ impl Hypothesis {
     /// The values about its own between which others are possible, in order, in a log whose cycles begin at these instants \[s\];
     /// `None` where there are none.
     pub fn values_between(&self, starts_s: &[f64]) -> Option<Vec<f64>> {
-        let mut values = self.cause.effect.between(starts_s);
-        if !self.cause.effect.has_values_between() {
-            let onsets: Vec<f64> = onsets(starts_s).collect();
-            let is_other = |value: &f64| !onsets.contains(value);
-            let others: Vec<f64> = values.iter().copied().filter(is_other).collect();
-            let is_onset = values.len() == others.len() + onsets.len() && !others.contains(&self.cause.variant);
-            if !is_onset || self.places.is_empty() {
-                return None;
-            }
-            values = onsets;
-        }
+        let mut values = match begins_s(&self.cause, starts_s) {
+            Some(_) if !self.places.is_empty() => onsets(starts_s).collect(),
+            None if self.cause.effect.has_values_between() => self.cause.effect.between(starts_s),
+            _ => return None,
+        };
         values.sort_by(f64::total_cmp);
         Some(values)
+    }
+
+    /// The one stretch of time in which it is on; `None` for always, and for what comes again.
+    pub fn once(&self, starts_s: &[f64]) -> Option<Span> {
+        let begins_s = begins_s(&self.cause, starts_s);
+        match self.span {
+            Some(Interval { every_s: Some(_), .. }) => None,
+            Some(Interval { stretch, .. }) => Some(Span {
+                from: begins_s.map_or(stretch.from, |begins_s| begins_s.max(stretch.from)),
+                to: stretch.to,
+            }),
+            None => begins_s.map(|from| Span {
+                from,
+                to: f64::INFINITY,
+            }),
+        }
     }
 
     /// It, when it is on.

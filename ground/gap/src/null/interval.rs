@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use twin::effect::{Cause, onsets};
+
 use crate::input::windows::Span;
 
 /// When an effect that passes is on.
@@ -21,6 +23,18 @@ impl Interval {
             None => self.stretch.contains(t_s),
         }
     }
+}
+
+/// \[s\] when an effect begins, if its variant is an onset in a log whose cycles begin at these instants.
+pub fn begins_s(cause: &Cause, starts_s: &[f64]) -> Option<f64> {
+    if cause.effect.has_values_between() {
+        return None;
+    }
+    let values = cause.effect.between(starts_s);
+    let onsets: Vec<f64> = onsets(starts_s).collect();
+    let others: Vec<f64> = values.iter().copied().filter(|value| !onsets.contains(value)).collect();
+    let is_onset = values.len() == others.len() + onsets.len() && !others.contains(&cause.variant);
+    is_onset.then_some(cause.variant)
 }
 
 /// Part of a cycle, 0 to 1, after so many cycles.

@@ -26,7 +26,7 @@ pub use self::{
 };
 use self::{
     columns::always,
-    intervals::{bounded, fitted, stretches, taken},
+    intervals::{Passing, bounded, fitted, stretches, taken},
     rivals::compare,
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::is_any_same,
@@ -70,6 +70,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
             always(problem, library, hypothesis);
         }
     }
+    let passing = Passing::new(problem, library);
     let mut set: Vec<usize> = Vec::new();
     let mut best = refine(problem, library, &set, &[]);
     let nothing = best.log_evidence;
@@ -78,7 +79,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     for round in 0..MOST_EFFECTS {
         progress(round as f64 / MOST_EFFECTS as f64);
         let mut gains = gains(problem, library, &scores, &set);
-        let stretches = stretches(problem, library, &set, &best, nothing, &mut gains);
+        let stretches = stretches(&passing, library, (&set, &best), nothing, &mut gains);
         if round < DISCRETE_ROUNDS {
             add_discrete(problem, library, &set, &best, &mut gains);
         }
@@ -118,7 +119,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
     }
     let mut chosen = Vec::new();
     for at in 0..set.len() {
-        chosen.push(compare(problem, library, &scores, &set, &best, nothing, at));
+        chosen.push(compare(&passing, library, &scores, &set, &best, nothing, at));
     }
     // A rival that does better in the place of a chosen one takes it; the comparison is then made anew.
     for _ in 0..MOST_EFFECTS {
@@ -138,7 +139,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         best = taken(problem, library, &set, &start, winner.span);
         scores = renewed_scores(problem, library, &set, &best);
         chosen = (0..set.len())
-            .map(|at| compare(problem, library, &scores, &set, &best, nothing, at))
+            .map(|at| compare(&passing, library, &scores, &set, &best, nothing, at))
             .collect();
     }
     chosen.sort_by(|one, other| other.gain.total_cmp(&one.gain));

@@ -9,7 +9,7 @@ use gap::{
     library::hypotheses::Library,
     null::{interval::Interval, model::Model, problem::Problem},
     report::terminal,
-    search::{periodic::again, readings::attribute},
+    search::{interval_sums::Residual, periodic::again, readings::attribute},
 };
 use tempfile::TempDir;
 
@@ -102,7 +102,7 @@ fn when_on_of(folder: &TempDir) -> Option<(Interval, f64)> {
     let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
     let rest: Vec<_> = (0..3).map(|channel| problem.residual(channel, &[])).collect();
     let one = problem.frames[2].weights.map(|weight| 1.0 / weight);
-    again(&problem, &rest, &[vec![(2, one)]], &[0.01])
+    again(&problem, &Residual::of(&problem, &rest), &[vec![(2, one)]], &[0.01])
 }
 
 #[test]

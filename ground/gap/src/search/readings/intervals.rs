@@ -3,6 +3,8 @@
 //! In: a set of hypotheses, refined. Out: for each hypothesis whose cause [passes](twin::effect::Page::passes) the stretch in
 //! which it would explain most ([`once`]), and sets refined with a member that is on in a stretch only.
 
+use std::sync::OnceLock;
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -11,6 +13,7 @@ use super::{
     variant::sharpened,
 };
 use crate::{
+    input::windows::Span,
     library::{
         hypotheses::{Hypothesis, Library},
         products::Entries,
@@ -18,40 +21,65 @@ use crate::{
     null::{interval::Interval, problem::Problem},
     search::{
         gauss_newton::{Refined, model_of, refine},
-        once,
+        interval_sums::Residual,
+        once::Tried,
         periodic::again,
     },
     thresholds::LEAST_PART,
 };
 
+/// Of each hypothesis that may be on in one stretch of time, what is the same for every set: its columns at the first instants tried. Those of
+/// a member of the set are other ones, and no member is tried.
+pub(super) struct Passing<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    of: Vec<OnceLock<Tried<'a>>>,
+}
+
+impl<'a> Passing<'a> {
+    pub(super) fn new(problem: &'a Problem<'a>, library: &Library) -> Self {
+        let of = library.hypotheses.iter().map(|_| OnceLock::new());
+        Passing {
+            problem,
+            of: of.collect(),
+        }
+    }
+
+    fn of(&self, library: &Library, index: usize) -> &Tried<'a> {
+        self.of[index].get_or_init(|| {
+            let (slopes, sigmas) = columns(library, &library.hypotheses[index]);
+            Tried::of(self.problem, &slopes, sigmas)
+        })
+    }
+}
+
 /// For each hypothesis that comes and goes the stretch of time in which it explains most of what a set leaves, if it is not
 /// always there; its gain is then that of the stretch. One with variants has its onset among them.
 pub(super) fn stretches(
-    problem: &Problem,
+    passing: &Passing,
     library: &Library,
-    set: &[usize],
-    best: &Refined,
+    (set, best): (&[usize], &Refined),
     nothing: f64,
     gains: &mut [f64],
 ) -> Vec<Option<Interval>> {
-    let model = model_of(library, set, &best.thetas);
+    let problem = passing.problem;
+    let residual = Residual::of(problem, &problem.residuals(&model_of(library, set, &best.thetas)));
     let least = LEAST_PART * (best.log_evidence - nothing);
-    let rest = problem.residuals(&model);
     let starts_s = problem.twin.starts_s();
-    let stretch = |(hypothesis, gain): (&Hypothesis, &mut f64)| {
-        let effect = hypothesis.cause.effect;
-        let repeats = effect.repeats(hypothesis.cause.variant);
-        if !gain.is_finite() || !effect.page().passes || !repeats && effect.variants(starts_s).len() > 1 {
+    let stretch = |(index, gain): (usize, &mut f64)| {
+        let hypothesis = &library.hypotheses[index];
+        let repeats = hypothesis.cause.effect.repeats(hypothesis.cause.variant);
+        if !gain.is_finite() || !repeats && !is_once(hypothesis, starts_s) {
             return None;
         }
-        let places = hypothesis.places.iter();
-        let slopes: Vec<Entries> = places.map(|place| library.products.column(*place)).collect();
-        let sigmas: Vec<f64> = (hypothesis.parameters.iter())
-            .map(|parameter| parameter.prior_sigma)
-            .collect();
         let found = match repeats {
-            true => again(problem, &rest, &slopes, &sigmas),
-            false => once::stretch(problem, &rest, &slopes, &sigmas).map(|(span, more)| (span.into(), more)),
+            true => {
+                let (slopes, sigmas) = columns(library, hypothesis);
+                again(problem, &residual, &slopes, &sigmas)
+            }
+            false => {
+                let found = passing.of(library, index).stretch(problem, &residual);
+                found.map(|(span, more)| (span.into(), more))
+            }
         };
         let found = found.filter(|(_, more)| *gain + more > least);
         *gain = match found {
@@ -62,7 +90,48 @@ pub(super) fn stretches(
         };
         found.map(|(span, _)| span)
     };
-    library.hypotheses.par_iter().zip(gains).map(stretch).collect()
+    gains.par_iter_mut().enumerate().map(stretch).collect()
+}
+
+/// Lends the time in which a member is on, `when`, to each other hypothesis that comes and goes, has no stretch of its own and would gain by
+/// it: a magnet that is brought is a current that is switched on but for the search that found its instants.
+pub(super) fn lent(
+    passing: &Passing,
+    library: &Library,
+    (set, best): (&[usize], &Refined),
+    when: Span,
+    stretches: &mut [Option<Interval>],
+    gains: &mut [f64],
+) {
+    let problem = passing.problem;
+    let residual = Residual::of(problem, &problem.residuals(&model_of(library, set, &best.thetas)));
+    let starts_s = problem.twin.starts_s();
+    for (index, (gain, stretch)) in gains.iter_mut().zip(stretches).enumerate() {
+        if !gain.is_finite() || stretch.is_some() || !is_once(&library.hypotheses[index], starts_s) {
+            continue;
+        }
+        let more = passing.of(library, index).over_always(&residual, when);
+        if let Some(more) = more.filter(|more| *more > 0.0) {
+            *gain += more;
+            *stretch = Some(when.into());
+        }
+    }
+}
+
+/// Whether a hypothesis may be on in one stretch of time. One with variants has its onset among them.
+fn is_once(hypothesis: &Hypothesis, starts_s: &[f64]) -> bool {
+    let effect = hypothesis.cause.effect;
+    effect.page().passes && effect.variants(starts_s).len() <= 1
+}
+
+/// A hypothesis' columns and the prior sigmas of their parameters.
+fn columns(library: &Library, hypothesis: &Hypothesis) -> (Vec<Entries>, Vec<f64>) {
+    let places = hypothesis.places.iter();
+    let sigmas = hypothesis.parameters.iter();
+    (
+        places.map(|place| library.products.column(*place)).collect(),
+        sigmas.map(|parameter| parameter.prior_sigma).collect(),
+    )
 }
 
 /// A set whose last member was added, refined: on in a stretch of time if it has one, with the onset that suits it best. The
@@ -133,8 +202,9 @@ pub(super) fn bounded(problem: &Problem, library: &mut Library, set: &[usize], b
     let model = model_of(library, others, &best.thetas[..others.len()]);
     let rest = problem.residuals(&model);
     let slopes = &best.slopes[best.slopes.len() - own.places.len()..];
-    let sigmas: Vec<f64> = own.parameters.iter().map(|parameter| parameter.prior_sigma).collect();
-    let Some((span, _)) = once::stretch(problem, &rest, slopes, &sigmas) else {
+    let (_, sigmas) = columns(library, own);
+    let residual = Residual::of(problem, &rest);
+    let Some((span, _)) = Tried::of(problem, slopes, sigmas).stretch(problem, &residual) else {
         return best;
     };
     let refined = passing(problem, library, set, &best.thetas, span.into());

@@ -4,13 +4,12 @@
 
 use super::{
     chosen::{Chosen, Rival},
-    intervals::{fitted, stretches},
+    intervals::{Passing, fitted, lent, stretches},
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::{is_any_same, without_its_physics},
 };
 use crate::{
     library::hypotheses::Library,
-    null::problem::Problem,
     search::gauss_newton::{Refined, refine},
 };
 
@@ -19,7 +18,7 @@ const FAR: f64 = 50.0;
 
 /// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
 pub(super) fn compare(
-    problem: &Problem,
+    passing: &Passing,
     library: &mut Library,
     scores: &[f64],
     set: &[usize],
@@ -27,6 +26,7 @@ pub(super) fn compare(
     nothing: f64,
     at: usize,
 ) -> Chosen {
+    let problem = passing.problem;
     let (mut others, mut thetas) = (set.to_vec(), best.thetas.clone());
     let own = others.remove(at);
     thetas.remove(at);
@@ -55,7 +55,10 @@ pub(super) fn compare(
     // the screen says nothing.
     let error = Some((own_gain - by_screen).abs()).filter(|error| error.is_finite());
     let far = own_gain - FAR - 2.0 * error.unwrap_or(0.0);
-    let stretches = stretches(problem, library, &others, &without, nothing, &mut linear);
+    let mut stretches = stretches(passing, library, (&others, &without), nothing, &mut linear);
+    if let Some(when) = library.hypotheses[own].once(problem.twin.starts_s()) {
+        lent(passing, library, (&others, &without), when, &mut stretches, &mut linear);
+    }
     let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
     let candidates = leading(&linear, CANDIDATES);
     for (number, rival) in candidates.iter().copied().enumerate() {
