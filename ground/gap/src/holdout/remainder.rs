@@ -9,6 +9,7 @@ use crate::{
     holdout::floor::floor,
     input::{case::Subject, log::Series, windows::Fit},
     null::{
+        interval::begins_s,
         model::Model,
         problem::{Component, Problem},
     },
@@ -17,10 +18,25 @@ use crate::{
 
 /// Judges all samples, or only those that were fitted.
 pub fn of_log(subject: &Subject, components: &[Component], setting: &Setting, only_fitted: bool) -> Remainder {
+    let starts_s = subject.twin.starts_s();
+    let begin_s = components
+        .iter()
+        .map(|component| begins_s(&component.active.cause, starts_s));
+    let begin_s: Vec<Option<f64>> = begin_s.collect();
+    let are_on = |row: u32| {
+        let t_s = starts_s[row as usize];
+        let own = components.iter().zip(&begin_s);
+        own.map(move |(component, begin_s)| {
+            component.span.is_none_or(|span| span.contains(t_s)) && begin_s.is_none_or(|begin_s| t_s >= begin_s)
+        })
+    };
     let pairs = subject.fit.channels.iter().zip(subject.held.samples());
     let all = Fit {
         channels: pairs
-            .map(|(fit, held)| if only_fitted { fit.clone() } else { merged(fit, held) })
+            .map(|(fit, held)| match only_fitted {
+                true => fit.clone(),
+                false => merged(fit, &told(fit, held, |before, after| are_on(before).eq(are_on(after)))),
+            })
             .collect(),
     };
     let mut problem = Problem::new(&subject.twin, &all, &subject.reference);
@@ -30,6 +46,25 @@ pub fn of_log(subject: &Subject, components: &[Component], setting: &Setting, on
     let model = Model::around(&problem, components.to_vec());
     let floor = floor(&problem, &model);
     remainder(&problem, &model, &floor, setting)
+}
+
+/// The held-out samples but for those between two fitted rows that are not `alike`.
+fn told(fit: &Series, held: &Series, are_alike: impl Fn(u32, u32) -> bool) -> Series {
+    let mut told = Series::default();
+    let mut latest: Option<(usize, bool)> = None;
+    for (row, value) in held.rows.iter().zip(&held.values) {
+        let after = fit.rows.partition_point(|fitted| fitted < row);
+        let is_told = match latest {
+            Some((place, is_told)) if place == after => is_told,
+            _ => after == 0 || after == fit.rows.len() || are_alike(fit.rows[after - 1], fit.rows[after]),
+        };
+        latest = Some((after, is_told));
+        if is_told {
+            told.rows.push(*row);
+            told.values.push(*value);
+        }
+    }
+    told
 }
 
 /// Samples of two sets of windows, which share none, in the order of their rows.
@@ -42,4 +77,27 @@ fn merged(one: &Series, other: &Series) -> Series {
     all.sort_by_key(|(row, _)| *row);
     let (rows, values) = all.into_iter().unzip();
     Series { rows, values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(rows: &[u32]) -> Series {
+        Series {
+            rows: rows.to_vec(),
+            values: rows.iter().map(|row| f64::from(*row)).collect(),
+        }
+    }
+
+    #[test]
+    fn between_fitted_rows_that_differ_nothing_is_told() {
+        let (fit, held) = (series(&[10, 11, 20, 21, 30]), series(&[5, 12, 19, 22, 29, 31]));
+        // On from row 15 on: nobody knows that it was not 12 or 20.
+        assert_eq!(
+            told(&fit, &held, |one, other| (one >= 15) == (other >= 15)),
+            series(&[5, 22, 29, 31])
+        );
+        assert_eq!(told(&fit, &held, |_, _| true), held);
+    }
 }

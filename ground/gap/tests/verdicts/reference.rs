@@ -131,6 +131,15 @@ fn named_in_turns(error: impl Fn(f64) -> f64) -> Vec<&'static str> {
     diagnosis.causes.iter().map(|cause| cause.effect).collect()
 }
 
+/// It begins in a window that judges, where no fit can tell when: what is said to be left is not what was placed wrongly.
+#[test]
+fn what_begins_between_fitted_windows_keeps_its_name() {
+    for begins_s in [193.0, 197.0] {
+        let named = named_in_turns(|t_s| if t_s > begins_s { 0.02 } else { 0.0 });
+        assert_eq!(named, ["gyro-supply"], "{begins_s} s");
+    }
+}
+
 /// A walk is a course that nobody knows, but one with the spectrum of a walk, and it says where the zero is between the windows. Not every walk
 /// moves far, and one that moves far resembles a supply that sags now and then; neither may have another name.
 #[test]
