@@ -47,13 +47,17 @@ const FELT: usize = 4;
 pub struct Memory {
     /// Low-passes beside the nominal channels' own.
     filters: Filters,
-    latest: Option<Latest>,
+    /// The latest questions of each channel, the latest last.
+    latest: Vec<Latest>,
     /// What the centre feels at other instants than the nominal channels', by these instants, the latest asked for last: all channels that
     /// are equally late feel the same, whatever they look at.
     felt: Vec<(Vec<f64>, Vec<Feel>)>,
 }
 
-/// The latest question of a channel that does not look as described.
+/// Questions of a channel that are kept: it may look along either way of three axes, and those who ask of exchanged axes ask in every order.
+const ASKED: usize = 6;
+
+/// A late question of a channel that does not look as described.
 struct Latest {
     channel: usize,
     look: Look,
@@ -122,16 +126,23 @@ impl Twin {
         rates
     }
 
-    fn latest<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a mut Latest {
+    fn latest<'a>(&self, channel: usize, look: Look, memory: &'a mut Memory) -> &'a Latest {
         let Memory { filters, latest, .. } = memory;
         let known = latest
-            .take()
-            .filter(|known| known.channel == channel && known.look == look);
-        latest.insert(known.unwrap_or_else(|| Latest {
-            channel,
-            input: self.filtered(&look, self.unit.channels[channel].tau_s(), filters),
-            look,
-        }))
+            .iter()
+            .position(|known| known.channel == channel && known.look == look);
+        let at = known.unwrap_or_else(|| {
+            let mut own = (0..latest.len()).filter(|at| latest[*at].channel == channel);
+            let oldest = own.next().filter(|_| own.count() + 1 >= ASKED);
+            oldest.map(|oldest| latest.remove(oldest));
+            latest.push(Latest {
+                channel,
+                input: self.filtered(&look, self.unit.channels[channel].tau_s(), filters),
+                look,
+            });
+            latest.len() - 1
+        });
+        &latest[at]
     }
 
     /// The input through a low-pass of `tau_s` and what the look has beside it; filters that are made for it are added to
