@@ -73,7 +73,7 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         .step_by(5)
         .collect();
     let instants: Vec<f64> = pairs.iter().map(|(t_s, _)| *t_s + slot).collect();
-    let covariances = smooth::covariances(&space, &motion, &instants);
+    let covariances = smooth::covariances(&space, &motion, space.open_parts(), &instants);
     let (mut square, mut nees, mut stated, mut worst) = (0.0, 0.0, 0.0, 0.0_f64);
     for (((_, feel), t_s), covariance) in pairs.iter().zip(&instants).zip(&covariances) {
         let error = (smoothed.trajectory.attitude(*t_s).inverse() * feel.q_nb).scaled_axis();

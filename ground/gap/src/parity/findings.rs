@@ -153,11 +153,14 @@ impl Findings {
         let chosen = search::choose(&space, &library, &residual, &seen, First::default(), &|share| {
             progress("search", share);
         });
+        // Columns of the library as they are offered: two thirds of what the memory holds, while the second look needs as many.
+        drop((offered, opened));
         let mut rivals = search::rivals(&library, &chosen);
         let by_parity = search::said(&chosen).into_iter();
         let mut causes: Vec<(Name, Fitted)> = by_parity
             .map(|one| Name::of(&problem, &library, one, By::Parity))
             .collect();
+        drop(library);
         let mut smoothed: Vec<Left> = Vec::new();
         let named: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
         if let Some(second) = Second::look(followed, withheld, &named, progress)? {

@@ -146,11 +146,11 @@ impl Followed {
         self.calibrated.get_or_init(|| calibrated.clone());
     }
 
-    /// A space about its smoothed motion, without nulls.
+    /// A space about its smoothed motion, without nulls; its calibration may be open still.
     pub fn space<'a>(&self, problem: &'a Problem<'a>, motion: &'a Smoothing) -> Space<'a> {
         match self.calibrated.get() {
             Some(known) => Space::known(problem, motion, known.clone()),
-            None => Space::new(problem, motion, Vec::new()),
+            None => Space::open_still(problem, motion, Vec::new()),
         }
     }
 }

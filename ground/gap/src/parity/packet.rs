@@ -31,6 +31,9 @@ pub const UNKNOWNS: usize = 16;
 /// Of the largest column: below it a column says the same as others.
 const RANK: f64 = 1e-9;
 
+/// Packets whose parts are taken from all channels before those of others: what a processor's cache holds of a hundred columns.
+const TOGETHER: usize = 32;
+
 /// Per channel and sample, the row of `Q` that belongs to it.
 pub struct Motion {
     /// Packets there are.
@@ -114,22 +117,37 @@ impl Elimination for Motion {
     }
 
     fn take(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
-        let channels = self.packet.par_iter().zip(&self.rows).zip(from);
-        channels.for_each(|((packets, rows), from)| {
-            let rows = rows.as_chunks::<UNKNOWNS>().0;
-            for (mut from, part) in from.column_iter_mut().zip(parts.column_iter()) {
-                let own = part.as_slice().as_chunks::<UNKNOWNS>().0;
-                for ((value, packet), row) in from.iter_mut().zip(packets).zip(rows) {
-                    *value -= own[*packet].iter().zip(row).map(|(part, q)| part * q).sum::<f64>();
+        for first in (0..self.packets).step_by(TOGETHER) {
+            let channels = self.packet.par_iter().zip(&self.rows).zip(&mut *from);
+            channels.for_each(|((packets, rows), from)| {
+                let before = |packet: usize| packets.partition_point(|own| *own < packet);
+                let samples = before(first)..before(first + TOGETHER);
+                let rows = &rows.as_chunks::<UNKNOWNS>().0[samples.clone()];
+                let packets = &packets[samples.clone()];
+                for (mut from, part) in from.column_iter_mut().zip(parts.column_iter()) {
+                    let own = part.as_slice().as_chunks::<UNKNOWNS>().0;
+                    let values = &mut from.as_mut_slice()[samples.clone()];
+                    for ((value, packet), row) in values.iter_mut().zip(packets).zip(rows) {
+                        *value -= dot(&own[*packet], row);
+                    }
                 }
-            }
-        });
+            });
+        }
     }
 
     fn free(&self, channel: usize) -> f64 {
         let taken: f64 = self.rows[channel].iter().map(|q| q * q).sum();
         self.packet[channel].len() as f64 - taken
     }
+}
+
+/// In four sums, of which none waits for the one before.
+fn dot(part: &[f64; UNKNOWNS], row: &[f64; UNKNOWNS]) -> f64 {
+    let mut sums = [0.0; 4];
+    for (parts, row) in part.as_chunks::<4>().0.iter().zip(row.as_chunks::<4>().0) {
+        (0..4).for_each(|at| sums[at] += parts[at] * row[at]);
+    }
+    sums.iter().sum()
 }
 
 /// An orthonormal basis of the columns, in the first so many columns of what is returned.

@@ -224,9 +224,8 @@ struct Taken {
 
 impl Taken {
     fn of(space: &Space, columns: Vec<Entries>, sigmas: Vec<f64>) -> Self {
-        let rest = |column: &Entries| space.rest(&space.project(column.clone()));
         Self {
-            rests: columns.iter().map(rest).collect(),
+            rests: space.rests(&columns),
             columns,
             sigmas,
         }
@@ -334,6 +333,7 @@ pub fn choose(
         .collect();
     let rest = space.rest(residual);
     let mut chosen: Vec<Chosen> = Vec::new();
+    let mut products = vec![Vec::new(); library.products.len()];
     let First { effects, mut taken } = first;
     while effects.len() + chosen.len() < MOST_CAUSES {
         progress(chosen.len() as f64 / MOST_CAUSES as f64);
@@ -351,7 +351,7 @@ pub fn choose(
             let Some(beside) = Beside::of(&taken, &rest) else {
                 break;
             };
-            let beside = |one: &&Seen| fit(one, beside.fit(library, one));
+            let beside = |one: &&Seen| fit(one, beside.fit(library, one, &mut products));
             others.iter().filter_map(beside).collect()
         };
         let Some(next) = likeliest(library, seen, &fits) else {
@@ -459,7 +459,9 @@ impl<'a> Beside<'a> {
         })
     }
 
-    fn fit(&self, library: &Library, seen: &Seen) -> Option<Fit> {
+    /// A hypothesis beside them. `products` are those of each column of the library with theirs, as far as they are known: many hypotheses
+    /// have a column in common.
+    fn fit(&self, library: &Library, seen: &Seen, products: &mut [Vec<f64>]) -> Option<Fit> {
         let places = library.hypotheses[seen.hypothesis].small();
         let (from, width) = (self.columns.len(), places.len());
         let sigmas = places.iter().map(|place| library.prior_sigmas[*place]);
@@ -473,16 +475,20 @@ impl<'a> Beside<'a> {
             .view_mut((from, from), (width, width))
             .copy_from(&seen.information);
         for (row, place) in places.iter().enumerate() {
-            for (column, rest) in self.rests.iter().enumerate() {
-                let product = dot(&library.products.column(*place), rest);
-                both.information[(from + row, column)] = product;
-                both.information[(column, from + row)] = product;
+            let known = &mut products[*place];
+            if known.len() < from {
+                let own = library.products.column(*place);
+                known.extend(self.rests[known.len()..].iter().map(|rest| dot(&own, rest)));
+            }
+            for (column, product) in known.iter().enumerate() {
+                both.information[(from + row, column)] = *product;
+                both.information[(column, from + row)] = *product;
             }
         }
         let mut parts = self.parts.clone();
         parts.push(from..from + width);
-        let gain = both.of_any_size(parts.clone())? - self.log_evidence;
-        both.settle(parts);
+        let of_other_sizes = both.settle(parts);
+        let gain = both.log_evidence()? + of_other_sizes - self.log_evidence;
         let estimate = both.estimate(&(0..from + width).collect::<Vec<_>>())?;
         let theta = estimate.parameters.rows(from, width).into_owned();
         Some(Fit {

@@ -34,7 +34,7 @@ pub mod tied;
 pub mod told;
 pub mod trajectory;
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3};
 use twin::{
     environment::Environment,
     predict::{Memory, Twin, UnitDescription},
@@ -54,7 +54,7 @@ use crate::{
         },
         smooth::{
             basis::Knots,
-            rows::{UNKNOWNS, past_s},
+            rows::past_s,
             smoothing::{Slopes, Smoothing},
             trajectory::{State, Trajectory},
         },
@@ -87,6 +87,12 @@ const LIGHT: f64 = 0.5;
 
 /// Part of a piece of a log in which a unit falls that is said to fall: what a burn or an entry adds at its ends tells no gravity either.
 const FALLS: f64 = 0.9;
+
+/// Share of the calibration's norm to which it is known in a step: one that moves the attitude by a millionth of its sigma.
+const NEAR: f64 = 1e-6;
+
+/// The same in a step after one so long that others will follow: an inexact step of Newton's (Dembo, Eisenstat and Steihaug 1982).
+const FAR: f64 = 1e-3;
 
 /// Knots a packet: two instants of field and force, and gyros between.
 const KNOTS_A_ROW: f64 = 2.0;
@@ -193,8 +199,9 @@ impl Smoothed {
     /// Steps until it has settled, or none helps any more.
     fn settle(&mut self, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {
         let until = self.turns.len() + MOST_STEPS;
+        let mut near = None;
         while self.turns.len() < until && !self.is_settled() {
-            if !self.steps(about, until, progress)? {
+            if !self.steps(about, until, &mut near, progress)? {
                 break;
             }
         }
@@ -203,21 +210,27 @@ impl Smoothed {
 
     /// Linearises about the trajectory, and steps as long as that holds. A step that makes the cost no smaller is halved; whether
     /// some part of each did.
-    fn steps(&mut self, about: &About, until: usize, progress: &dyn Fn(f64)) -> Result<bool, CaseError> {
+    fn steps(
+        &mut self,
+        about: &About,
+        until: usize,
+        near: &mut Near,
+        progress: &dyn Fn(f64),
+    ) -> Result<bool, CaseError> {
         let (log, course) = (about.log, (about.course, about.start));
         let (fit, reference) = (fit(log), Reference::default());
         let twin = self.twin(log, about.unit, about.environment)?;
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = self.smoothing(&problem, course.0, course.1);
-        let space = Space::new(&problem, &motion, Vec::new());
+        let mut space = Space::open_still(&problem, &motion, Vec::new());
         let mut now = self.at(&problem, log, course)?;
         let pieces = about.start.holes.pieces(&log.start_s);
         let mut turned = 0.0;
         while self.turns.len() < until && turned < LINEAR_RAD && !self.is_settled() {
             progress(self.turns.len() as f64 / MOST_STEPS as f64);
             let prior = motion.prior_of(now.prior.iter().copied(), now.track.as_ref());
-            let residual = space.project_residual(now.residuals, &prior);
-            let correction = motion.correction(&space.motion_part(&residual));
+            let part = motion_part(&mut space, now.residuals, &prior, near, self.turns.last());
+            let correction = motion.correction(&part);
             let turn = self.trajectory.turn(&self.knots, &correction, &pieces);
             self.turns.push(turn);
             turned += turn;
@@ -339,6 +352,34 @@ impl Smoothed {
     }
 }
 
+/// What marginalised the calibration about a motion nearby, where there was one.
+type Near = Option<Cholesky<f64, Dyn>>;
+
+/// The motion's part of what the calibration leaves of a residual, in a space in which that may be open still. From one motion to the next
+/// the calibration's matrix changes little, so the factor of one serves others. A step that will be followed by others need not be exact.
+fn motion_part(
+    space: &mut Space,
+    residual: Entries,
+    prior: &DVector<f64>,
+    near: &mut Near,
+    last: Option<&f64>,
+) -> DVector<f64> {
+    let share = if last.is_some_and(|turn| *turn > LINEAR_RAD) {
+        FAR
+    } else {
+        NEAR
+    };
+    let known = near.as_ref().filter(|_| space.factor().is_none());
+    if let Some(part) = known.and_then(|near| space.motion_part_near(&residual, prior, near, share)) {
+        return part;
+    }
+    if space.factor().is_none() {
+        space.marginalise();
+        *near = space.factor().cloned();
+    }
+    space.motion_part(&space.project_residual(residual, prior))
+}
+
 /// All rows of a log.
 pub fn fit(log: &Log) -> Fit {
     Fit {
@@ -347,19 +388,10 @@ pub fn fit(log: &Log) -> Fit {
 }
 
 /// Covariance of the attitude at instants \[s\]: of a turn in b \[rad2\], noise and calibration together.
-pub fn covariances(space: &Space, motion: &Smoothing, instants_s: &[f64]) -> Vec<Matrix3<f64>> {
-    let parts = space.open_parts();
-    let mut moved = DMatrix::zeros(parts.ncols(), 3 * instants_s.len());
-    for (at, part) in parts.column_iter().enumerate() {
-        let turned = motion.correction(&part.into_owned());
-        for (instant, t_s) in instants_s.iter().enumerate() {
-            let (first, weights) = motion.turn_rows(*t_s);
-            for axis in 0..3 {
-                let own = turned[UNKNOWNS * first..].iter().zip(&weights[axis]);
-                moved[(at, 3 * instant + axis)] = own.map(|(turned, weight)| turned * weight).sum();
-            }
-        }
-    }
+///
+/// `parts` are what the motion can imitate of calibration and nulls ([`Space::open_parts`]).
+pub fn covariances(space: &Space, motion: &Smoothing, parts: DMatrix<f64>, instants_s: &[f64]) -> Vec<Matrix3<f64>> {
+    let mut moved = motion.turned(parts, instants_s);
     space.open_factor(&mut moved);
     (instants_s.iter().enumerate())
         .map(|(instant, t_s)| {

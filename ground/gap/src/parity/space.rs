@@ -20,6 +20,15 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 pub use self::within::Opened;
 use crate::{library::products::Entries, null::problem::Problem};
 
+/// Columns that are taken through the motion, and rows that are solved for, at once: what a processor's cache holds.
+const AT_ONCE: usize = 64;
+
+/// Steps of conjugate gradients at most: so many cost half of a new factor.
+const MOST_NEAR: usize = 20;
+
+/// Steps after which it is seen whether so many will do.
+const TRIED: usize = 3;
+
 /// A motion that can be eliminated, whichever way it is described.
 pub trait Elimination {
     /// `Q'u` of columns, `Q` being orthonormal: what the motion can imitate of each, a column each.
@@ -63,7 +72,28 @@ pub struct Space<'a> {
 impl<'a> Space<'a> {
     /// Sets it up; `nulls` are columns for a standard deviation that leaves them free.
     pub fn new(problem: &'a Problem<'a>, motion: &'a dyn Elimination, nulls: Vec<Entries>) -> Self {
-        Self::among(problem, motion, nulls, &[]).0
+        let mut space = Self::open_still(problem, motion, nulls);
+        space.marginalise();
+        space
+    }
+
+    /// One in which only the motion is marginalised yet.
+    pub fn open_still(problem: &'a Problem<'a>, motion: &'a dyn Elimination, nulls: Vec<Entries>) -> Self {
+        let mut space = Self::known(problem, motion, DMatrix::zeros(0, 0));
+        space.nulls = nulls;
+        space
+    }
+
+    /// Marginalises calibration and nulls, and gives what the motion can imitate of each of their columns.
+    pub fn marginalise(&mut self) -> DMatrix<f64> {
+        let (inner, parts) = self.inner();
+        self.set(inner);
+        parts
+    }
+
+    /// What marginalises calibration and nulls, where it is known.
+    pub fn factor(&self) -> Option<&Cholesky<f64, Dyn>> {
+        self.factor.as_ref()
     }
 
     /// The same, and what calibration and nulls take of columns that are to be asked for.
@@ -73,8 +103,7 @@ impl<'a> Space<'a> {
         nulls: Vec<Entries>,
         columns: &[&Entries],
     ) -> (Self, Opened) {
-        let mut space = Self::known(problem, motion, DMatrix::zeros(0, 0));
-        space.nulls = nulls;
+        let mut space = Self::open_still(problem, motion, nulls);
         let (inner, mut open) = space.opened(columns);
         space.set(inner);
         space.open_factor(&mut open);
@@ -101,8 +130,7 @@ impl<'a> Space<'a> {
         nulls: Vec<Entries>,
         columns: &[&Entries],
     ) -> (Self, DMatrix<f64>, DMatrix<f64>) {
-        let mut space = Self::known(problem, motion, DMatrix::zeros(0, 0));
-        space.nulls = nulls;
+        let space = Self::open_still(problem, motion, nulls);
         let (inner, open) = space.opened(columns);
         (space, inner, open)
     }
@@ -202,6 +230,78 @@ impl<'a> Space<'a> {
         self.one_apart(&left, &projected.with_prior(self.part(&left)))
     }
 
+    /// The same of many columns.
+    pub fn rests(&self, columns: &[Entries]) -> Vec<Entries> {
+        columns.chunks(AT_ONCE).flat_map(|own| self.rests_of(own)).collect()
+    }
+
+    fn rests_of(&self, columns: &[Entries]) -> Vec<Entries> {
+        let own: Vec<&Entries> = columns.iter().collect();
+        let apart = self.entries(&own, &self.motion.parts(&own));
+        let left: Vec<Entries> = (columns.iter().zip(&apart))
+            .map(|(column, apart)| {
+                let mut open = self.plain(apart);
+                if let Some(factor) = &self.factor {
+                    factor.solve_mut(&mut open);
+                }
+                self.without(column, &open)
+            })
+            .collect();
+        let left: Vec<&Entries> = left.iter().collect();
+        self.entries(&left, &self.motion.parts(&left))
+    }
+
+    /// Columns without what the motion imitates of them, of which these are the parts.
+    fn entries(&self, columns: &[&Entries], parts: &DMatrix<f64>) -> Vec<Entries> {
+        let apart = self.apart(columns, parts);
+        let own = |at: usize| -> Entries {
+            let values = apart.iter().map(|values| values.column(at).into_owned());
+            values.enumerate().collect()
+        };
+        (0..columns.len()).map(own).collect()
+    }
+
+    /// The motion's part of what calibration and nulls leave of a residual, by conjugate gradients with the factor of a space about a motion
+    /// nearby, until what is left is this share of the whole; none where that motion is not near enough. `M c = b` with `M = I + C'(I - Q Q')C` costs a pass through the motion a step, and
+    /// `M` itself one for each of its columns (Golub and Van Loan, Matrix Computations, 11.5).
+    pub fn motion_part_near(
+        &self,
+        residual: &Entries,
+        prior: &DVector<f64>,
+        near: &Cholesky<f64, Dyn>,
+        enough: f64,
+    ) -> Option<DVector<f64>> {
+        let mut left = self.part(residual);
+        left.rows_mut(0, prior.len()).add_assign(prior);
+        let mut rest = self.plain(&self.one_apart(residual, &left));
+        if rest.len() != near.l_dirty().nrows() {
+            return None;
+        }
+        let mut steep = near.solve(&rest);
+        let mut along = steep.clone();
+        let whole = rest.dot(&steep);
+        let mut size = whole;
+        for step in 1..=MOST_NEAR {
+            let column = self.without(&Entries::new(), &-&along);
+            let part = self.part(&column);
+            let moved = &along + self.plain(&self.one_apart(&column, &part));
+            let share = size / along.dot(&moved);
+            left.axpy(-share, &part, 1.0);
+            rest.axpy(-share, &moved, 1.0);
+            steep = near.solve(&rest);
+            let before = std::mem::replace(&mut size, rest.dot(&steep));
+            let share = (size / whole).max(0.0).sqrt();
+            if size <= 0.0 || share <= enough {
+                return Some(left);
+            }
+            if step >= TRIED && share.powf(MOST_NEAR as f64 / step as f64) > enough {
+                return None;
+            }
+            along = &steep + along * (size / before);
+        }
+        None
+    }
+
     /// By how many of its own sigmas each parameter of the calibration is off, channel by channel, as this residual has it.
     pub fn calibration(&self, residual: &Projected) -> Vec<f64> {
         let own = self.problem.frames.iter().map(|frame| frame.nuisance.ncols()).sum();
@@ -220,8 +320,18 @@ impl<'a> Space<'a> {
     /// Variance and more of what calibration and nulls come to, as a factor: with rows `b` of what depends on them, in units of their sigmas,
     /// `L^-1 b` has the covariance as its inner products.
     pub fn open_factor(&self, right: &mut DMatrix<f64>) {
-        if let Some(factor) = &self.factor {
-            factor.l_dirty().solve_lower_triangular_mut(right);
+        let Some(factor) = &self.factor else {
+            return;
+        };
+        let (lower, size) = (factor.l_dirty(), right.nrows());
+        for first in (0..size).step_by(AT_ONCE) {
+            let next = size.min(first + AT_ONCE);
+            let (known, mut own) = right.rows_range_pair_mut(..first, first..next);
+            if first > 0 {
+                own.gemm(-1.0, &lower.view((first, 0), (next - first, first)), &known, 1.0);
+            }
+            let corner = lower.view((first, first), (next - first, next - first));
+            corner.solve_lower_triangular_mut(&mut own);
         }
     }
 
@@ -233,21 +343,36 @@ impl<'a> Space<'a> {
     /// What calibration and nulls leave of a residual, and what of each channel's calibration that costs: the energy of how far it
     /// must be off, in its own sigmas. Without it a calibration could explain anything at no price.
     fn left(&self, residual: &Projected) -> (Entries, Vec<f64>) {
+        let found = match self.factor {
+            Some(_) => self.open(residual),
+            None => DVector::zeros(self.size()),
+        };
+        let mut next = 0;
+        let price = self.problem.frames.iter().map(|frame| {
+            let own = found.rows(next, frame.nuisance.ncols());
+            next += frame.nuisance.ncols();
+            own.norm_squared()
+        });
+        (self.without(&residual.column, &found), price.collect())
+    }
+
+    /// Calibration and nulls there are.
+    fn size(&self) -> usize {
+        let calibration = self.problem.frames.iter().map(|frame| frame.nuisance.ncols());
+        calibration.sum::<usize>() + self.nulls.len()
+    }
+
+    /// A column in all channels, without what calibration and nulls of these sizes are.
+    fn without(&self, column: &Entries, found: &DVector<f64>) -> Entries {
         let nothing = (self.problem.frames.iter()).map(|frame| DVector::zeros(frame.weights.len()));
         let mut left: Entries = nothing.enumerate().collect();
-        for (channel, values) in &residual.column {
+        for (channel, values) in column {
             left[*channel].1.copy_from(values);
         }
-        let mut price = vec![0.0; self.problem.frames.len()];
-        if self.factor.is_none() {
-            return (left, price);
-        }
-        let found = self.open(residual);
         let mut next = 0;
         for (channel, frame) in self.problem.frames.iter().enumerate() {
             let own = found.rows(next, frame.nuisance.ncols());
             next += frame.nuisance.ncols();
-            price[channel] = own.norm_squared();
             left[channel].1.gemv(-1.0, &frame.nuisance, &own, 1.0);
         }
         for (null, size) in self.nulls.iter().zip(found.iter().skip(next)) {
@@ -255,7 +380,7 @@ impl<'a> Space<'a> {
                 left[*channel].1.axpy(-size, values, 1.0);
             }
         }
-        (left, price)
+        left
     }
 
     /// The motion's part of what calibration and nulls leave of a residual.

@@ -1,13 +1,26 @@
 //! Uniform B-splines of the fifth degree: four times continuously differentiable, so that an angular acceleration has a slope.
 //!
-//! In: an instant and an order of derivative. Out: the first of six coefficients that count there, and their weights. Cox and
-//! de Boor's recursion for equal knots (de Boor, A Practical Guide to Splines, 1978, chapter X): with `x` the part of the
-//! interval, `w_p[j] = ((x + p - j) w_(p-1)[j-1] + (1 + j - x) w_(p-1)[j]) / p`, and of a derivative `w'_p[j] = w_(p-1)[j-1] - w_(p-1)[j]`.
+//! In: an instant and an order of derivative. Out: the first of six coefficients that count there, and their weights. They are
+//! polynomials of the part `x` of the interval that is past, which Cox and de Boor's recursion makes for equal knots (de Boor, A
+//! Practical Guide to Splines, 1978, chapter X): `w_p[j] = ((x + p - j) w_(p-1)[j-1] + (1 + j - x) w_(p-1)[j]) / p`.
 
 /// Coefficients that count at an instant.
 pub const SUPPORT: usize = 6;
 
 const DEGREE: usize = SUPPORT - 1;
+
+/// Of each power of `x`, what it counts for in the six weights, times [`WHOLE`].
+const POWERS: [[f64; SUPPORT]; SUPPORT] = [
+    [1.0, 26.0, 66.0, 26.0, 1.0, 0.0],
+    [-5.0, -50.0, 0.0, 50.0, 5.0, 0.0],
+    [10.0, 20.0, -60.0, 20.0, 10.0, 0.0],
+    [-10.0, 20.0, 0.0, -20.0, 10.0, 0.0],
+    [5.0, -20.0, 30.0, -20.0, 5.0, 0.0],
+    [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0],
+];
+
+/// `5!`: the divisions of the recursion together.
+const WHOLE: f64 = 120.0;
 
 /// Where the knots are.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +56,7 @@ impl Knots {
     /// The interval of an instant, and the part of it that is past. Beyond the ends, the last polynomial goes on.
     fn place(&self, t_s: f64) -> (usize, f64) {
         let at = (t_s - self.from_s) / self.step_s;
-        let first = (at.floor().max(0.0) as usize).min(self.intervals - 1);
+        let first = (at.max(0.0) as usize).min(self.intervals - 1);
         (first, at - first as f64)
     }
 
@@ -51,23 +64,13 @@ impl Knots {
     pub fn weights(&self, t_s: f64, order: usize) -> (usize, [f64; SUPPORT]) {
         let (first, x) = self.place(t_s);
         let mut weights = [0.0; SUPPORT];
-        weights[0] = 1.0;
-        for degree in 1..=DEGREE - order {
-            let p = degree as f64;
-            for j in (0..=degree).rev() {
-                let before = if j > 0 { weights[j - 1] } else { 0.0 };
-                let own = if j < degree { weights[j] } else { 0.0 };
-                weights[j] = ((x + p - j as f64) * before + (1.0 + j as f64 - x) * own) / p;
-            }
+        for power in (order..=DEGREE).rev() {
+            // By deriving that often, a power brings these factors down.
+            let factor: f64 = (power - order + 1..=power).map(|factor| factor as f64).product();
+            let own = weights.iter_mut().zip(POWERS[power]);
+            own.for_each(|(weight, own)| *weight = *weight * x + factor * own);
         }
-        for degree in DEGREE - order + 1..=DEGREE {
-            for j in (0..=degree).rev() {
-                let before = if j > 0 { weights[j - 1] } else { 0.0 };
-                let own = if j < degree { weights[j] } else { 0.0 };
-                weights[j] = before - own;
-            }
-        }
-        let scale = self.step_s.powi(-(order as i32));
+        let scale = self.step_s.powi(-(order as i32)) / WHOLE;
         (first, weights.map(|weight| weight * scale))
     }
 }
@@ -104,6 +107,32 @@ mod tests {
                     (quotient - own).abs() < 1e-3 * (1.0 + own.abs()),
                     "{t_s} {order}: {quotient} {own}"
                 );
+            }
+        }
+    }
+
+    /// Cox and de Boor's recursion.
+    fn recursed(x: f64) -> [f64; SUPPORT] {
+        let mut weights = [0.0; SUPPORT];
+        weights[0] = 1.0;
+        for degree in 1..=DEGREE {
+            let p = degree as f64;
+            for j in (0..=degree).rev() {
+                let before = if j > 0 { weights[j - 1] } else { 0.0 };
+                weights[j] = ((x + p - j as f64) * before + (1.0 + j as f64 - x) * weights[j]) / p;
+            }
+        }
+        weights
+    }
+
+    #[test]
+    fn weights_are_those_of_the_recursion() {
+        // Within an interval, and beyond both ends.
+        for (t_s, interval, x) in [(1.234, 2, 0.34), (0.95, 0, -0.5), (3.05, 19, 1.5)] {
+            let (first, weights) = KNOTS.weights(t_s, 0);
+            assert_eq!(first, interval);
+            for (weight, recursed) in weights.iter().zip(recursed(x)) {
+                assert!((weight - recursed).abs() < 1e-9, "{t_s}: {weight} {recursed}");
             }
         }
     }

@@ -11,7 +11,7 @@ use crate::{
     null::problem::{Component, Problem},
     parity::{
         search::{Free, opened, residual_of},
-        smooth::{About, LONGEST_RAD, SETTLED_RAD, Smoothed, fit},
+        smooth::{About, LONGEST_RAD, SETTLED_RAD, Smoothed, fit, motion_part},
         space::Space,
     },
 };
@@ -29,13 +29,15 @@ impl Smoothed {
         let model: Vec<Component> = named.iter().map(|own| own.component.clone()).collect();
         let (fit, reference) = (fit(about.log), Reference::default());
         let pieces = about.start.holes.pieces(&about.log.start_s);
+        let mut near = None;
         for _ in 0..MOST_STEPS {
             let twin = bent.twin(about.log, about.unit, about.environment)?;
             let problem = Problem::new(&twin, &fit, &reference);
             let motion = bent.smoothing(&problem, about.course, about.start);
-            let space = Space::new(&problem, &motion, opened(&problem, named));
-            let residual = space.project_residual(residual_of(&problem, &model), &motion.prior());
-            let correction = motion.correction(&space.motion_part(&residual));
+            let mut space = Space::open_still(&problem, &motion, opened(&problem, named));
+            let residual = residual_of(&problem, &model);
+            let part = motion_part(&mut space, residual, &motion.prior(), &mut near, None);
+            let correction = motion.correction(&part);
             let turn = bent.trajectory.turn(&bent.knots, &correction, &pieces);
             bent.turns.push(turn);
             bent.trajectory

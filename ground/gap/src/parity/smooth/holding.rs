@@ -87,8 +87,9 @@ impl Smoothed {
         let problem = Problem::new(&twin, &fit, &reference);
         let falling = self.in_free_fall(&problem, about.course, about.start);
         let motion = falling.unwrap_or_else(|| self.smoothing(&problem, about.course, about.start));
-        let space = Space::new(&problem, &motion, Vec::new());
-        Ok(covariances(&space, &motion, instants_s))
+        let mut space = Space::open_still(&problem, &motion, Vec::new());
+        let parts = space.marginalise();
+        Ok(covariances(&space, &motion, parts, instants_s))
     }
 
     fn follow(&mut self, track: &Fixes, about: &About, progress: &dyn Fn(f64)) -> Result<(), CaseError> {

@@ -20,6 +20,8 @@
 //! fall, where no turn changes what accelerometers feel. Steps that have the smaller one no longer settle on a rocket, so they keep `g^2`; what
 //! the attitude is known to once it has settled has the slopes by a turn times `sqrt(min(1, |f| / g))` ([`Prior::known`]).
 
+use std::array::from_fn;
+
 use nalgebra::Vector3;
 
 use crate::{
@@ -65,18 +67,32 @@ pub fn off(
     knots: &Knots,
     rests: &[((f64, f64), f64)],
 ) -> Vec<f64> {
-    let priors = priors(starts_s, trajectory, course, knots, rests);
+    let priors = all(starts_s, trajectory, course, knots, rests, false);
     priors.map(|prior| prior.off).collect()
 }
 
 /// A row at an instant that says that something is none within a sigma, and is what it is. Of each term: the order of the derivative, the
 /// first of the three unknowns of a knot, and by how much each changes it.
 pub fn row(knots: &Knots, t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64) -> Prior {
-    let first = knots.weights(t_s, 0).0;
-    let mut slopes = vec![0.0; UNKNOWNS * SUPPORT];
+    let weights = |order: usize| knots.weights(t_s, order).1;
+    row_at(knots.weights(t_s, 0).0, &weights, terms, sigma, is)
+}
+
+/// The same where the first knot and the weights of each order are known.
+fn row_at(
+    first: usize,
+    weights: &dyn Fn(usize) -> [f64; SUPPORT],
+    terms: &[(usize, usize, Vector3<f64>)],
+    sigma: f64,
+    is: f64,
+) -> Prior {
+    let mut slopes = if terms.is_empty() {
+        Vec::new()
+    } else {
+        vec![0.0; UNKNOWNS * SUPPORT]
+    };
     for (order, from, by) in terms {
-        let (_, weights) = knots.weights(t_s, *order);
-        for (at, weight) in weights.iter().enumerate() {
+        for (at, weight) in weights(*order).iter().enumerate() {
             (0..3).for_each(|axis| slopes[UNKNOWNS * at + from + axis] += weight * by[axis] / sigma);
         }
     }
@@ -92,9 +108,21 @@ pub fn row(knots: &Knots, t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigm
 pub fn priors<'a>(
     starts_s: &'a [f64],
     trajectory: &'a Trajectory,
+    course: (&'a Course, &'a Start),
+    knots: &'a Knots,
+    rests: &'a [((f64, f64), f64)],
+) -> impl Iterator<Item = Prior> + 'a {
+    all(starts_s, trajectory, course, knots, rests, true)
+}
+
+/// All rows, without slopes where only what they are off by is asked for.
+fn all<'a>(
+    starts_s: &'a [f64],
+    trajectory: &'a Trajectory,
     (course, start): (&'a Course, &'a Start),
     knots: &'a Knots,
     rests: &'a [((f64, f64), f64)],
+    has_slopes: bool,
 ) -> impl Iterator<Item = Prior> + 'a {
     let row = move |t_s: f64| {
         starts_s
@@ -102,11 +130,13 @@ pub fn priors<'a>(
             .min(starts_s.len() - 1)
     };
     let pieces = start.holes.pieces(starts_s);
-    let one = move |t_s: f64, terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64| {
-        self::row(knots, t_s, terms, sigma, is)
-    };
     (0..knots.intervals).flat_map(move |interval| {
         let t_s = knots.from_s + (interval as f64 + 0.5) * knots.step_s;
+        let weights: [(usize, [f64; SUPPORT]); 4] = from_fn(|order| knots.weights(t_s, order));
+        let one = move |terms: &[(usize, usize, Vector3<f64>)], sigma: f64, is: f64| {
+            let terms = if has_slopes { terms } else { &[] };
+            row_at(weights[0].0, &|order| weights[order].1, terms, sigma, is)
+        };
         let [bend, jerk] = trajectory.changes(t_s);
         let row = row(t_s);
         let loose = if turning::is_in_hole(&pieces, t_s) { LOOSE } else { 1.0 };
@@ -127,7 +157,6 @@ pub fn priors<'a>(
                 (0, 0, e.cross(&bend)),
             ];
             let turn = one(
-                t_s,
                 &turn,
                 loose * course.rate_dot_sigmas[row] / start.knot_s,
                 counts * bend[axis],
@@ -139,12 +168,12 @@ pub fn priors<'a>(
                 (1, 0, by_rate),
                 (0, 0, by_rate.cross(&w)),
             ];
-            let moved = one(t_s, &moved, loose * course.jerk_sigmas[row], counts * jerk[axis]);
+            let moved = one(&moved, loose * course.jerk_sigmas[row], counts * jerk[axis]);
             let acc_sigma = rest.map_or(loose * start.acc_sigmas[row], |(_, sigma)| *sigma);
             let still = [(0, 3, e), (0, 0, e.cross(&(acceleration - f)))];
             let still = Prior {
                 turning,
-                ..one(t_s, &still, acc_sigma, counts * acceleration[axis])
+                ..one(&still, acc_sigma, counts * acceleration[axis])
             };
             [turn, moved, still]
         })

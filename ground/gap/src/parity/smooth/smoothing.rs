@@ -19,7 +19,7 @@ use crate::{
     library::products::Entries,
     null::problem::Problem,
     parity::smooth::{
-        banded::{Banded, Factor, Inverse, LANES},
+        banded::{Banded, Factor, Inverse, LANES, Panel},
         basis::Knots,
         prior::{Prior, priors},
         rows::{Rows, UNKNOWNS, width},
@@ -32,6 +32,9 @@ use crate::{
         space::Elimination,
     },
 };
+
+/// Rows of a panel that are filled and emptied before others: what the first of a processor's caches holds.
+const TOGETHER: usize = 64;
 
 /// Which slopes of the prior rows are in the normal matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +57,8 @@ pub struct Smoothing {
     /// Rows of the log, and of each thermometer the row of every sample and its part of the temperature.
     log_rows: usize,
     warm: Vec<Vec<(usize, f64)>>,
+    /// Degrees of freedom of each channel, made when first asked for.
+    free: Vec<OnceLock<f64>>,
 }
 
 impl Smoothing {
@@ -100,6 +105,7 @@ impl Smoothing {
             tie: None,
             log_rows: problem.twin.starts_s().len(),
             warm: warm(problem),
+            free: vec![OnceLock::new(); problem.frames.len()],
         }
     }
 
@@ -153,10 +159,41 @@ impl Smoothing {
         solved
     }
 
+    /// What the turn in b at instants \[s\] comes to with parts: a row a part, three columns an instant.
+    pub fn turned(&self, mut parts: DMatrix<f64>, instants_s: &[f64]) -> DMatrix<f64> {
+        let (size, count) = (self.factor.size(), parts.ncols());
+        if let Some((tie, _)) = &self.tie {
+            tie.apply(&mut parts.view_mut((0, 0), (size, count)));
+        }
+        let places: Vec<_> = instants_s.iter().map(|t_s| self.knots.weights(*t_s, 0)).collect();
+        let mut turned = DMatrix::zeros(count, 3 * instants_s.len());
+        self.each_correction::<LANES>(&parts, &mut |from, panel| {
+            for (instant, (first, weights)) in places.iter().enumerate() {
+                for axis in 0..3 {
+                    let mut sums = [0.0; LANES];
+                    for (at, weight) in weights.iter().enumerate() {
+                        let own = &panel[UNKNOWNS * (first + at) + axis];
+                        sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * weight);
+                    }
+                    let mut column = turned.column_mut(3 * instant + axis);
+                    let rows = column.iter_mut().skip(from).zip(sums);
+                    rows.for_each(|(turned, sum)| *turned = sum);
+                }
+            }
+        });
+        turned
+    }
+
     /// Covariance of the turn at an instant \[rad2\] with the calibration known.
     pub fn covariance(&self, t_s: f64) -> [[f64; 3]; 3] {
         let (first, own) = self.turn_rows(t_s);
         from_fn(|one| from_fn(|other| self.between(UNKNOWNS * first, &own[one], &own[other])))
+    }
+
+    /// `own' N^-1 own` with everything in `N`.
+    fn around(&self, first: usize, own: &[f64]) -> f64 {
+        let less = self.tie.as_ref().map_or(0.0, |(tie, _)| tie.less(first, own, own));
+        self.inverse().around(first, own) - less
     }
 
     /// `one' N^-1 other` with everything in `N`.
@@ -178,10 +215,9 @@ impl Smoothing {
 }
 
 impl Smoothing {
-    /// `A'u`, and behind it what a column is along the temperatures.
-    fn seen(&self, column: &Entries) -> Vec<f64> {
+    /// Adds `A'u`, and behind it what a column is along the temperatures.
+    fn see(&self, column: &Entries, seen: &mut [f64]) {
         let size = self.factor.size();
-        let mut seen = vec![0.0; size + self.log_rows];
         for (channel, values) in column {
             let own = &self.rows[*channel];
             let samples = own.first.iter().zip(own.slopes.chunks_exact(own.width()));
@@ -197,7 +233,6 @@ impl Smoothing {
                 seen[size + row] += share * value;
             }
         }
-        seen
     }
 }
 
@@ -205,20 +240,10 @@ impl Elimination for Smoothing {
     fn parts(&self, columns: &[&Entries]) -> DMatrix<f64> {
         let size = self.factor.size();
         let mut parts = DMatrix::zeros(size + self.log_rows, columns.len());
-        let rows = size + self.log_rows;
-        let blocks = parts.as_mut_slice().par_chunks_mut(LANES * rows);
-        blocks.zip(columns.par_chunks(LANES)).for_each(|(parts, columns)| {
-            let mut panel = vec![[0.0; LANES]; size];
-            for (lane, (column, part)) in columns.iter().zip(parts.chunks_exact_mut(rows)).enumerate() {
-                let seen = self.seen(column);
-                panel.iter_mut().zip(&seen).for_each(|(row, own)| row[lane] = *own);
-                part[size..].copy_from_slice(&seen[size..]);
-            }
-            self.factor.forward(&mut panel);
-            for (lane, part) in parts.chunks_exact_mut(rows).enumerate() {
-                part.iter_mut().zip(&panel).for_each(|(own, row)| *own = row[lane]);
-            }
-        });
+        match columns.len() {
+            1 => self.parts_in::<1>(columns, &mut parts),
+            _ => self.parts_in::<LANES>(columns, &mut parts),
+        }
         if let Some((tie, _)) = &self.tie {
             tie.apply(&mut parts.view_mut((0, 0), (size, columns.len())));
         }
@@ -233,31 +258,84 @@ impl Elimination for Smoothing {
             own
         });
         let parts = tied.as_ref().unwrap_or(parts);
-        let mut panel = vec![[0.0; LANES]; size];
-        for block in 0..parts.ncols().div_ceil(LANES) {
-            let lanes = LANES * block..parts.ncols().min(LANES * (block + 1));
-            for (lane, at) in lanes.clone().enumerate() {
-                let part = parts.column(at);
-                panel
-                    .iter_mut()
-                    .zip(part.as_slice())
-                    .for_each(|(row, own)| row[lane] = *own);
-            }
-            self.factor.backward(&mut panel);
-            let channels = self.rows.par_iter().zip(&self.warm).zip(&mut *from);
-            channels.for_each(|((own, warm), from)| {
-                for (sample, (row, share)) in warm.iter().enumerate() {
-                    (lanes.clone()).for_each(|at| from[(sample, at)] -= share * parts[(size + row, at)]);
-                }
-                for (sample, first) in own.first.iter().enumerate() {
-                    let values = own.of(sample, &panel[UNKNOWNS * first..]);
-                    (lanes.clone().zip(values)).for_each(|(at, value)| from[(sample, at)] -= value);
-                }
-            });
+        match parts.ncols() {
+            1 => self.take_in::<1>(parts, from),
+            _ => self.take_in::<LANES>(parts, from),
         }
     }
 
     fn free(&self, channel: usize) -> f64 {
+        *self.free[channel].get_or_init(|| self.free_of(channel))
+    }
+}
+
+impl Smoothing {
+    /// `L^-1 A'u` of columns, so many at a time, and what they are along the temperatures.
+    fn parts_in<const N: usize>(&self, columns: &[&Entries], parts: &mut DMatrix<f64>) {
+        let (size, rows) = (self.factor.size(), parts.nrows());
+        let blocks = parts.as_mut_slice().par_chunks_mut(N * rows);
+        blocks.zip(columns.par_chunks(N)).for_each(|(parts, columns)| {
+            // What begins within the log is nothing before.
+            let mut begun = size;
+            for (column, part) in columns.iter().zip(parts.chunks_exact_mut(rows)) {
+                self.see(column, part);
+                begun = part[..begun].iter().position(|own| *own != 0.0).unwrap_or(begun);
+            }
+            let mut panel = vec![[0.0; N]; size];
+            for (rows_of_panel, panel) in panel.chunks_mut(TOGETHER).enumerate() {
+                for (lane, part) in parts.chunks_exact(rows).enumerate() {
+                    let own = panel.iter_mut().zip(&part[TOGETHER * rows_of_panel..]);
+                    own.for_each(|(row, own)| row[lane] = *own);
+                }
+            }
+            self.factor.forward_from(begun, &mut panel);
+            for (rows_of_panel, panel) in panel.chunks(TOGETHER).enumerate() {
+                for (lane, part) in parts.chunks_exact_mut(rows).enumerate() {
+                    let own = part[TOGETHER * rows_of_panel..].iter_mut().zip(panel);
+                    own.for_each(|(own, row)| *own = row[lane]);
+                }
+            }
+        });
+    }
+
+    /// `L^-T` of parts, so many at a time, with the panel of each and the first of its columns.
+    pub fn each_correction<const N: usize>(&self, parts: &DMatrix<f64>, with: &mut dyn FnMut(usize, &Panel<N>)) {
+        let size = self.factor.size();
+        let mut panel = vec![[0.0; N]; size];
+        for first in (0..parts.ncols()).step_by(N) {
+            let own = parts.columns_range(first..parts.ncols().min(first + N));
+            for (rows_of_panel, panel) in panel.chunks_mut(TOGETHER).enumerate() {
+                for (lane, part) in own.column_iter().enumerate() {
+                    let own = panel.iter_mut().zip(&part.as_slice()[TOGETHER * rows_of_panel..]);
+                    own.for_each(|(row, own)| row[lane] = *own);
+                }
+            }
+            self.factor.backward(&mut panel);
+            with(first, &panel);
+        }
+    }
+
+    fn take_in<const N: usize>(&self, parts: &DMatrix<f64>, from: &mut [DMatrix<f64>]) {
+        let size = self.factor.size();
+        self.each_correction::<N>(parts, &mut |first, panel| {
+            let channels = self.rows.par_iter().zip(&self.warm).zip(&mut *from);
+            channels.for_each(|((own, warm), from)| {
+                let samples = from.nrows().max(1);
+                let values: Vec<[f64; N]> = (own.first.iter().enumerate())
+                    .map(|(sample, first)| own.of(sample, &panel[UNKNOWNS * first..]))
+                    .collect();
+                let columns = from.as_mut_slice().chunks_exact_mut(samples);
+                for (lane, (column, part)) in columns.zip(parts.column_iter()).skip(first).take(N).enumerate() {
+                    let warm = column.iter_mut().zip(warm);
+                    warm.for_each(|(value, (row, share))| *value -= share * part[size + row]);
+                    let moved = column.iter_mut().zip(&values);
+                    moved.for_each(|(value, moved)| *value -= moved[lane]);
+                }
+            });
+        });
+    }
+
+    fn free_of(&self, channel: usize) -> f64 {
         if !self.warm[channel].is_empty() {
             let taken: f64 = self.warm[channel].iter().map(|(_, share)| share * share).sum();
             return self.warm[channel].len() as f64 - taken;
@@ -267,7 +345,7 @@ impl Elimination for Smoothing {
         let taken: f64 = (0..own.first.len())
             .map(|sample| {
                 let slopes = own.whole(sample, &mut whole);
-                self.between(UNKNOWNS * own.first[sample], slopes, slopes)
+                self.around(UNKNOWNS * own.first[sample], slopes)
             })
             .sum();
         own.first.len() as f64 - taken

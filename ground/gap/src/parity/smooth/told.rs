@@ -140,21 +140,28 @@ impl Told {
             Some(another) => another,
             None => followed.motion(smoothed, &problem),
         };
-        let free = opened(&problem, named);
-        let space = match free.is_empty() && another.is_none() {
-            true => followed.space(&problem, motion),
-            false => Space::new(&problem, motion, free.clone()),
-        };
         if let Some((_, sigma_s)) = &mut told.track {
             *sigma_s = motion.offset_sigma_s();
         }
         let log = &followed.log;
         let covariances = match followed.in_free_fall(smoothed, &problem) {
             Some(falling) => {
-                let space = Space::new(&problem, &falling, free);
-                covariances(&space, &falling, &log.start_s)
+                let mut space = Space::open_still(&problem, &falling, opened(&problem, named));
+                let parts = space.marginalise();
+                covariances(&space, &falling, parts, &log.start_s)
             }
-            None => covariances(&space, motion, &log.start_s),
+            None => {
+                let free = opened(&problem, named);
+                let mut space = match free.is_empty() && another.is_none() {
+                    true => followed.space(&problem, motion),
+                    false => Space::open_still(&problem, motion, free),
+                };
+                let parts = match space.factor() {
+                    Some(_) => space.open_parts(),
+                    None => space.marginalise(),
+                };
+                covariances(&space, motion, parts, &log.start_s)
+            }
         };
         let lost = smoothed.lost(&log.start_s, followed.holes());
         let is_lost = |t_s: f64| lost.iter().any(|(from_s, to_s)| (*from_s..=*to_s).contains(&t_s));

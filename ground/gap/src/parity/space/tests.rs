@@ -156,11 +156,19 @@ fn an_inner_product_is_that_of_the_dense_marginal_covariance() {
     });
 }
 
-/// Both ways to eliminate a motion, and columns that touch one channel, a plate and all.
+/// Both ways to eliminate a motion, and columns that touch one channel, a plate and all, a third of which begin within the log.
 fn eliminated(check: impl Fn(&str, &Problem, &dyn Elimination, &[&Entries])) {
     posed(30, |problem, library, course| {
         let columns: Vec<_> = (0..library.products.len())
-            .map(|place| library.products.column(place))
+            .map(|place| {
+                let mut column = library.products.column(place);
+                if place % 3 == 0 {
+                    column
+                        .iter_mut()
+                        .for_each(|(_, values)| values.rows_mut(0, 10 + place % 9).fill(0.0));
+                }
+                column
+            })
             .collect();
         let columns: Vec<&Entries> = columns.iter().collect();
         // More than are solved together, and no multiple.
@@ -264,5 +272,81 @@ fn what_one_plate_has_of_its_own_keeps_what_the_others_cannot_imitate() {
         let (iron, scale) = (of("hard-iron"), of("accel-scale"));
         assert!((0.84..0.97).contains(&iron), "{iron}");
         assert!((0.45..0.9).contains(&scale), "{scale}");
+    });
+}
+
+#[test]
+fn what_many_columns_leave_is_what_each_leaves_alone() {
+    eliminated(|which, problem, motion, columns| {
+        let space = Space::new(problem, motion, Vec::new());
+        let own: Vec<Entries> = columns.iter().map(|own| (*own).clone()).collect();
+        for (at, (column, together)) in own.iter().zip(space.rests(&own)).enumerate() {
+            let alone = space.rest(&space.project(column.clone()));
+            for ((_, together), (_, alone)) in together.iter().zip(&alone) {
+                let off = (together - alone).amax();
+                assert!(off < 1e-9 * alone.amax().max(1.0), "{which} {at}: {off}");
+            }
+        }
+    });
+}
+
+#[test]
+fn what_each_column_keeps_is_the_same_among_all_others() {
+    eliminated(|which, problem, motion, columns| {
+        let (among, opened) = Space::among(problem, motion, Vec::new(), columns);
+        // No set stands beside all those that it shares a column with.
+        let sets: Vec<Vec<usize>> = (0..columns.len())
+            .map(|at| vec![at, (7 * at) % columns.len()])
+            .collect();
+        let within = among.within(columns, &opened, &sets, &|_| ());
+        let alone = Space::new(problem, motion, Vec::new());
+        for (set, inner) in sets.iter().zip(&within) {
+            let (u, v) = (columns[set[0]], columns[set[1]]);
+            let expected = dot(u, &alone.rest(&alone.project(v.clone())));
+            let scale = (kept(&alone, u) * kept(&alone, v)).sqrt();
+            let found = inner[(0, 1)];
+            assert!(
+                (found - expected).abs() < ROUNDING * scale.max(1e-3),
+                "{which} {set:?}: {found} {expected}"
+            );
+        }
+    });
+}
+
+#[test]
+fn a_calibration_is_the_same_whichever_way_it_is_marginalised() {
+    eliminated(|which, problem, motion, columns| {
+        let (among, _) = Space::among(problem, motion, Vec::new(), columns);
+        let alone = Space::new(problem, motion, Vec::new());
+        let off = (among.calibrated() - alone.calibrated()).amax();
+        assert!(off < 1e-9 * alone.calibrated().amax(), "{which}: {off}");
+    });
+}
+
+#[test]
+fn a_factor_from_nearby_gives_what_its_own_gives_and_one_from_far_away_nothing_else() {
+    eliminated(|which, problem, motion, columns| {
+        let space = Space::new(problem, motion, Vec::new());
+        let residual = columns[columns.len() / 2].clone();
+        let none = DVector::zeros(0);
+        let expected = space.motion_part(&space.project_residual(residual.clone(), &none));
+        let inner = space.calibrated().clone();
+        let nearby = DMatrix::from_fn(inner.nrows(), inner.ncols(), |row, column| {
+            let share = if row == column { 1.1 } else { 1.0 };
+            share * inner[(row, column)]
+        });
+        let size = expected.amax().max(1.0);
+        let part = |near: DMatrix<f64>| {
+            let near = Cholesky::new(near).expect("positive");
+            space.motion_part_near(&residual, &none, &near, 1e-9)
+        };
+        let found = part(nearby).expect("near enough");
+        assert!((&found - &expected).amax() < 1e-6 * size, "{which}");
+        let far = part(DMatrix::identity(inner.nrows(), inner.ncols()));
+        assert!(
+            far.is_none_or(|found| (&found - &expected).amax() < 1e-6 * size),
+            "{which}, far"
+        );
+        assert!(part(DMatrix::identity(1, 1)).is_none(), "{which}, of another size");
     });
 }

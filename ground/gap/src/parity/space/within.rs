@@ -1,7 +1,7 @@
 //! Inner products of many columns with each other, motion and calibration marginalised.
 //!
 //! In: columns, and sets of them. Out: `<u, v>` within each set. Two things make it cheap. The parts of the motion are made for many
-//! columns at once, and no longer kept than their set needs them. And what the calibration takes of a column, `C'(I - Q Q')u`, is
+//! columns at once, and no longer kept than the sets need them that have columns in common. And what the calibration takes of a column, `C'(I - Q Q')u`, is
 //! taken from the other side: `(I - Q Q')C` is made once, a block of its columns at a time, and of it a column `u` needs only the few
 //! channels that it touches, while `(I - Q Q')u` has samples in all.
 
@@ -10,17 +10,25 @@ use rayon::prelude::*;
 
 use crate::{
     library::products::Entries,
-    parity::space::{Space, dot},
+    parity::space::{AT_ONCE, Space, dot},
 };
 
-/// Columns of calibration and nulls whose samples in all channels are held at once: 30 MiB for five minutes of packets.
-const BLOCK: usize = 64;
-
-/// The same where nothing else is asked for: what a processor's cache holds.
-const LEAST: usize = 16;
+/// Columns of calibration and nulls whose samples in all channels are held at once: 60 MiB for five minutes of packets. Each time all columns
+/// that are asked for are gone through.
+const BLOCK: usize = 128;
 
 /// Columns whose parts in the motion are held at once, unless one set has more: 20 MiB for five minutes of packets.
 const HELD: usize = 128;
+
+/// A column in a channel that it touches.
+#[derive(Clone, Copy)]
+struct Touching<'a> {
+    /// Its place.
+    at: usize,
+    /// The first sample that is not zero.
+    begun: usize,
+    values: &'a DVector<f64>,
+}
 
 /// `c_u` of columns, a column each.
 pub struct Opened(pub(super) DMatrix<f64>);
@@ -33,7 +41,7 @@ impl Opened {
 }
 
 impl Space<'_> {
-    /// `<u, v>` of the columns of each set, which names them by their places; sets that share columns stand side by side.
+    /// `<u, v>` of the columns of each set, which names them by their places.
     pub fn within(
         &self,
         columns: &[&Entries],
@@ -41,11 +49,13 @@ impl Space<'_> {
         sets: &[Vec<usize>],
         progress: &dyn Fn(f64),
     ) -> Vec<DMatrix<f64>> {
-        let mut inner = Vec::with_capacity(sets.len());
-        while inner.len() < sets.len() {
+        let order = side_by_side(columns.len(), sets);
+        let mut inner = vec![DMatrix::zeros(0, 0); sets.len()];
+        let mut done = 0;
+        while done < sets.len() {
             let mut places: Vec<usize> = Vec::new();
-            let mut last = inner.len();
-            while let Some(set) = sets.get(last) {
+            let mut last = done;
+            while let Some(set) = order.get(last).map(|at| &sets[*at]) {
                 let known = places.len();
                 let mut with = places.clone();
                 with.extend(set);
@@ -59,7 +69,7 @@ impl Space<'_> {
             }
             let held: Vec<&Entries> = places.iter().map(|place| columns[*place]).collect();
             let parts = self.motion.parts(&held);
-            for set in &sets[inner.len()..last] {
+            for (place, set) in order[done..last].iter().map(|place| (*place, &sets[*place])) {
                 let at: Vec<usize> = set
                     .iter()
                     .map(|place| places.partition_point(|own| own < place))
@@ -73,9 +83,10 @@ impl Space<'_> {
                     }
                 }
                 own.fill_upper_triangle_with_lower_triangle();
-                inner.push(own);
+                inner[place] = own;
             }
-            progress(inner.len() as f64 / sets.len() as f64);
+            done = last;
+            progress(done as f64 / sets.len() as f64);
         }
         inner
     }
@@ -83,19 +94,21 @@ impl Space<'_> {
     /// `I + C'(I - Q Q')C`, and `C'(I - Q Q')u` of each column.
     pub(super) fn opened(&self, columns: &[&Entries]) -> (DMatrix<f64>, DMatrix<f64>) {
         let frames = &self.problem.frames;
-        let mut touching: Vec<Vec<(usize, &DVector<f64>)>> = vec![Vec::new(); frames.len()];
+        let mut touching: Vec<Vec<Touching>> = vec![Vec::new(); frames.len()];
         for (at, column) in columns.iter().enumerate() {
-            for (channel, values) in column.iter().filter(|(_, values)| values.iter().any(|own| *own != 0.0)) {
-                touching[*channel].push((at, values));
+            for (channel, values) in column.iter() {
+                if let Some(begun) = values.iter().position(|own| *own != 0.0) {
+                    touching[*channel].push(Touching { at, begun, values });
+                }
             }
         }
+        // What begins late stands side by side, so that what is nothing before it is left out for many at once.
+        touching.iter_mut().for_each(|own| own.sort_by_key(|own| own.begun));
         let calibration: usize = frames.iter().map(|frame| frame.nuisance.ncols()).sum();
         let size = calibration + self.nulls.len();
         let mut inner = DMatrix::identity(size, size);
         let mut open = DMatrix::zeros(size, columns.len());
-        // Every block goes through all columns that are asked for.
-        let block = if columns.is_empty() { LEAST } else { BLOCK };
-        self.each_apart(block, &mut |from, apart| {
+        self.each_apart(&mut |from, apart| {
             let before = frames.iter().scan(0, |known, frame| {
                 *known += frame.nuisance.ncols();
                 Some(*known - frame.nuisance.ncols())
@@ -112,9 +125,11 @@ impl Space<'_> {
                     own
                 });
                 let products = touching[channel].chunks(HELD).map(|touching| {
-                    let mut values = DMatrix::zeros(apart.ncols(), touching.len());
-                    (touching.iter().enumerate()).for_each(|(at, (_, own))| values.set_column(at, own));
-                    &apart * values
+                    let begun = touching.first().map_or(0, |own| own.begun);
+                    let samples = apart.ncols() - begun;
+                    let columns = touching.iter().map(|own| own.values.rows(begun, samples));
+                    let values = DMatrix::from_columns(&columns.collect::<Vec<_>>());
+                    apart.columns(begun, samples) * values
                 });
                 (own, products.collect::<Vec<DMatrix<f64>>>())
             };
@@ -124,8 +139,8 @@ impl Space<'_> {
                     inner.view_mut((from, before[channel]), own.shape()).copy_from(&own);
                 }
                 let products = products.iter().flat_map(|product| product.column_iter());
-                for ((place, _), product) in touching[channel].iter().zip(products) {
-                    let mut sum = open.view_mut((from, *place), (product.len(), 1));
+                for (Touching { at, .. }, product) in touching[channel].iter().zip(products) {
+                    let mut sum = open.view_mut((from, *at), (product.len(), 1));
                     sum += product;
                 }
             }
@@ -141,12 +156,60 @@ impl Space<'_> {
         (inner, open)
     }
 
+    /// `I + C'(I - Q Q')C`, and what the motion can imitate of each column of `C`: where nothing else is asked for, no samples of `(I - Q Q')C`
+    /// have to be made.
+    pub(super) fn inner(&self) -> (DMatrix<f64>, DMatrix<f64>) {
+        let parts = self.open_parts();
+        let size = parts.ncols();
+        let mut inner = DMatrix::identity(size, size);
+        let mut known = 0;
+        for frame in &self.problem.frames {
+            let own = frame.nuisance.ncols();
+            let mut view = inner.view_mut((known, known), (own, own));
+            view.gemm(1.0, &frame.nuisance.transpose(), &frame.nuisance, 1.0);
+            known += own;
+        }
+        for (null, column) in self.nulls.iter().enumerate() {
+            let mut row = inner.row_mut(known + null);
+            row += self.plain(column).transpose();
+        }
+        for first in (0..size).step_by(AT_ONCE) {
+            let next = size.min(first + AT_ONCE);
+            let own = parts.columns_range(first..next).transpose();
+            let mut view = inner.view_mut((first, 0), (next - first, next));
+            view.gemm(-1.0, &own, &parts.columns_range(..next), 1.0);
+        }
+        inner.fill_upper_triangle_with_lower_triangle();
+        (inner, parts)
+    }
+
     /// Gives calibration and nulls without what the motion imitates of them, so many columns at a time: the first of them, and the samples
     /// of each channel.
-    fn each_apart(&self, block: usize, with: &mut dyn FnMut(usize, &[DMatrix<f64>])) {
-        for (at, columns) in self.columns().chunks(block).enumerate() {
+    fn each_apart(&self, with: &mut dyn FnMut(usize, &[DMatrix<f64>])) {
+        for (at, columns) in self.columns().chunks(BLOCK).enumerate() {
             let columns: Vec<&Entries> = columns.iter().collect();
-            with(block * at, &self.apart(&columns, &self.motion.parts(&columns)));
+            with(BLOCK * at, &self.apart(&columns, &self.motion.parts(&columns)));
         }
     }
+}
+
+/// Sets in an order in which those stand side by side that share columns, whichever others they share them through: then none is made twice.
+fn side_by_side(columns: usize, sets: &[Vec<usize>]) -> Vec<usize> {
+    // Of each column, another of the same sets that stands before it, or itself.
+    let mut before: Vec<usize> = (0..columns).collect();
+    let first = |before: &[usize], mut own: usize| {
+        while before[own] != own {
+            own = before[own];
+        }
+        own
+    };
+    for set in sets {
+        for pair in set.windows(2) {
+            let ends = [pair[0], pair[1]].map(|own| first(&before, own));
+            before[ends[0].max(ends[1])] = ends[0].min(ends[1]);
+        }
+    }
+    let mut order: Vec<usize> = (0..sets.len()).collect();
+    order.sort_by_key(|at| sets[*at].first().map(|own| first(&before, *own)));
+    order
 }
