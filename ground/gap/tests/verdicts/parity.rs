@@ -340,6 +340,7 @@ fn an_attitude_that_does_not_settle_is_said_and_not_written() {
         kept: None,
         lost: Vec::new(),
         withheld: None,
+        scatters: None,
     };
     assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
     assert!(

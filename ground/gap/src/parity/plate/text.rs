@@ -5,6 +5,7 @@ use std::fmt::Write;
 use twin::{effect::by_name, predict::Kind};
 
 use crate::{
+    parity::smooth::told::rests_words,
     parity::{
         flight::Flight,
         nulls::NULLS,
@@ -210,8 +211,8 @@ fn attitude_line(findings: &Findings) -> String {
         ", heading from that of the begin"
     };
     format!(
-        "ATTITUDE  smoothed over the whole log, in attitude.csv: known to {mean:.2} deg (one sigma, all axes{heading}); at rest in {} spans",
-        told.rests.len()
+        "ATTITUDE  smoothed over the whole log, in attitude.csv: known to {mean:.2} deg (one sigma, all axes{heading}); {}",
+        rests_words(told.rests.len())
     )
 }
 

@@ -83,6 +83,7 @@ pub fn attitude(findings: &Findings) -> Told {
         kept: None,
         lost: Vec::new(),
         withheld: None,
+        scatters: None,
     }
 }
 

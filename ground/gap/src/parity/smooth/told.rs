@@ -30,6 +30,7 @@ use crate::{
         space::Space,
     },
     probability::outcome::Outcome,
+    thresholds::PARITY_GAP,
 };
 
 /// Why nothing else that is known of a motion was looked at.
@@ -75,6 +76,17 @@ pub struct Told {
     pub lost: Vec<(f64, f64)>,
     /// Why the motion is not told although it has settled.
     pub withheld: Option<&'static str>,
+    /// \[sigma\] by how much more the readings scatter than described, where that is much; then it may be why the motion did not settle.
+    pub scatters: Option<f64>,
+}
+
+/// In how many spans a unit is at rest, in words.
+pub fn rests_words(spans: usize) -> String {
+    match spans {
+        0 => "at rest in none of it".to_owned(),
+        1 => "at rest in one span".to_owned(),
+        _ => format!("at rest in {spans} spans"),
+    }
 }
 
 impl Told {
@@ -102,6 +114,7 @@ impl Told {
     /// When the unit's description names an effect there is not.
     pub fn explained(followed: &Followed, findings: &Findings, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
         let mut told = Self::beside(followed, &findings.free_effects, progress)?;
+        told.scatters = Some(findings.gap[1]).filter(|gap| *gap > PARITY_GAP);
         let why = match findings.outcome {
             Outcome::Clean | Outcome::Recalibrate | Outcome::Named => return Ok(told),
             Outcome::Undecided => UNDECIDED,
@@ -129,6 +142,7 @@ impl Told {
             kept: smoothed.attitudes.clone(),
             lost: Vec::new(),
             withheld: None,
+            scatters: None,
         };
         if !smoothed.is_settled() {
             return Ok(told);
@@ -277,17 +291,23 @@ impl Told {
             );
         }
         let Some((worst_s, worst)) = norms.clone().max_by(|one, other| one.1.total_cmp(&other.1)) else {
+            let help = match self.scatters {
+                Some(gap) => format!(
+                    "the readings scatter {gap:.1} times as much as unit.toml says, so its sigmas weigh them wrongly; with true ones it \
+                     may settle"
+                ),
+                None => "a reference or a rest in the log would help".to_owned(),
+            };
             return format!(
-                "ATTITUDE  did not settle: step {} still turned it by {turn_deg:.2} deg, so no attitude.csv is written; a reference \
-                 or a rest in the log would help",
+                "ATTITUDE  did not settle: step {} still turned it by {turn_deg:.2} deg, so no attitude.csv is written; {help}",
                 self.turns.len()
             );
         };
         let mean = (norms.map(|(_, norm)| norm * norm).sum::<f64>() / self.attitudes.len() as f64).sqrt();
         format!(
             "ATTITUDE  smoothed over the whole log, in attitude.csv: known to {mean:.2} deg (one sigma, all axes), to {worst:.2} deg \
-             at {worst_s:.0} s; at rest in {} spans; settled in {} steps{}",
-            self.rests.len(),
+             at {worst_s:.0} s; {}; settled in {} steps{}",
+            rests_words(self.rests.len()),
             self.turns.len(),
             self.lost_words()
         )
@@ -347,5 +367,39 @@ impl Told {
             _ => "The track beside the motion: not used",
         };
         Figure::of(title, 1, &[panel]).map(Some)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_that_did_not_settle_says_what_would_help() {
+        let mut told = Told {
+            attitudes: Vec::new(),
+            rests: Vec::new(),
+            turns: vec![0.1],
+            track: None,
+            beside_track: Vec::new(),
+            belief: None,
+            kept: None,
+            lost: Vec::new(),
+            withheld: None,
+            scatters: None,
+        };
+        assert!(told.line().contains("a reference or a rest"), "{}", told.line());
+        told.scatters = Some(2.96);
+        assert!(
+            told.line().contains("3.0 times") && told.line().contains("unit.toml"),
+            "{}",
+            told.line()
+        );
+    }
+
+    #[test]
+    fn rests_are_counted_in_words() {
+        assert_eq!(rests_words(1), "at rest in one span");
+        assert_eq!(rests_words(2), "at rest in 2 spans");
     }
 }
