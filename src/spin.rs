@@ -29,7 +29,9 @@
 //!
 //! Scalars one at a time, Joseph's form. Gyros far off weigh less, by P. J. Huber's rule; force and field have a gate each, and a
 //! field's gate that stays shut opens the angle about the spin, then all.
-//! The field's model error is considered, not estimated (S. F. Schmidt, 1966): it is added to the covariance that is said.
+//! By how much the field's direction is told wrong is considered, not estimated ([`covariance`]): it is the same in all readings, and the
+//! attitude has of it what its gains took. Of the angle between nose and field they take little: iron along x_b looks the same, and
+//! the pad's gravity knows that angle better.
 //!
 //! Refuses to go on (and says so) when a number is no longer one, or when there was no slice for a second.
 //!
@@ -111,6 +113,38 @@ pub struct Surroundings {
     /// How late the sensors are.
     pub delays: Delays,
 }
+
+impl Surroundings {
+    /// Two axes across the field about which its direction may be off, in n, the first of them level; and the field's level part.
+    fn across_field(&self) -> ([Vector3<f32>; 2], f32) {
+        let along_n = self.field_n_ut.normalize();
+        let level_n = Vector3::z().cross(&along_n);
+        let level = level_n.norm();
+        let first_n = if level > LEVEL { level_n / level } else { Vector3::x() };
+        ([first_n, along_n.cross(&first_n)], level)
+    }
+
+    /// \[rad\] what the heading has in common with the field's error about the second axis, of variance one. The field alone
+    /// gives a heading of variance `V = (field_sd^2 + iron^2 / field^2) / level^2`, and an error of it by `field_sd / level` for each of that
+    /// error. A heading of variance `P`, of which a rail may have told too, has the part `P / V` from the field.
+    fn in_heading(&self, heading_variance: f32, iron_variance: f32) -> f32 {
+        let (_, level) = self.across_field();
+        if level <= LEVEL {
+            return 0.0;
+        }
+        let of_iron = iron_variance / self.field_n_ut.norm_squared();
+        let alone = (square(self.field_sd) + of_iron) / square(level);
+        let part = if heading_variance < alone {
+            heading_variance / alone
+        } else {
+            1.0
+        };
+        part * self.field_sd / level
+    }
+}
+
+/// Level part of a field that is too steep to say a heading.
+const LEVEL: f32 = 1e-3;
 
 /// The filter of the spin phase.
 #[derive(Clone, Debug)]
@@ -197,7 +231,7 @@ impl Spin {
         let mut covariance = Covariance::of(&variances);
         covariance.set_block(ATTITUDE, &start.covariance_n);
         covariance.set_block(IRON, &start.iron_covariance);
-        Spin {
+        let mut spin = Spin {
             surroundings: start.surroundings,
             at_us: start.at_us,
             q_nb: start.q_nb,
@@ -229,7 +263,17 @@ impl Spin {
             by_load: [0.0; PLATES],
             pad_force: start.pad.along_x,
             slice_us: start.at_us,
-        }
+        };
+        spin.consider_the_field();
+        spin
+    }
+
+    /// The field's error is in the heading, as far as the heading is from the field.
+    fn consider_the_field(&mut self) {
+        let heading_variance = self.covariance.variance(ATTITUDE + 2);
+        let iron_variance = self.covariance.block::<3, 3>(IRON, IRON).trace() / 3.0;
+        let in_common = self.surroundings.in_heading(heading_variance, iron_variance);
+        self.covariance.set_considered(&(Vector3::z() * in_common));
     }
 
     /// [rad/s] the rate in b.
@@ -278,12 +322,9 @@ impl Spin {
         }
     }
 
-    /// \[rad2\] covariance of the attitude in n, with what the field's model may be off by.
+    /// \[rad2\] covariance of the attitude in n.
     pub fn covariance_n(&self) -> Matrix3<f32> {
-        let along_n = self.surroundings.field_n_ut.normalize();
-        let across = Matrix3::identity() - along_n * along_n.transpose();
-        self.covariance.block::<3, 3>(ATTITUDE, ATTITUDE)
-            + across * (self.surroundings.field_sd * self.surroundings.field_sd)
+        self.covariance.block(ATTITUDE, ATTITUDE)
     }
 
     /// Two components across the spin, in axes that do not spin, as a vector in b.

@@ -4,6 +4,10 @@
 //! the last correction add up to. Joseph's form as in [`crate::kalman`]: with `p = P h'`, `s = h p + r`, `k = p/s` and
 //! `u = p - k s/2`, `P <- P - k u' - u k'`.
 //!
+//! Two errors that are not estimated are considered: `phi`, of variance one and independent of the noises, with `C = E[x phi']`, what
+//! a scalar sees of them being `g` (S. F. Schmidt, "Application of state-space methods to navigation problems", Advances in Control
+//! Systems 3, 1966): `p = P h' + C g'`, `s = h p + g (C' h' + g') + r`, and `C <- C - k (h C + g)`.
+//!
 //! Refuses a scalar beyond its gate, or one that is not a number, and says by how much it was.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -34,10 +38,15 @@ pub const BY_LOAD: usize = 21;
 /// What a scalar sees: some states and how much of each.
 pub type Row<'a> = &'a [(usize, f32)];
 
+/// Errors that are considered.
+pub const CONSIDERED: usize = 2;
+
 /// Covariance and pending correction.
 #[derive(Clone, Debug)]
 pub struct Covariance {
     p: [[f32; STATES]; STATES],
+    /// What the states have in common with each error that is considered.
+    with_considered: [[f32; STATES]; CONSIDERED],
     /// The error state that the scalars since the last correction found.
     pub error: [f32; STATES],
 }
@@ -69,6 +78,7 @@ impl Covariance {
         }
         Covariance {
             p,
+            with_considered: [[0.0; STATES]; CONSIDERED],
             error: [0.0; STATES],
         }
     }
@@ -80,6 +90,13 @@ impl Covariance {
                 self.p[at + row][at + column] = block[(row, column)];
             }
         }
+    }
+
+    /// What the attitude has in common with the last of the errors that are considered.
+    pub fn set_considered(&mut self, with_attitude: &Vector3<f32>) {
+        self.with_considered = [[0.0; STATES]; CONSIDERED];
+        let [.., last] = &mut self.with_considered;
+        last[..SPIN].copy_from_slice(with_attitude.as_slice());
     }
 
     /// All of it.
@@ -142,7 +159,7 @@ impl Covariance {
                 self.p[axis][column] -= taken[axis];
             }
         }
-        for row in &mut self.p {
+        for row in self.p.iter_mut().chain(&mut self.with_considered) {
             let taken = taken([row[0], row[1], row[2]], [row[ACROSS], row[ACROSS + 1]]);
             for axis in 0..3 {
                 row[axis] -= taken[axis];
@@ -172,7 +189,7 @@ impl Covariance {
             self.p[ACROSS][column] += dt_s * with_y_up[column];
             self.p[ACROSS + 1][column] += dt_s * with_z_up[column];
         }
-        for row in &mut self.p {
+        for row in self.p.iter_mut().chain(&mut self.with_considered) {
             let gained = [
                 dt_s * (row[SPIN] + half * row[SPIN_UP]),
                 dt_s * (row[ACROSS] + half * row[ACROSS_UP]),
@@ -206,6 +223,12 @@ impl Covariance {
 
     /// Takes a scalar with white variance `r`. By how many times its variance it was off, squared; used only up to `gate`.
     pub fn update(&mut self, row: Row, residual: f32, r: f32, gate: f32) -> f32 {
+        self.consider(row, &[0.0; CONSIDERED], residual, r, gate)
+    }
+
+    /// The same of a scalar that sees so much of each error that is considered.
+    #[inline(never)]
+    pub fn consider(&mut self, row: Row, sees: &[f32; CONSIDERED], residual: f32, r: f32, gate: f32) -> f32 {
         let mut column = [0.0; STATES];
         for &(i, a) in row {
             for (sum, part) in column.iter_mut().zip(&self.p[i]) {
@@ -213,6 +236,17 @@ impl Covariance {
             }
         }
         let (mut s, mut left) = (r, residual);
+        // h C + g
+        let mut in_common = *sees;
+        for ((in_common, sees), with) in in_common.iter_mut().zip(sees).zip(&self.with_considered) {
+            for &(i, a) in row {
+                *in_common += a * with[i];
+            }
+            for (sum, part) in column.iter_mut().zip(with) {
+                *sum += sees * part;
+            }
+            s += sees * *in_common;
+        }
         for &(i, a) in row {
             s += a * column[i];
             left -= a * self.error[i];
@@ -226,6 +260,11 @@ impl Covariance {
         let gain = column.map(|part| part * by_s);
         for (error, gain) in self.error.iter_mut().zip(&gain) {
             *error += gain * left;
+        }
+        for (with, in_common) in self.with_considered.iter_mut().zip(in_common) {
+            for (with, gain) in with.iter_mut().zip(&gain) {
+                *with -= gain * in_common;
+            }
         }
         let half = 0.5 * s;
         let mut rest = column;
@@ -259,7 +298,47 @@ impl Covariance {
             .p
             .as_flattened()
             .iter()
+            .chain(self.with_considered.as_flattened())
             .fold(0.0, |sum, element| sum + element * 0.0);
         sum == 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// \[rad2\] variance of an angle after many readings that are all off by one error of this deviation.
+    fn after_readings(prior: f32, considered_sd: f32) -> f32 {
+        let mut variances = [1e-6; STATES];
+        variances[ATTITUDE] = prior;
+        let mut covariance = Covariance::of(&variances);
+        for _ in 0..10_000 {
+            covariance.consider(&[(ATTITUDE, 1.0)], &[considered_sd, 0.0], 0.0, 1e-2, f32::MAX);
+        }
+        covariance.variance(ATTITUDE)
+    }
+
+    /// Readings with a common error of a deviation of 0.1 leave that error, or what was known before if it is better.
+    #[test]
+    fn an_error_that_is_the_same_in_all_readings_stays() {
+        let told = after_readings(1.0, 0.1);
+        assert!((0.009..0.011).contains(&told), "{told}");
+        let known = after_readings(0.0001, 0.1);
+        assert!((0.000_09..0.000_101).contains(&known), "{known}");
+        let without = after_readings(1.0, 0.0);
+        assert!(without < 2e-6, "{without}");
+    }
+
+    /// What the attitude has in common with it from the start is not counted twice.
+    #[test]
+    fn a_heading_that_has_the_same_error_learns_nothing_of_it() {
+        let mut variances = [1e-6; STATES];
+        variances[ATTITUDE + 2] = 0.01;
+        let mut covariance = Covariance::of(&variances);
+        covariance.set_considered(&Vector3::new(0.0, 0.0, 0.1));
+        covariance.consider(&[(ATTITUDE + 2, 1.0)], &[0.0, -0.1], 0.0, 1e-2, f32::MAX);
+        let left = covariance.variance(ATTITUDE + 2);
+        assert!((left - 0.01).abs() < 1e-6, "{left}");
     }
 }

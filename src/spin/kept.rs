@@ -69,6 +69,7 @@ impl Spin {
             return None;
         }
         spin.q_nb = renormalised(spin.q_nb);
+        spin.consider_the_field();
         spin.at_us = outage.ended_us.wrapping_sub((outage.lasted_s * 1e6) as u64);
         spin.carry(outage.ended_us);
         spin.slice_us = outage.ended_us;

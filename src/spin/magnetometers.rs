@@ -56,10 +56,14 @@ impl Spin {
         // nose and field. Where that is near a right one, a part of the norm in 300 is two degrees.
         let axes = [along_b, other_b];
         let aged = square(FIELD_AGE_S * speed);
+        let (off_n, _) = self.surroundings.across_field();
+        let sd = self.surroundings.field_sd;
         let mut all = true;
         for (axis_b, r) in axes.iter().zip([white + aged, white]) {
             // h . C_bn (m x a) = a . (C_nb h x m)
             let seen = (dcm * axis_b).cross(&self.surroundings.field_n_ut);
+            // The field turned is the attitude turned back.
+            let sees = off_n.map(|off_n| -sd * seen.dot(&off_n));
             let row: [(usize, f32); 6] = [
                 (ATTITUDE, seen.x),
                 (ATTITUDE + 1, seen.y),
@@ -70,7 +74,7 @@ impl Spin {
             ];
             let off = self
                 .covariance
-                .update(row.as_slice() as Row, axis_b.dot(&residual_b), r, GATE);
+                .consider(row.as_slice() as Row, &sees, axis_b.dot(&residual_b), r, GATE);
             all &= off <= GATE;
         }
         Some(all)

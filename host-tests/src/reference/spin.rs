@@ -18,8 +18,9 @@ use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use self::lasting::{Lasting, least_along};
 
 /// Error states: attitude in n, spin and its derivative, rate across and its derivative, biases, what gyros see of the spin, iron, lever,
-/// biases by load.
-const N: usize = 25;
+/// biases by load; and what is considered and never corrected, the field's error about two axes across it, over its deviation.
+const N: usize = 27;
+const FIELD: usize = 25;
 const SPIN: usize = 3;
 const SPIN_UP: usize = 4;
 const ACROSS: usize = 5;
@@ -78,6 +79,12 @@ fn value(axis: &Axis, counts: f32, above_c: f32) -> f64 {
     f64::from(axis.scale_at(above_c) * (counts - axis.bias_counts_at(above_c)))
 }
 
+/// Axes across the field about which its direction may be off: level, and the one above the other.
+fn off_n(field_n: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let level_n = Vector3::z().cross(&field_n).normalize();
+    [level_n, field_n.cross(&level_n).normalize()]
+}
+
 fn axis_b(axis: &Axis) -> Vector3<f64> {
     axis.axis_b.cast()
 }
@@ -87,6 +94,7 @@ impl Spin {
     pub fn begin(start: &Start<'static>, set: &Set) -> Self {
         let [_, _, of_gyro] = set.uncertainty;
         let mut variances = [0.0; N];
+        variances[FIELD..].fill(1.0);
         variances[SPIN] = square(start.rate_sd.into());
         variances[SPIN_UP] = 9.0;
         for axis in 0..2 {
@@ -105,6 +113,16 @@ impl Spin {
         p.fixed_view_mut::<3, 3>(0, 0).copy_from(&start.covariance_n.cast());
         p.fixed_view_mut::<3, 3>(IRON, IRON)
             .copy_from(&start.iron_covariance.cast());
+        // The heading's error is that of the field by the part that the field alone has in it.
+        let surroundings = &start.surroundings;
+        let (field_sd, level) = (
+            f64::from(surroundings.field_sd),
+            off_n(surroundings.field_n_ut.cast())[1].z,
+        );
+        let iron = f64::from(start.iron_covariance.trace()) / 3.0 / f64::from(surroundings.field_n_ut.norm_squared());
+        let from_field = (p[(2, 2)] * square(level) / (square(field_sd) + iron)).min(1.0);
+        p[(2, FIELD + 1)] = from_field * field_sd / level;
+        p[(FIELD + 1, 2)] = p[(2, FIELD + 1)];
         let rate_b: Vector3<f64> = start.rate_b.cast();
         Spin {
             at_us: start.at_us,
@@ -139,11 +157,9 @@ impl Spin {
         Vector3::new(self.spin, 0.0, 0.0) + self.turning_b(self.across)
     }
 
-    /// \[rad2\] covariance of the attitude with what the field's model may be off by.
+    /// \[rad2\] covariance of the attitude.
     pub fn covariance_n(&self) -> Matrix3<f64> {
-        let along_n: Vector3<f64> = self.start.surroundings.field_n_ut.cast().normalize();
-        let across = Matrix3::identity() - along_n * along_n.transpose();
-        self.p.fixed_view::<3, 3>(0, 0) + across * square(self.start.surroundings.field_sd.into())
+        self.p.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
     /// Attitude at an instant.
@@ -281,7 +297,9 @@ impl Spin {
         if off > gate {
             return off;
         }
-        let gain = self.p * h / (of_state + r);
+        let mut gain = self.p * h / (of_state + r);
+        // Considered: the form below holds for any gain.
+        gain.fixed_rows_mut::<{ N - FIELD }>(FIELD).fill(0.0);
         self.error += gain * left;
         let left_over = SMatrix::<f64, N, N>::identity() - gain * h.transpose();
         self.p = left_over * self.p * left_over.transpose() + gain * r * gain.transpose();
@@ -386,6 +404,10 @@ impl Spin {
             let mut h = SVector::<f64, N>::zeros();
             h.fixed_rows_mut::<3>(0).copy_from(&seen_n);
             h.fixed_rows_mut::<3>(IRON).copy_from(&n_b);
+            for (k, off_n) in off_n(field_n).iter().enumerate() {
+                let turned = n_b.dot(&dcm.tr_mul(&off_n.cross(&field_n)));
+                h[FIELD + k] = turned * f64::from(self.start.surroundings.field_sd);
+            }
             all &= self.update(&h, n_b.dot(&residual_b), r, GATE) <= GATE;
         }
         all
