@@ -14,12 +14,14 @@
 //! logarithm of a density is taken for straight, so that `c = 2 sqrt(a b)`. Motion only adds to it; more than white is not said.
 //!
 //! **What is given back.** In a packet's time `T` the filter adds `R T` to the attitude's variance across the spin, where `c R T` is
-//! right: `D = (1 - c) R T (1 - x x')` is too much. Noise that does not last still moves the attitude for a time of `1/w`. Where the field
-//! corrects a direction as fast as that, nothing is given back: with `A = D P^-1` and `k = 1 / (w T)`, `A (1 + k A)^-2` stands for `A`.
-//! `P <- S P S'` with `S = 1 - A (1 + k A)^-2 / 2` stays a covariance whatever the numbers are. `P` is here that of the attitude
-//! given the rate across: the rate's noise of this moment is all there, and what the two have in common does not change.
+//! right. The field sees two directions in every packet. What is left there is no noise of the gyros, but what is constant: the
+//! field's error, iron. About the field, along `m`, nothing is seen, and `D = (1 - c) R T (1 - (x.m)^2)` is too much. Noise that does not
+//! last still moves the attitude for a time of `1/w`, so that of the variance `v` about the field `D / (w T)` stays:
+//! `d = min(D, v - D / (w T))`. With `v = 1 / (m' P^-1 m)` and `S = 1 - (1 - sqrt(1 - d/v)) v m m' P^-1`, `S P S' = P - d m m'`, a
+//! covariance as long as `d < v`. `P` is here that of the attitude given the rate across: the rate's noise of this moment is all there,
+//! and what the two have in common does not change.
 
-use nalgebra::{ComplexField, Matrix3};
+use nalgebra::{ComplexField, Matrix3, Vector3};
 
 use super::{
     Spin,
@@ -34,9 +36,10 @@ use crate::{
 /// Of the corner, the width of a low-pass: what lies at the spin itself, which the filter took for the rate, passes two of them
 /// by a thousandth.
 const WIDTH: f32 = 1.0 / 6.0;
-/// Of the corner, how fast the spin must be for the side below it to be clear of what is constant in b: by three widths, which two
-/// low-passes leave a hundredth of.
-const CLEAR: f32 = 1.0 + 3.0 * WIDTH;
+/// Of the corner, how fast the spin must be for the side below it to be clear of what is constant in b. Beside `n` widths, two low-passes
+/// leave of a constant as large as the noise a density of `8 / (width dt (1 + n^2)^2)`: with a corner of 8 rad/s and slices of 20 ms, a
+/// tenth of white noise at 7.3.
+const CLEAR: f32 = 1.0 + 7.3 * WIDTH;
 /// Of how many times `1/width` a density is the mean: at a corner of 9 rad/s a second, as the noise itself.
 const REMEMBERED: f32 = 1.5;
 /// [rad/s] the corner before the gyros were heard: that of 1 deg/s.
@@ -111,9 +114,10 @@ impl Lasting {
             }
         }
         let [above, below] = if spin > 0.0 { [0, 1] } else { [1, 0] };
-        // What is constant in b, a bias or a false rate, is no noise.
+        // What is constant in b, a bias or a false rate, is no noise; nor is what it would leave in the low-passes.
         if spin.abs() < CLEAR * self.corner {
             squares[below] = squares[above];
+            self.passed[below] = self.passed[above];
         }
         for (density, square) in self.density.iter_mut().zip(squares) {
             *density += part * (square - *density);
@@ -153,10 +157,11 @@ impl Spin {
         if lasts >= self.rough {
             return;
         }
-        let too_much = (1.0 - lasts / self.rough) * density * lasted_s;
-        let slow = 1.0 / (lasting.corner * lasted_s);
         let nose_n = dcm_nb(&self.q_nb).column(0).into_owned();
-        let back = (Matrix3::identity() - nose_n * nose_n.transpose()) * too_much;
+        let along_n = self.surroundings.field_n_ut.normalize();
+        let across = along_n.cross(&nose_n).norm_squared();
+        let too_much = (1.0 - lasts / self.rough) * density * lasted_s * across;
+        let slow = 1.0 / (lasting.corner * lasted_s);
         let of_rate = self.covariance.block::<2, 2>(ACROSS, ACROSS);
         let both = self.covariance.block::<3, 2>(ATTITUDE, ACROSS);
         let Some(inverse) = of_rate.try_inverse() else {
@@ -164,12 +169,21 @@ impl Spin {
         };
         let by_rate = both * inverse;
         let given_rate = self.covariance.block::<3, 3>(ATTITUDE, ATTITUDE) - by_rate * both.transpose();
-        let Some(inverse) = (given_rate + back * slow).try_inverse() else {
-            return;
-        };
-        let less = back * inverse * given_rate * inverse * 0.5;
-        self.covariance.lessen_attitude(&less, &by_rate);
+        if let Some(less) = less(&given_rate, &along_n, too_much, slow) {
+            self.covariance.lessen_attitude(&less, &by_rate);
+        }
     }
+}
+
+/// `1 - S` for a covariance of which so much is given back along a direction, but for `slow` of it. `None` where all of it stays.
+fn less(of: &Matrix3<f32>, along_n: &Vector3<f32>, too_much: f32, slow: f32) -> Option<Matrix3<f32>> {
+    let seen_n = of.try_inverse()? * along_n;
+    let variance = 1.0 / along_n.dot(&seen_n);
+    let given_back = (variance - slow * too_much).min(too_much);
+    // Not greater, so that NaN is refused too.
+    let leaves = given_back > 0.0 && given_back < variance;
+    let part = 1.0 - ComplexField::sqrt(1.0 - given_back / variance);
+    leaves.then(|| along_n * seen_n.transpose() * (part * variance))
 }
 
 #[cfg(test)]
@@ -224,8 +238,46 @@ mod tests {
         assert!(constant < 0.1, "{constant}");
     }
 
-    /// What the attitude has in common with the rate is the same afterwards, what is given back is taken off where the covariance is large
-    /// beside it, and where it is small a part is left.
+    /// Densities after a minute of a constant at this spin and a slice of nothing at another.
+    fn of_constant(spin: f32, then: f32) -> [f32; 2] {
+        let mut lasting = Lasting::new(&Set::nominal(Ranges::of(&Settings::NOMINAL)));
+        for k in 0..3000 {
+            let phase = (spin * 0.02 * k as f32) % core::f32::consts::TAU;
+            lasting.hear(1.0, spin, phase, 0.02);
+        }
+        lasting.hear(0.0, then, 0.0, 0.02);
+        lasting.density.map(|density| 2.0 * density)
+    }
+
+    #[test]
+    fn what_is_constant_in_b_is_a_tenth_of_white_noise_where_the_side_below_is_heard() {
+        let clear = BEGINS_AT * CLEAR + 0.01;
+        let [_, below] = of_constant(clear, clear);
+        assert!((0.07..0.12).contains(&below), "{below}");
+    }
+
+    #[test]
+    fn a_side_that_is_heard_again_has_nothing_of_what_was_not_heard() {
+        let [above, below] = of_constant(BEGINS_AT + 1.0, 2.0 * BEGINS_AT * CLEAR);
+        assert!((above - below).abs() < 0.01, "{above} {below}");
+    }
+
+    /// What is given back is taken off along its direction, and nowhere else; of a variance that is as small as what noise moves for a
+    /// time nothing is.
+    #[test]
+    fn what_is_given_back_is_taken_off_along_its_direction() {
+        let root = Matrix3::new(0.5, -0.2, 0.1, 0.3, 0.8, -0.4, 0.1, 0.2, 0.6);
+        let of = root * root.transpose();
+        let along_n = Vector3::new(0.6, -0.3, 0.74).normalize();
+        let variance = 1.0 / along_n.dot(&(of.try_inverse().expect("inverse") * along_n));
+        let back = 0.3 * variance;
+        let s = Matrix3::identity() - less(&of, &along_n, back, 0.5).expect("something");
+        let left = s * of * s.transpose() - (of - along_n * along_n.transpose() * back);
+        assert!(left.norm() < 1e-6, "{left}");
+        assert_eq!(less(&of, &along_n, variance, 1.1), None);
+    }
+
+    /// What the attitude has in common with the rate is the same afterwards, and no variance is more.
     #[test]
     fn what_is_given_back_leaves_a_covariance() {
         let mut random = 7;

@@ -1,7 +1,7 @@
 //! What of the gyros' noise lasts in the attitude, in f64: the densities on either side of the spin, and the whole congruence.
 
 use emems::calibration::Set;
-use nalgebra::{Matrix2, Matrix3, SMatrix};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 use super::{ACROSS, N, Spin, square};
 
@@ -45,8 +45,9 @@ impl Lasting {
             }
         }
         let (above, below) = if spin > 0.0 { (0, 1) } else { (1, 0) };
-        if spin.abs() < 1.5 * self.corner {
+        if spin.abs() < (1.0 + 7.3 / 6.0) * self.corner {
             squares[below] = squares[above];
+            self.passed[below] = self.passed[above];
         }
         for (density, square) in self.density.iter_mut().zip(squares) {
             *density += width / self.heard * (square - *density);
@@ -76,18 +77,21 @@ impl Spin {
             return;
         }
         let nose_n = self.nose_n();
-        let back =
-            (Matrix3::identity() - nose_n * nose_n.transpose()) * ((1.0 - lasts / self.rough) * density * lasted_s);
+        let field_n: Vector3<f64> = self.start.surroundings.field_n_ut.cast().normalize();
+        let across = 1.0 - square(nose_n.dot(&field_n));
+        let back = (1.0 - lasts / self.rough) * density * lasted_s * across;
         let of_rate: Matrix2<f64> = self.p.fixed_view::<2, 2>(ACROSS, ACROSS).into_owned();
         let both = self.p.fixed_view::<3, 2>(0, ACROSS).into_owned();
         let by_rate = both * of_rate.try_inverse().expect("rates are not known for sure");
         let given = self.p.fixed_view::<3, 3>(0, 0) - by_rate * both.transpose();
-        // The whole congruence: `a <- a - A (1 + k A)^-2 (a - by_rate u) / 2`.
-        let a = back * given.try_inverse().expect("attitude is not known for sure");
-        let slow = (Matrix3::identity() + a / (self.lasting.corner * lasted_s))
-            .try_inverse()
-            .expect("positive");
-        let less = a * slow * slow * 0.5;
+        // The whole congruence.
+        let seen_n = given.try_inverse().expect("attitude is not known for sure") * field_n;
+        let variance = 1.0 / field_n.dot(&seen_n);
+        let given_back = back.min(variance - back / (self.lasting.corner * lasted_s));
+        if given_back <= 0.0 {
+            return;
+        }
+        let less = field_n * seen_n.transpose() * (variance * (1.0 - (1.0 - given_back / variance).sqrt()));
         let mut s = SMatrix::<f64, N, N>::identity();
         s.fixed_view_mut::<3, 3>(0, 0).copy_from(&(Matrix3::identity() - less));
         s.fixed_view_mut::<3, 2>(0, ACROSS).copy_from(&(less * by_rate));
