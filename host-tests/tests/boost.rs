@@ -1,6 +1,6 @@
 //! The attitude through a boost, smooth and spoilt: it says what it knows, and is right about it.
 
-use std::sync::Arc;
+use std::{f64::consts::TAU, sync::Arc};
 
 use emems::{
     calibration::{Ranges, Set},
@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use twin::{
     environment::{Environment, World},
     host::timing::BOOT,
-    motion::{Course, Motion, SoundingRocket},
+    motion::{Course, Motion, Pose, Profile, SoundingRocket},
     part::Nanos,
     run::Fault,
     truth::{Truth, TruthSource},
@@ -48,12 +48,12 @@ struct Met {
     nees: f64,
 }
 
-fn met(frames: &[Derived], motion: &SoundingRocket, from_s: f64, to_s: f64) -> Met {
+fn met(frames: &[Derived], motion: &impl Motion, from_s: f64, to_s: f64) -> Met {
     met_since(BOOT, frames, motion, from_s, to_s)
 }
 
 /// Of frames whose clock started then \[ns\].
-fn met_since(started: Nanos, frames: &[Derived], motion: &SoundingRocket, from_s: f64, to_s: f64) -> Met {
+fn met_since(started: Nanos, frames: &[Derived], motion: &impl Motion, from_s: f64, to_s: f64) -> Met {
     let (mut count, mut worst, mut square, mut said, mut nees) = (0.0, 0.0_f64, 0.0, 0.0, 0.0);
     for frame in frames {
         let t_s = (frame.increments.end_us as f64 * 1e3 + started as f64) * 1e-9;
@@ -146,6 +146,71 @@ fn a_rocket_that_is_never_despun_keeps_its_attitude() {
     let motion = world.motion.clone();
     let flown = flight(world).fly(240 * S);
     is_right("not despun", &met(&flown.derived, &motion, 200.0, 240.0), SPINNING_DEG);
+}
+
+/// A rocket whose last motor is lit after the yo-yo, in free fall, and spins it up again.
+#[derive(Clone)]
+struct Relit {
+    first: SoundingRocket,
+    /// \[rad\] about x_b, and [m/s2] along it.
+    roll: Profile,
+    thrust: Profile,
+}
+
+/// \[s\] the motor is lit, long after the filter of slow motion has the attitude again, and is burnt out; the rocket is despun.
+const RELIT_S: f64 = 150.0;
+const BURNT_OUT_S: f64 = 180.0;
+const DESPUN_S: f64 = 200.0;
+
+impl Relit {
+    /// As the second stage does: 3.2 g within 0.6 s, and three turns a second at half a turn a second in a second.
+    fn new(gravity: f64) -> Self {
+        let spun = Profile::from_rest(0.0).coast(RELIT_S).ramp_to_rate(3.0 * TAU, 6.0);
+        let roll = spun.clone().coast(DESPUN_S - spun.end_s()).ramp_to_rate(0.0, 2.0);
+        let lit = Profile::from_rest(0.0).coast(RELIT_S).move_to(3.2 * 9.806_65, 0.6);
+        Relit {
+            first: SoundingRocket::new(PAD_S, gravity),
+            roll,
+            thrust: lit.clone().coast(BURNT_OUT_S - lit.end_s()).move_to(0.0, 1.0),
+        }
+    }
+}
+
+impl Motion for Relit {
+    fn at(&self, t_s: f64) -> Pose {
+        let pose = self.first.at(t_s);
+        let attitude = pose.attitude.rolled(self.roll.at(t_s));
+        let thrust_n = attitude.q_nb * Vector3::new(self.thrust.at(t_s).value, 0.0, 0.0);
+        Pose {
+            attitude,
+            acc_n: pose.acc_n + thrust_n,
+            micro_g: pose.micro_g && t_s < RELIT_S,
+            ..pose
+        }
+    }
+
+    fn duration_s(&self) -> Option<f64> {
+        self.first.duration_s()
+    }
+}
+
+#[test]
+fn a_second_ignition_after_the_coast_is_followed_as_the_first() {
+    let environment = Environment::alcantara();
+    let motion = Relit::new(environment.gravity);
+    let world = World {
+        motion: motion.clone(),
+        environment,
+    };
+    let flown = flight(world).fly(250 * S);
+    let met = |from_s, to_s| met(&flown.derived, &motion, from_s, to_s);
+    // The motor is lit in slow motion: the attitude is that of micro-gravity, and stays so.
+    let before = met(140.0, RELIT_S);
+    is_right("before it is lit", &before, 1.5);
+    is_right("spun up again", &met(RELIT_S, 156.0), 1.5);
+    is_right("burning", &met(156.0, BURNT_OUT_S), 1.5);
+    is_right("burnt out", &met(BURNT_OUT_S, DESPUN_S), 1.5);
+    is_right("despun", &met(DESPUN_S, 250.0), 2.0);
 }
 
 /// A vehicle whose lift-off line is broken.
