@@ -1,7 +1,7 @@
 //! Many units through the sounding rocket's flight: what the attitude was off by in each phase, and what it said.
 //!
 //! `cargo run --ignore-rust-version --target host-tuple -p emems-attitude --example rocket_campaign -- [UNITS] [smooth|rough|rougher] [PAGE.html]`
-//! flies so many units (default 100), each with its own parts, clocks and noise, on the host board in virtual time, some two
+//! flies so many units (default 100; `1001-1100`: those of these seeds), each with its own parts, clocks and noise, on the host board in virtual time, some two
 //! seconds of processor each, and prints a line a phase. The page has the error and three standard deviations over the flight.
 //!
 //! Each unit is told a field that is off by what a model is: each component by a normal number of
@@ -294,23 +294,26 @@ fn page(units: &[Vec<Sent>]) -> Result<String, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);
-    let count: u64 = arguments.next().map_or(Ok(100), |text| text.parse())?;
+    let units = arguments.next().unwrap_or("100".into());
+    let (first, last) = units.split_once('-').unwrap_or(("1", &units));
+    let (first, last): (u64, u64) = (first.parse()?, last.parse()?);
     let levels = match arguments.next().as_deref() {
         None | Some("smooth") => None,
         Some("rough") => Some(Levels::ROUGH),
         Some("rougher") => Some(Levels::ROUGHER),
         Some(other) => return Err(format!("{other}: a flight is smooth, rough or rougher").into()),
     };
-    let next = Mutex::new(0);
+    let next = Mutex::new(first);
     let flown = Mutex::new(Vec::new());
     let fly_some = || {
         loop {
             let seed = {
                 let mut next = next.lock().expect("no thread panics with it");
+                let seed = *next;
                 *next += 1;
-                *next
+                seed
             };
-            if seed > count {
+            if seed > last {
                 return;
             }
             let unit = fly(seed, levels);
