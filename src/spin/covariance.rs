@@ -240,12 +240,15 @@ impl Covariance {
         let mut in_common = *sees;
         for ((in_common, sees), with) in in_common.iter_mut().zip(sees).zip(&self.with_considered) {
             for &(i, a) in row {
-                *in_common += a * with[i];
+                *in_common += a * with.get(i).copied().unwrap_or_default();
             }
-            for (sum, part) in column.iter_mut().zip(with) {
-                *sum += sees * part;
+            // Gyros and force see nothing of it, and are most of a packet's scalars.
+            if *sees != 0.0 {
+                for (sum, part) in column.iter_mut().zip(with) {
+                    *sum += sees * part;
+                }
+                s += sees * *in_common;
             }
-            s += sees * *in_common;
         }
         for &(i, a) in row {
             s += a * column[i];
