@@ -28,4 +28,4 @@ pub const UART_START: Nanos = 108_300;
 /// \[ns\] a byte on a UART, 8N1 at 42 MHz / 365, the divisor nearest to 115200.
 pub const UART_BYTE: Nanos = 86_905;
 /// \[ns\] from reset to the start of the unit's clock.
-pub const BOOT: Nanos = 667_800;
+pub const BOOT: Nanos = 670_000;
