@@ -262,8 +262,9 @@ impl<'a> Space<'a> {
     }
 
     /// The motion's part of what calibration and nulls leave of a residual, by conjugate gradients with the factor of a space about a motion
-    /// nearby, until what is left is this share of the whole; none where that motion is not near enough. `M c = b` with `M = I + C'(I - Q Q')C` costs a pass through the motion a step, and
-    /// `M` itself one for each of its columns (Golub and Van Loan, Matrix Computations, 11.5).
+    /// nearby, until what is left is this share of the whole; none where that motion is not near enough. `M c = b` with
+    /// `M = I + C'(I - Q Q')C` costs a pass through the motion a step, and `M` itself one for each of its columns (Golub and Van Loan, Matrix
+    /// Computations, 11.5).
     pub fn motion_part_near(
         &self,
         residual: &Entries,

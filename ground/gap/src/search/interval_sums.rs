@@ -5,9 +5,9 @@
 //! before edge `j` only and `c` on always, a stretch has the column `c_off - c_on`, and one that goes over the end of the order
 //! `c_off - c_on + c`. So the products of the `c_j` with each other and with the residual tell all stretches.
 //!
-//! Where noise is white `c_i'c_j` is a sum over the samples before the earlier edge. In colour it is not: of a step little but its edges
-//! stands out of errors that are slow, and no edge is among the whitened samples of what is on always. There each `c_j` is made in physical
-//! units and then whitened. The products with a residual are sums over samples in both ([`Frame::dual`]).
+//! Where noise is white, `c_i'c_j` is a sum over the samples before the earlier edge. In colour it is not. There slow errors leave of a step
+//! little but its edges, and the whitened column of what is on always has no edge. So each `c_j` is made in physical units and then whitened.
+//! The products with a residual are sums over samples in both cases ([`Frame::dual`]).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -5,13 +5,19 @@ use std::fs;
 use crate::gyros::{diagnosed_in, erring, erring_in, rate};
 use gap::{
     holdout::fit_error::FitError,
-    input::case::Subject,
+    input::{case::Subject, log::Series, reference::Reference, windows::Fit},
     library::hypotheses::Library,
     null::{interval::Interval, model::Model, problem::Problem},
     report::terminal,
     search::{interval_sums::Residual, periodic::again, readings::attribute},
 };
 use tempfile::TempDir;
+use twin::{
+    effect::LIBRARY,
+    environment::Environment,
+    motion::Tumble,
+    predict::{Kind, Scene, Twin, emems},
+};
 
 #[test]
 fn a_warm_up_between_those_tried_is_one_and_not_the_two_beside_it() {
@@ -170,4 +176,49 @@ fn what_is_predicted_is_of_one_fit_where_the_calibration_can_take_the_place_of_t
         let off: f64 = left.zip(rest.iter()).map(|(left, rest)| (left - rest).powi(2)).sum();
         assert!(off < 1.0, "channel {channel}: {off}");
     }
+}
+
+/// A current that is switched on and iron that is brought are the same readings. At 0.13 uT the search for the iron's instants, which asks for
+/// more than an effect whose onset is tried, finds none of its own.
+#[test]
+fn the_stretch_of_a_current_is_lent_to_iron() {
+    const ROWS: u32 = 600;
+    let environment = Environment::laboratory();
+    let starts_s: Vec<f64> = (0..ROWS).map(|row| 0.2 * f64::from(row)).collect();
+    let scene = Scene::new(&Tumble::new(), &environment, 0.0, 120.0, 0.01);
+    let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s.clone()).expect("no effect is named");
+    let channels = &twin.unit().channels;
+    let fit = |values: &dyn Fn(usize, usize) -> f64| {
+        let series = |channel: usize| Series {
+            rows: (0..ROWS).collect(),
+            values: (0..starts_s.len()).map(|row| values(channel, row)).collect(),
+        };
+        Fit {
+            channels: (0..channels.len()).map(series).collect(),
+        }
+    };
+    let exact = Reference::default();
+    let nothing = fit(&|_, _| 0.0);
+    let predicted = Problem::new(&twin, &nothing, &exact).predictions(&[]);
+    let log = fit(&|channel, row| {
+        let own = &channels[channel];
+        let is_on = own.sensor == Kind::Magnetometer && own.group == "plate 1" && starts_s[row] > 64.3;
+        predicted[channel][row] + if is_on { 0.13 * own.axis_b.x } else { 0.0 }
+    });
+    let problem = Problem::new(&twin, &log, &exact);
+    let names = LIBRARY.iter().map(|effect| effect.page().name);
+    let others = names.filter(|name| !["hard-iron", "current-field"].contains(name));
+    let others: Vec<String> = others.map(str::to_owned).collect();
+    let mut library = Library::new(&problem, &others, &|_| {});
+    let found = attribute(&problem, &mut library, &|_| {});
+    let rivals = &found.chosen.first().expect("something is there").rivals;
+    let gain = |name: &str| {
+        let own = rivals
+            .iter()
+            .filter(|rival| library.hypotheses[rival.hypothesis].effect() == name);
+        own.map(|rival| rival.gain).fold(f64::NEG_INFINITY, f64::max)
+    };
+    // They differ by no more than the prior of an onset, one of 18 values.
+    let gains = ["hard-iron", "current-field"].map(gain);
+    assert!((gains[0] - gains[1]).abs() < 18f64.ln() && gains[0] > 0.0, "{gains:?}");
 }

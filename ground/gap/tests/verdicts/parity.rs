@@ -331,16 +331,8 @@ fn an_attitude_is_smoothed_beside_what_is_named_and_not_told_where_something_is_
 #[test]
 fn an_attitude_that_does_not_settle_is_said_and_not_written() {
     let told = Told {
-        attitudes: Vec::new(),
-        rests: Vec::new(),
         turns: vec![0.4, 0.3],
-        track: None,
-        beside_track: Vec::new(),
-        belief: None,
-        kept: None,
-        lost: Vec::new(),
-        withheld: None,
-        scatters: None,
+        ..Told::default()
     };
     assert!(told.csv().is_none() && told.figure().expect("no plot").is_none());
     assert!(

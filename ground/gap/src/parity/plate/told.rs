@@ -76,14 +76,7 @@ pub fn attitude(findings: &Findings) -> Told {
     Told {
         attitudes: findings.attitude.iter().flatten().map(one).collect(),
         rests: rests(&findings.field),
-        turns: Vec::new(),
-        track: None,
-        beside_track: Vec::new(),
-        belief: None,
-        kept: None,
-        lost: Vec::new(),
-        withheld: None,
-        scatters: None,
+        ..Told::default()
     }
 }
 

@@ -57,6 +57,7 @@ pub struct Attitude {
 }
 
 /// The attitude of a flight.
+#[derive(Default)]
 pub struct Told {
     /// At every row; none where the smoother did not settle.
     pub attitudes: Vec<Attitude>,
@@ -133,16 +134,13 @@ impl Told {
         };
         let smoothed = bent.as_ref().unwrap_or(smoothed);
         let mut told = Self {
-            attitudes: Vec::new(),
             rests: smoothed.rests.clone(),
             turns: smoothed.turns.clone(),
             track: smoothed.track.map(|own| (own, None)),
             beside_track: smoothed.beside_track.clone(),
             belief: smoothed.belief,
             kept: smoothed.attitudes.clone(),
-            lost: Vec::new(),
-            withheld: None,
-            scatters: None,
+            ..Told::default()
         };
         if !smoothed.is_settled() {
             return Ok(told);
@@ -377,16 +375,8 @@ mod tests {
     #[test]
     fn a_motion_that_did_not_settle_says_what_would_help() {
         let mut told = Told {
-            attitudes: Vec::new(),
-            rests: Vec::new(),
             turns: vec![0.1],
-            track: None,
-            beside_track: Vec::new(),
-            belief: None,
-            kept: None,
-            lost: Vec::new(),
-            withheld: None,
-            scatters: None,
+            ..Told::default()
         };
         assert!(told.line().contains("a reference or a rest"), "{}", told.line());
         told.scatters = Some(2.96);

@@ -94,7 +94,7 @@ pub(super) fn stretches(
 }
 
 /// Lends the time in which a member is on, `when`, to each other hypothesis that comes and goes, has no stretch of its own and would gain by
-/// it: a magnet that is brought is a current that is switched on but for the search that found its instants.
+/// it. A magnet that is brought and a current that is switched on are the same readings; only the searches for their instants differ.
 pub(super) fn lent(
     passing: &Passing,
     library: &Library,
