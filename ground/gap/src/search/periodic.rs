@@ -29,6 +29,11 @@ const STEPS: f64 = 4.0;
 /// Times the period and the edges are sought nearer.
 const ROUNDS: usize = 6;
 
+/// The round after which a stretch that is there shows half of what is asked of it. Edges are then tried a 60th of a period apart and the period
+/// to a 40th of the last cycle, so a stretch of a phase or more overlaps the one tried by two thirds and more. Below half, what later rounds
+/// find is a few samples.
+const SHOWN_AFTER: usize = 1;
+
 /// The channels that an effect touches, and a residual.
 struct Folded<'a> {
     /// \[s\] instants of the rows of the log.
@@ -72,18 +77,21 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
         around.iter().flat_map(near).collect()
     };
     let mut all: Vec<f64> = (0..PHASES).map(|phase| phase as f64 / PHASES as f64).collect();
+    let price = ((steps * PHASES * PHASES) as f64).ln();
     let (mut found, mut hz_step, mut edge_step) = (None, 0.5 * step_hz, 1.0 / PHASES as f64);
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let tried = (-2..=2).map(|index| 1.0 / (1.0 / every_s + hz_step * f64::from(index)));
         let best = tried.filter_map(|every_s| folded.best(every_s, from_s, &all).map(|best| (best, every_s)));
         let ((gain, [on, off]), period_s) = best.max_by(|one, other| one.0.0.total_cmp(&other.0.0))?;
+        if round >= SHOWN_AFTER && gain < 0.5 * (STRETCH_MARGIN + price) {
+            return None;
+        }
         every_s = period_s;
         found = Some((gain, on, off));
         (hz_step, edge_step) = (0.4 * hz_step, 0.4 * edge_step);
         all = edges(&[on, off], edge_step);
     }
     let (gain, on, off) = found?;
-    let price = ((steps * PHASES * PHASES) as f64).ln();
     let from = from_s + on * every_s;
     let stretch = Span {
         from,
