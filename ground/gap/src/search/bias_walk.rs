@@ -20,7 +20,7 @@ use twin::{
 use crate::{
     null::{
         model::Courses,
-        normal::log_determinant,
+        normal::{Normal, log_determinant},
         problem::{Component, Frame, Problem},
     },
     search::scatter::Scatter,
@@ -55,23 +55,18 @@ impl Walk {
         if withheld.iter().any(|name| name == effect.page().name) {
             return None;
         }
-        let unit = problem.twin.unit();
-        let is_gyro = |index: &usize| unit.channels[*index].sensor == Kind::Gyro;
-        let gyros: Vec<usize> = (0..unit.channels.len()).filter(is_gyro).collect();
+        let gyros = gyros(problem);
         let mut walk = Walk {
             channels: Vec::new(),
-            gain: -(LIBRARY.len() as f64).ln(),
+            gain: log_prior(),
             effect: *effect,
         };
         for channel in &gyros {
-            let frame = &problem.frames[*channel];
-            let samples = frame.series.rows.len();
+            let samples = problem.frames[*channel].series.rows.len();
             if samples < WALK_FEWEST {
                 continue;
             }
-            let shapes = shapes(problem, *channel, frame);
-            let residual = problem.residual(*channel, components);
-            let normal = frame.normal(&shapes, &residual);
+            let normal = normal(problem, *channel, components);
             let typical = effect
                 .page()
                 .parameters
@@ -87,7 +82,7 @@ impl Walk {
                 let part = if bend < 0.0 { 0.5 * (below - above) / bend } else { 0.0 };
                 at(size * STEP.powf(part.clamp(-0.5, 0.5)))
             });
-            let price = 0.5 * (samples as f64).ln() + 1.0 + (gyros.len() as f64).ln();
+            let price = price(samples, gyros.len());
             if let Some((size, gain)) = best.filter(|(_, gain)| *gain > price) {
                 walk.gain += gain - price;
                 walk.channels.push((*channel, size));
@@ -96,14 +91,24 @@ impl Walk {
         Some(walk).filter(|walk| walk.gain > 0.0)
     }
 
+    /// \[nats\] of a walk as large as this one over no walk, prices paid, where nothing else is there. With those of effects in frames in which it
+    /// is [open](Self::open) they are the evidence of both together: that of `y` and `x` is that of `y` and that of `x` given `y`. A walk that
+    /// takes the effects' place is larger and gains more alone, and leaves them less.
+    pub fn alone(&self, problem: &Problem) -> f64 {
+        let count = gyros(problem).len();
+        let of = |(channel, size): &(usize, f64)| {
+            let normal = normal(problem, *channel, &[]);
+            gain(&normal.information, &normal.score, *size) - price(problem.frames[*channel].series.rows.len(), count)
+        };
+        log_prior() + self.channels.iter().map(of).sum::<f64>()
+    }
+
     /// Whether what is there beside these effects has the spectrum of a walk, not only its slowness: the pull of its terms, made
     /// white from the slowest term on, has squares of one on the mean in every octave, all channels together.
     pub fn is_one(&self, problem: &Problem, components: &[Component]) -> bool {
         let mut whites = Vec::new();
         for (channel, size) in &self.channels {
-            let residual = problem.residual(*channel, components);
-            let frame = &problem.frames[*channel];
-            let normal = frame.normal(&shapes(problem, *channel, frame), &residual);
+            let normal = normal(problem, *channel, components);
             match white(&normal.information, &normal.score, *size) {
                 Some(white) => whites.push(white),
                 None => return false,
@@ -209,6 +214,29 @@ fn sigmas(size: f64) -> impl Iterator<Item = f64> {
     (0..TERMS).map(move |term| size / place(term))
 }
 
+/// Channels that may walk.
+fn gyros(problem: &Problem) -> Vec<usize> {
+    let channels = problem.twin.unit().channels.iter().enumerate();
+    let gyros = channels.filter(|(_, channel)| channel.sensor == Kind::Gyro);
+    gyros.map(|(index, _)| index).collect()
+}
+
+/// \[nats\] of a walk before anything was seen: it is one effect of the library.
+fn log_prior() -> f64 {
+    -(LIBRARY.len() as f64).ln()
+}
+
+/// \[nats\] that its size in one of so many gyros costs, of so many samples.
+fn price(samples: usize, gyros: usize) -> f64 {
+    0.5 * (samples as f64).ln() + 1.0 + (gyros as f64).ln()
+}
+
+/// Normal equations of a walk's terms in a channel beside effects.
+fn normal(problem: &Problem, channel: usize, components: &[Component]) -> Normal {
+    let frame = &problem.frames[channel];
+    frame.normal(&shapes(problem, channel, frame), &problem.residual(channel, components))
+}
+
 /// \[nats\] by which a walk of this size makes a log likelier.
 fn gain(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> f64 {
     let sigmas = DVector::from_iterator(TERMS, sigmas(size));
@@ -228,4 +256,74 @@ fn white(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> Option<
     let mut white = score.clone();
     factor.l_dirty().solve_lower_triangular_mut(&mut white);
     Some(white)
+}
+
+#[cfg(test)]
+mod tests {
+    use twin::{
+        environment::Environment,
+        motion::Tumble,
+        predict::{Scene, Twin, emems},
+    };
+
+    use super::*;
+    use crate::{
+        input::{log::Series, reference::Reference, windows::Fit},
+        null::evidence::Screen,
+    };
+
+    const ROWS: usize = 200;
+
+    /// Relative rounding of some thousand sums.
+    const ROUNDING: f64 = 1e-9;
+
+    /// \[nats\] of columns of one channel with these sigmas, over none of them.
+    fn evidence(frame: &Frame, columns: &DMatrix<f64>, sigmas: Vec<f64>, residual: &DVector<f64>) -> f64 {
+        let all: Vec<usize> = (0..sigmas.len()).collect();
+        let mut screen = Screen::zeros(sigmas);
+        screen.add(&all, &frame.normal(columns, residual));
+        screen.log_evidence().expect("finite")
+    }
+
+    /// The evidence of a walk alone, and of an effect with that walk open, is that of both together. With a larger walk alone it is not.
+    #[test]
+    fn a_walk_alone_and_an_effect_beside_it_are_worth_what_both_together_are() {
+        let environment = Environment::laboratory();
+        let starts_s: Vec<f64> = (0..ROWS).map(|row| row as f64 * 0.2).collect();
+        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 40.0, 0.01);
+        let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s).expect("no effect is named");
+        let course = |row: u32| 0.01 * (0.02 * f64::from(row)).sin() + 0.003 * (0.9 * f64::from(row)).sin();
+        let all = Series {
+            rows: (0..ROWS as u32).collect(),
+            values: (0..ROWS as u32).map(course).collect(),
+        };
+        let fit = Fit {
+            channels: vec![all; twin.unit().channels.len()],
+        };
+        let exact = Reference::default();
+        let problem = Problem::new(&twin, &fit, &exact);
+        let gyro = gyros(&problem)[0];
+        let at = |size: f64| Walk {
+            channels: vec![(gyro, size)],
+            gain: 0.0,
+            effect: LIBRARY[0],
+        };
+        let frame = &problem.frames[gyro];
+        let residual = problem.residual(gyro, &[]);
+        let effect = DMatrix::from_fn(ROWS, 1, |row, _| 0.3 * row as f64 / ROWS as f64);
+        let size = 1e-3;
+        let mut both = shapes(&problem, gyro, frame).insert_columns(TERMS, 1, 0.0);
+        both.column_mut(TERMS).copy_from(&effect.column(0));
+        let together = evidence(frame, &both, sigmas(size).chain([2.0]).collect(), &residual);
+        let open = at(size).open(&problem, problem.frames.clone());
+        let beside = evidence(&open[gyro], &effect, vec![2.0], &residual);
+        let paid = log_prior() - price(ROWS, gyros(&problem).len());
+        let sum = |size: f64| at(size).alone(&problem) - paid + beside;
+        assert!(
+            (sum(size) - together).abs() < ROUNDING * together.abs().max(1.0),
+            "{} {together}",
+            sum(size)
+        );
+        assert!((sum(3.0 * size) - together).abs() > 1.0);
+    }
 }

@@ -118,7 +118,7 @@ pub fn walked_in_colour(
     // What was found beside the walk may be there without it too, and have escaped the search.
     let effects = evidence(problem, &library, &found.chosen) + smaller + on_scatter;
     let without = effects.max(evidence(problem, &library, &walked.found.chosen) + on_scatter);
-    let alone = Walk::beside(problem, &[], withheld).map_or(0.0, |walk| walk.gain);
+    let alone = walked.walk.alone(problem);
     let open = walked.walk.open(problem, in_colour.clone());
     reframe(problem, &mut walked.library, open);
     let beside = evidence(problem, &walked.library, &walked.found.chosen);
