@@ -3,7 +3,8 @@
 //! In: the [`Problem`], the [`Library`] and a set of its hypotheses. Out: [`Refined`], whose evidence can be compared with that
 //! of any other set on the same problem: `-1/2 (r'Pr + theta' D^-2 theta) - 1/2 ln det(I + D I D)` at the best parameters,
 //! the residual exact there, the curvature that of its linearisation (Laplace), and effects of any of their sizes counted in.
-//! Parameters and covariance are those of the usual size, which data that say anything outweigh.
+//! Parameters and covariance are those of the usual size, which data that say anything outweigh; so what is sought further does not lean on
+//! a patch that is as large as it needs to be. Of a set that is settled [`at_likeliest_size`] gives those of the size that suits each effect best.
 
 use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
@@ -47,6 +48,23 @@ pub struct Refined {
 /// The slopes of the library serve until the effect turns out not to be linear: most are, and slopes cost more than all
 /// the rest.
 pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVector<f64>]) -> Refined {
+    refine_at(problem, library, set, start, Size::Usual)
+}
+
+/// The same with the size for each effect that suits it best. At the usual one an effect that is large is drawn to zero wherever the calibration
+/// can take its place at a lower price: of a field that was 13 uT wrong 3 uT were left, and the calibration did the rest on the fitted windows.
+pub fn at_likeliest_size(problem: &Problem, library: &Library, set: &[usize], start: &[DVector<f64>]) -> Refined {
+    refine_at(problem, library, set, start, Size::Likeliest)
+}
+
+/// For which size of each effect the parameters are the most probable ones.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Size {
+    Usual,
+    Likeliest,
+}
+
+fn refine_at(problem: &Problem, library: &Library, set: &[usize], start: &[DVector<f64>], size: Size) -> Refined {
     let width_of = |hypothesis: &usize| library.hypotheses[*hypothesis].parameters.len();
     let begin = |(index, hypothesis): (usize, &usize)| {
         let width = width_of(hypothesis);
@@ -66,7 +84,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
         .collect();
     let mut best: Option<Refined> = None;
     for step in 0..STEPS {
-        let point = Point::at(problem, library, set, &thetas, &slopes);
+        let point = Point::at(problem, library, set, &thetas, &slopes, size);
         if best
             .as_ref()
             .is_some_and(|best| point.log_evidence < best.log_evidence - CONVERGED && step > 2)
@@ -101,7 +119,7 @@ pub fn refine(problem: &Problem, library: &Library, set: &[usize], start: &[DVec
             slopes.truncate(library.reference);
             let model = model_of(library, set, &thetas);
             slopes.extend((0..set.len()).flat_map(|index| problem.slopes(&model, index)));
-            let anew = Point::at(problem, library, set, &thetas, &slopes);
+            let anew = Point::at(problem, library, set, &thetas, &slopes, size);
             from = library.reference;
             next.clear();
             for hypothesis in set {
@@ -143,7 +161,14 @@ struct Point {
 }
 
 impl Point {
-    fn at(problem: &Problem, library: &Library, set: &[usize], thetas: &[DVector<f64>], slopes: &[Entries]) -> Self {
+    fn at(
+        problem: &Problem,
+        library: &Library,
+        set: &[usize],
+        thetas: &[DVector<f64>],
+        slopes: &[Entries],
+        size: Size,
+    ) -> Self {
         let model = model_of(library, set, thetas);
         let mut values = vec![0.0; library.reference];
         let mut sigmas = library.prior_sigmas[..library.reference].to_vec();
@@ -192,7 +217,13 @@ impl Point {
             }
         }
         let all: Vec<usize> = (0..values.len()).collect();
-        let of_any_size = screen.of_any_size(parts);
+        let of_any_size = match size {
+            Size::Usual => screen.of_any_size(parts),
+            Size::Likeliest => {
+                let of_other_sizes = screen.settle(parts);
+                screen.log_evidence().map(|evidence| evidence + of_other_sizes)
+            }
+        };
         let Some((estimate, log_evidence)) = screen.estimate(&all).zip(of_any_size) else {
             return Point {
                 estimate: nothing(values.len()),

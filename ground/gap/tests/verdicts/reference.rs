@@ -7,7 +7,10 @@ use gap::{
     input::case::Subject,
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
-    search::readings::Chosen,
+    search::{
+        in_colour::attribute_in_colour,
+        readings::{Chosen, attribute},
+    },
     unknown::{fast::within_stretches, recognised::recognised, remainder::Setting},
 };
 use rand_distr::{Distribution, StandardNormal};
@@ -59,6 +62,25 @@ fn a_slow_error_with_the_law_of_an_effect_is_recognised_and_another_is_not() {
     let other = seen(switched).map(|(name, _)| name);
     assert_eq!(other, None);
     assert!(seen(|_| 0.0).is_none());
+}
+
+/// A search gives an effect the size that it has where the calibration could take its place too. Both are priors about zero that share what they
+/// explain by their variances: to a bias of 0.1 rad/s beside a calibration of 0.01 the usual size of 0.01 leaves a half, five times that
+/// 25/26.
+#[test]
+fn a_search_leaves_a_large_effect_its_size_beside_the_calibration() {
+    let folder = beside_reference(|_| 0.1);
+    let file = folder.path().join("unit.toml");
+    let unit = fs::read_to_string(&file).expect("a file");
+    fs::write(&file, unit.replace("bias_sigma = 0.001", "bias_sigma = 0.01")).expect("a file");
+    let subject = Subject::open(folder.path()).expect("opens");
+    let mut problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let mut library = Library::new(&problem, &[], &|_| {});
+    let found = attribute(&problem, &mut library, &|_| {});
+    let found = attribute_in_colour(&mut problem, &mut library, &subject.slow, found, &|_| {});
+    let chosen = found.chosen.first().expect("a bias of ten sigmas");
+    assert_eq!(library.hypotheses[chosen.hypothesis].effect(), "gyro-bias");
+    assert!((chosen.theta[0] - 0.1 * 25.0 / 26.0).abs() < 0.002, "{}", chosen.theta);
 }
 
 /// What counts against a name beside such a reference: a tone of seven sigmas, and not as much that is slow, which courses judge.
