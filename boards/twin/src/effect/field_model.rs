@@ -30,6 +30,9 @@ const PAGE: Page = Page {
         Symbol::signed("de", "uT", 0.5),
         Symbol::signed("dd", "uT", 0.5),
     ],
+    // 65 uT, the strongest field at the Earth's surface: a case may have the field of another site. Whatever stands still in space beside a
+    // known attitude is the field, however large.
+    largest: 130.0,
     passes: true,
     ..Page::SMOOTH
 };
