@@ -1,7 +1,8 @@
 //! The flight log under power cuts: every operation, every way to tear, one after another and at random.
 //!
-//! The per-change set is what runs here without asking. The long set, some 20 minutes of two cores:
-//! `EMEMS_RUNS=1000000 cargo host-test --test recorder_cuts many_cuts -- --nocapture`, with `EMEMS_SEED` to go elsewhere.
+//! Each campaign flies twice: a share of it without asking, all of it among the long tests. The share cuts at every operation in every
+//! way, with fewer seeds. A million runs take some 20 minutes of two cores:
+//! `EMEMS_RUNS=1000000 cargo host-test --test recorder_cuts many_cuts -- --nocapture --ignored`, with `EMEMS_SEED` to go elsewhere.
 //! A run that is not clean is printed with its number, from which everything in it is drawn.
 
 use std::collections::BTreeSet;
@@ -37,10 +38,10 @@ fn used(seed: u64) -> Flown {
     flown
 }
 
-#[test]
-fn a_cut_at_any_operation_in_any_way_loses_nothing() {
+/// A cut at each operation, in each way, on chips of so many seeds.
+fn one_cut(seeds: u64) {
     let operations = u64::from(RECORDS) + MORE_OPERATIONS;
-    let (tears, seeds) = (TEARS.len() as u64, 20);
+    let tears = TEARS.len() as u64;
     let tally = campaign(operations * tears * seeds, |flight| {
         let tear = TEARS[(flight % tears) as usize];
         let after = 1 + flight / tears % operations;
@@ -51,14 +52,14 @@ fn a_cut_at_any_operation_in_any_way_loses_nothing() {
     });
     // Each record is at least one operation, so a cut at any of the first ones strikes.
     let cuts = tally.runs * u64::from(RECORDS) / operations;
-    tally.check(23_000, cuts, cuts / 2);
+    tally.check(1_150 * seeds, cuts, cuts / 2);
 }
 
-#[test]
-fn a_second_cut_soon_after_the_first_loses_nothing() {
+/// Two cuts: the first at each operation, the second at each soon after it, in so many pairs of ways for each way of the first.
+fn two_cuts(pairs: u64) {
     let operations = u64::from(RECORDS_OF_PAIRS) + MORE_OPERATIONS;
     let (tears, soon) = (TEARS.len() as u64, 12);
-    let tally = campaign(operations * soon * tears * 5, |flight| {
+    let tally = campaign(operations * soon * tears * pairs, |flight| {
         let mut draw = draws(asked_once(), flight);
         let first = TEARS[(flight % tears) as usize];
         let second = TEARS[draw(tears) as usize];
@@ -72,7 +73,7 @@ fn a_second_cut_soon_after_the_first_loses_nothing() {
     });
     // The second comes within the first records of its boot and strikes always.
     let cuts = tally.runs + tally.runs * u64::from(RECORDS_OF_PAIRS) / operations;
-    tally.check(40_000, cuts, cuts / 2);
+    tally.check(8_000 * pairs, cuts, cuts / 2);
 }
 
 fn asked_once() -> u64 {
@@ -80,9 +81,9 @@ fn asked_once() -> u64 {
     *SEED.get_or_init(|| asked("EMEMS_SEED", 1))
 }
 
-#[test]
-fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
-    let runs = asked("EMEMS_RUNS", 20_000);
+/// One cut to twelve, on chips with flipped bits and worn blocks.
+fn many_cuts(runs: u64) {
+    let runs = asked("EMEMS_RUNS", runs);
     let tally = campaign(runs, |flight| {
         let mut draw = draws(asked_once(), flight);
         let blocks = 40;
@@ -105,9 +106,9 @@ fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
     tally.check(runs, 6 * runs, 3 * runs);
 }
 
-#[test]
-fn one_page_destroyed_after_a_cut_takes_at_most_the_newest_record_with_it() {
-    let runs = asked("EMEMS_RUNS", 20_000);
+/// A cut, and later one page destroyed.
+fn one_page(runs: u64) {
+    let runs = asked("EMEMS_RUNS", runs);
     let tally = campaign(runs, |flight| {
         let mut draw = draws(asked_once(), flight);
         let mut flown = used(flight);
@@ -123,6 +124,26 @@ fn one_page_destroyed_after_a_cut_takes_at_most_the_newest_record_with_it() {
         flown.judge(&newest.into_iter().collect())
     });
     tally.check(runs, runs, runs / 2);
+}
+
+#[test]
+fn a_cut_at_any_operation_in_any_way_loses_nothing() {
+    one_cut(2);
+}
+
+#[test]
+fn a_second_cut_soon_after_the_first_loses_nothing() {
+    two_cuts(1);
+}
+
+#[test]
+fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
+    many_cuts(2_000);
+}
+
+#[test]
+fn one_page_destroyed_after_a_cut_takes_at_most_the_newest_record_with_it() {
+    one_page(2_000);
 }
 
 /// The check is no rubber stamp: a campaign whose cuts do not strike, or tear nothing, is refused.
@@ -146,4 +167,31 @@ fn a_campaign_in_which_nothing_is_cut_or_torn_is_refused() {
 
 fn said(panic: &(dyn std::any::Any + Send)) -> &str {
     panic.downcast_ref::<String>().map_or("", String::as_str)
+}
+
+/// What takes more than six seconds of a core: the campaigns at full length.
+mod long {
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_cut_at_any_operation_in_any_way_loses_nothing() {
+        super::one_cut(20);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_second_cut_soon_after_the_first_loses_nothing() {
+        super::two_cuts(5);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn many_cuts_with_flips_and_blocks_that_wear_out_lose_nothing() {
+        super::many_cuts(20_000);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn one_page_destroyed_after_a_cut_takes_at_most_the_newest_record_with_it() {
+        super::one_page(20_000);
+    }
 }

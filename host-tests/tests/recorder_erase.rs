@@ -101,10 +101,10 @@ fn f07_a_cut_at_any_operation_of_an_erase_leaves_the_old_log_or_none() {
     tally.check(3_900, cuts, cuts / OLD_ONES);
 }
 
-#[test]
-fn f07_an_erase_ordered_again_after_a_cut_and_cut_again_leaves_the_old_log_or_none() {
+/// Two cuts: each pair of operations, each way of the first, so many chips.
+fn ordered_again(chips: u64) {
     let tears = TEARS.len() as u64;
-    let tally = campaign(OPERATIONS * OPERATIONS * tears * 3, |flight| {
+    let tally = campaign(OPERATIONS * OPERATIONS * tears * chips, |flight| {
         let first = TEARS[(flight % tears) as usize];
         let second = TEARS[(flight / 7 % tears) as usize];
         let after = 1 + flight / tears % OPERATIONS;
@@ -115,16 +115,21 @@ fn f07_an_erase_ordered_again_after_a_cut_and_cut_again_leaves_the_old_log_or_no
         verdict(flown, once || twice)
     });
     let cuts = 2 * tally.runs * (OPERATIONS - MARGIN) / OPERATIONS;
-    tally.check(10_000, cuts, cuts / OLD_ONES / 2);
+    tally.check(4_000 * chips, cuts, cuts / OLD_ONES / 2);
 }
 
 #[test]
-fn f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used() {
+fn f07_an_erase_ordered_again_after_a_cut_and_cut_again_leaves_the_old_log_or_none() {
+    ordered_again(1);
+}
+
+/// A cut at each operation of a flight after an erase, in each way, on so many chips.
+fn used_after_an_erase(chips: u64) {
     // An erased log whose blocks still hold the old one: each is erased just before its first page.
     const APPENDED: u32 = 100;
     let operations = u64::from(APPENDED) + 12;
     let tears = TEARS.len() as u64;
-    let tally = campaign(operations * tears * 4, |flight| {
+    let tally = campaign(operations * tears * chips, |flight| {
         let tear = TEARS[(flight % tears) as usize];
         let after = 1 + flight / tears % operations;
         let mut flown = three_boots(BLOCKS, flight);
@@ -138,7 +143,12 @@ fn f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used() {
         verdict(flown, true)
     });
     let cuts = tally.runs * u64::from(APPENDED) / operations;
-    tally.check(4_000, cuts, cuts / 2);
+    tally.check(1_000 * chips, cuts, cuts / 2);
+}
+
+#[test]
+fn f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used() {
+    used_after_an_erase(1);
 }
 
 /// The verdict is no rubber stamp.
@@ -148,4 +158,19 @@ fn a_log_half_erased_and_an_erase_that_is_undone_are_found_out() {
     half.chip.erase(LOG_START + 1);
     assert!(verdict(half, false).lost > 0);
     assert_eq!(verdict(three_boots(BLOCKS, 1), true).wrong, 1);
+}
+
+/// What takes more than six seconds of a core: the campaigns at full length.
+mod long {
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn f07_an_erase_ordered_again_after_a_cut_and_cut_again_leaves_the_old_log_or_none() {
+        super::ordered_again(3);
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn f04_a_block_whose_erase_was_cut_is_erased_again_before_it_is_used() {
+        super::used_after_an_erase(4);
+    }
 }
