@@ -3,7 +3,7 @@
 #[allow(dead_code, reason = "each test file uses its own share of the bench")]
 mod bench;
 
-use std::{cell::RefCell, rc::Rc};
+use std::{cell::RefCell, rc::Rc, sync::OnceLock};
 
 use bench::{MS, Tape, image};
 use emems::{packet::PACKET_BYTES, sample::NO_SLOT, unit::Settings};
@@ -91,11 +91,18 @@ fn both_boards_ask_the_gyros_at_the_same_time() {
     }
 }
 
+/// Four seconds at rest with derived frames, on the image and on the host.
+fn both() -> &'static [Tape; 2] {
+    static BOTH: OnceLock<[Tape; 2]> = OnceLock::new();
+    BOTH.get_or_init(|| {
+        let script = [(MS, b"G_DL".to_vec())];
+        [on_image, on_host].map(|on| on("still", 4_000 * MS, &script))
+    })
+}
+
 #[test]
 fn both_boards_send_at_the_same_time() {
-    let sent = |tape: &Tape| tape.packets()[0].0;
-    let image = sent(&on_image("still", 1_000 * MS, &[]));
-    let host = sent(&on_host("still", 1_000 * MS, &[]));
+    let [image, host] = both().each_ref().map(|tape| tape.packets()[0].0);
     assert!(
         image.abs_diff(host) <= CLOCK_TOLERANCE_NS,
         "the first packet is out at {image} ns on the image, at {host} ns on the host: \
@@ -105,10 +112,7 @@ fn both_boards_send_at_the_same_time() {
 
 #[test]
 fn both_boards_take_each_sensor_at_the_same_time() {
-    let script = [(MS, b"G_DL".to_vec())];
-    let image = on_image("still", 4_000 * MS, &script);
-    let host = on_host("still", 4_000 * MS, &script);
-    let (image, host) = (image.derived(), host.derived());
+    let [image, host] = both().each_ref().map(Tape::derived);
     assert!(image.len() > 10 && image.len() == host.len());
     for (image, host) in image.iter().zip(&host).skip(2) {
         assert_eq!(image.start_us.abs_diff(host.start_us), 0);
