@@ -24,9 +24,8 @@ impl Filter {
             Some(bias_b) => self.compare_rest(&bias_b),
             None => self.contradicted = None,
         }
-        self.pending
-            .passage
-            .means_seen(&self.covariance, &mut self.measured.seen);
+        self.covariance
+            .means_seen(&self.pending.passage, &mut self.measured.seen);
     }
 
     /// Fourth: the state has the correction. An attitude that is found afresh does without: it was found in the axes that the

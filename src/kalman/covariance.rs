@@ -112,7 +112,7 @@ impl Covariance {
     ///
     /// Not inlined: from where the whole filter begins, an element is too far for an offset of the FPU's loads.
     #[inline(never)]
-    pub(super) fn times(&self, driven: usize, drivers: &[f32; DRIVERS], product: &mut State) {
+    fn times(&self, driven: usize, drivers: &[f32; DRIVERS], product: &mut State) {
         // A copy stays in registers.
         let drivers = *drivers;
         for k in 0..DRIVEN {
@@ -120,6 +120,14 @@ impl Covariance {
         }
         for k in 0..DRIVERS {
             product.drivers[k] = self.across[driven][k] + dot(&self.drivers[k], &drivers);
+        }
+    }
+
+    /// `P h'` at the end of the window for each axis of n as a mean over the window sees it, still without passage:
+    /// the covariance at its start times `(1 on the axis, B' on the drivers)`.
+    pub(super) fn means_seen(&self, passage: &Passage, seen: &mut [State; 3]) {
+        for (axis, (drive, seen)) in passage.mean_drive.iter().zip(seen).enumerate() {
+            self.times(axis, drive, seen);
         }
     }
 

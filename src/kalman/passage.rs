@@ -1,6 +1,6 @@
 //! What a window did to the error state.
 //!
-//! In: the window's drive and its means. Out: `F` and `Q` applied to vectors; [`super::Covariance`] applies them to itself.
+//! In: the window's drive and its means. Out: `F` and `Q` applied to vectors; `super::Covariance` applies them to itself.
 //! With `A` the drive, `B` its mean over the window and `T` the tilt, `x <- F x` is
 //!
 //! ```text
@@ -14,9 +14,7 @@
 use nalgebra::Vector3;
 
 use super::{
-    Params, at_least,
-    covariance::Covariance,
-    square,
+    Params, at_least, square,
     state::{DRIVEN, DRIVERS, GYRO_MATRIX, Row, State, VELOCITY, dot},
     window::{Means, Window},
 };
@@ -89,14 +87,6 @@ impl Passage {
         State {
             driven: [x, y, z, 0.0, 0.0],
             drivers: core::array::from_fn(|k| x * missed(0, k) + y * missed(1, k) + z * missed(2, k)),
-        }
-    }
-
-    /// `P h'` at the end of the window for each axis of n as a mean over the window sees it, still without passage:
-    /// the covariance at its start times `(1 on the axis, B' on the drivers)`.
-    pub fn means_seen(&self, covariance: &Covariance, seen: &mut [State; 3]) {
-        for (axis, (drive, seen)) in self.mean_drive.iter().zip(seen).enumerate() {
-            covariance.times(axis, drive, seen);
         }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 use super::{super::state::STATES, *};
 use crate::{
     draws::{Draws, near},
-    kalman::Sampled,
+    kalman::{Covariance, Sampled},
 };
 
 type Matrix = SMatrix<f64, STATES, STATES>;
@@ -192,7 +192,7 @@ fn a_mean_sees_the_attitude_in_the_middle() {
         } = &drawn.window;
         let mean = |axis: usize, k: usize| f64::from(drive_integral[axis][k]) / f64::from(*duration_s);
         let mut seen = [State::ZERO; 3];
-        drawn.passage.means_seen(&drawn.covariance, &mut seen);
+        drawn.covariance.means_seen(&drawn.passage, &mut seen);
         for (axis, seen) in seen.iter().enumerate() {
             let mut h = Column::zeros();
             h[axis] = 1.0;
