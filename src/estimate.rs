@@ -298,8 +298,8 @@ impl Estimator {
         &self.filter
     }
 
-    /// Takes a reading of the accelerometers before the packet with this counter, so that the step has less to do. Who has them with the cycle
-    /// only need not: the step takes those that were not.
+    /// Takes a reading of the accelerometers before the packet with this counter, so that the step has less to do. A caller that has the
+    /// readings only with the cycle leaves this out: the step takes the readings that were not taken here.
     #[inline(never)]
     pub fn take_force(&mut self, counter: u16, force: &Force) {
         self.averager.take(counter, force, &self.set);
