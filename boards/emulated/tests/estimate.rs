@@ -35,43 +35,6 @@ fn tumbled() -> Tape {
 }
 
 #[test]
-fn after_a_reset_in_flight_the_first_frame_has_the_attitude_and_says_why_the_unit_started() {
-    let mut tape = Tape {
-        script: vec![(MS, b"G_DL".to_vec()), (1_000 * MS, b"G_MVG_MV".to_vec())],
-        ..Tape::default()
-    };
-    let plant = Plant::new(world("tumble"), 7);
-    let reset = Scheduled {
-        at: 5_077 * MS,
-        fault: Fault::Reset,
-    };
-    emulated::fly(image(), plant, &[reset], 6_500 * MS, &mut tape).expect("the image flies");
-    let frames = tape.derived();
-    let starts = frames.windows(2).position(|pair| pair[1].start_us < pair[0].start_us);
-    let (before, after) = frames.split_at(starts.expect("a reset") + 1);
-    let last = before.last().expect("frames");
-    let first = after.first().expect("derived frames go on");
-    let start = first.start.expect("a start");
-    assert_eq!((start.reset, start.starts, start.crash), (ResetCause::Pin, 2, None));
-    assert_eq!(first.mode, Mode::Flight);
-    assert!(
-        (1..=2).contains(&(first.counter - last.counter)),
-        "{} {}",
-        last.counter,
-        first.counter
-    );
-    // At rest; found afresh it would take five packets.
-    let (was, is) = (
-        last.estimate.q_nb.expect("an attitude"),
-        first.estimate.q_nb.expect("an attitude"),
-    );
-    let cosine: f32 = was.iter().zip(is).map(|(was, is)| was * is).sum();
-    assert!(cosine.abs() > 0.9999, "{was:?} {is:?}");
-    let [nn, _, _, ee, _, dd] = first.estimate.covariance_n;
-    println!("deviations {} {} {} rad", nn.sqrt(), ee.sqrt(), dd.sqrt());
-}
-
-#[test]
 fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
     let tape = tumbled();
     let (packets, frames) = (tape.packets(), tape.derived());
@@ -111,6 +74,44 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
 /// What takes more than six seconds of a core.
 mod long {
     use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn after_a_reset_in_flight_the_first_frame_has_the_attitude_and_says_why_the_unit_started() {
+        let mut tape = Tape {
+            script: vec![(MS, b"G_DL".to_vec()), (1_000 * MS, b"G_MVG_MV".to_vec())],
+            ..Tape::default()
+        };
+        let plant = Plant::new(world("tumble"), 7);
+        let reset = Scheduled {
+            at: 5_077 * MS,
+            fault: Fault::Reset,
+        };
+        emulated::fly(image(), plant, &[reset], 6_500 * MS, &mut tape).expect("the image flies");
+        let frames = tape.derived();
+        let starts = frames.windows(2).position(|pair| pair[1].start_us < pair[0].start_us);
+        let (before, after) = frames.split_at(starts.expect("a reset") + 1);
+        let last = before.last().expect("frames");
+        let first = after.first().expect("derived frames go on");
+        let start = first.start.expect("a start");
+        assert_eq!((start.reset, start.starts, start.crash), (ResetCause::Pin, 2, None));
+        assert_eq!(first.mode, Mode::Flight);
+        assert!(
+            (1..=2).contains(&(first.counter - last.counter)),
+            "{} {}",
+            last.counter,
+            first.counter
+        );
+        // At rest; found afresh it would take five packets.
+        let (was, is) = (
+            last.estimate.q_nb.expect("an attitude"),
+            first.estimate.q_nb.expect("an attitude"),
+        );
+        let cosine: f32 = was.iter().zip(is).map(|(was, is)| was * is).sum();
+        assert!(cosine.abs() > 0.9999, "{was:?} {is:?}");
+        let [nn, _, _, ee, _, dd] = first.estimate.covariance_n;
+        println!("deviations {} {} {} rad", nn.sqrt(), ee.sqrt(), dd.sqrt());
+    }
 
     /// From lift-off on a step takes milliseconds in one piece. Nobody who waits for a part meanwhile takes it for silent.
     #[test]
