@@ -204,7 +204,7 @@ pub fn table(judged: &[Judged]) -> Vec<Line> {
     lines
 }
 
-/// The sensor of a channel: `a3` of `a3x`, which is what localisation is counted over (gap.md, section 6).
+/// The sensor of a channel: `a3` of `a3x`, which is what localisation is counted over.
 fn sensor_of(channel: &str) -> &str {
     channel.trim_end_matches(['x', 'y', 'z'])
 }
@@ -231,7 +231,7 @@ fn first_names<'a>(cases: impl Iterator<Item = &'a Judged>) -> Vec<(f64, bool)> 
         .collect()
 }
 
-/// Mean distance between stated and observed share of what is so, over ten bins of equal mass (gap.md, section 6).
+/// Mean distance between stated and observed share of what is so, over ten bins of equal mass.
 fn expected_calibration_error(mut stated: Vec<(f64, bool)>) -> f64 {
     const BINS: usize = 10;
     stated.sort_by(|a, b| a.0.total_cmp(&b.0));

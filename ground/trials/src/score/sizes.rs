@@ -1,6 +1,6 @@
 //! How large an effect was said to be, and how far the gap would shrink by that, against what they were.
 //!
-//! In: judged cases of one effect that was named right. Out: medians over them (gap.md, section 6).
+//! In: judged cases of one effect that was named right. Out: medians over them.
 
 use super::{Judged, Line, Named, Verdict};
 
@@ -84,7 +84,7 @@ fn error(judged: &Judged, named: &Named) -> Option<f64> {
 }
 
 /// \[%\] by which what a verdict states of its causes lets the held-out gap shrink: `p` parameters known to `SNR^2`, the sum of
-/// their squares over their variances, leave `p / SNR^2` of the excess energy (gap.md, section 4.6).
+/// their squares over their variances, leave `p / SNR^2` of the excess energy.
 fn predicted_percent(verdict: &Verdict) -> Option<f64> {
     let floor = verdict.gap.floor;
     let before = verdict
