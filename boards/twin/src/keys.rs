@@ -4,7 +4,7 @@
 //! that is nearest (Jaro and Winkler's similarity, at least 0.8), or as it was.
 
 /// Similarity from which a word is taken for a misspelling.
-const NEAR: f64 = 0.8;
+const MISSPELT: f64 = 0.8;
 
 /// The complaint, with what was meant.
 pub fn meant(complaint: &str) -> String {
@@ -17,7 +17,7 @@ fn nearest(complaint: &str) -> Option<&str> {
     // Every other piece between backticks is a key.
     let known = expected.split('`').skip(1).step_by(2);
     let near = known.map(|key| (strsim::jaro_winkler(unknown, key), key));
-    near.filter(|(near, _)| *near >= NEAR)
+    near.filter(|(near, _)| *near >= MISSPELT)
         .max_by(|one, other| one.0.total_cmp(&other.0))
         .map(|(_, key)| key)
 }

@@ -16,7 +16,7 @@ const QUIET: f64 = 3.0;
 const LEVEL: f64 = 6.0;
 
 /// Shortest window \[samples\].
-const LEAST: usize = 5;
+const SHORTEST_WINDOW: usize = 5;
 
 /// A stretch at rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +35,7 @@ pub struct Stretch {
 
 /// Finds the stretches of at least `shortest` samples; `samples[k]` holds all channels at instant `k`.
 pub fn still(samples: &[Vec<f64>], shortest: usize) -> Vec<Stretch> {
-    let window = (shortest / 2).max(LEAST);
+    let window = (shortest / 2).max(SHORTEST_WINDOW);
     let channels = samples.first().map_or(0, Vec::len);
     if samples.len() < window || channels == 0 {
         return Vec::new();
@@ -75,7 +75,7 @@ pub fn still(samples: &[Vec<f64>], shortest: usize) -> Vec<Stretch> {
             (None, true) => begun = Some(start),
             (Some(from), false) => {
                 let (from, to) = (from + window / 2, start - 1 + window - window / 2);
-                if to >= from + shortest.saturating_sub(window).max(LEAST) {
+                if to >= from + shortest.saturating_sub(window).max(SHORTEST_WINDOW) {
                     stretches.push(measure(samples, from, to, channels));
                 }
                 begun = None;

@@ -4,7 +4,7 @@
 //! first) that takes components in the body to components in the world. Out: pictures of a few instants, which need no script, and
 //! what the script of the page turns: by a slider, by the pointer in every panel whose x axis has the same label, and seen from any side.
 //!
-//! A history of more than [`MOST`] poses is shown with every k-th: poses have no least and most.
+//! A history of more than [`POSES_KEPT`] poses is shown with every k-th: poses have no least and most.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::{COLOURS, live::Store, page::escape};
 
 /// Poses that a page holds of a history.
-pub const MOST: usize = 4_000;
+pub const POSES_KEPT: usize = 4_000;
 
 /// Pictures of instants.
 const INSTANTS: usize = 5;
@@ -94,7 +94,7 @@ impl Scene {
             .iter()
             .map(|face| json!({"corners": face.corners, "colour": face.colour % COLOURS.len()}));
         let histories = self.poses.iter().map(|poses| {
-            let kept: Vec<&(f64, [f64; 4])> = poses.at.iter().step_by(poses.at.len().div_ceil(MOST).max(1)).collect();
+            let kept: Vec<&(f64, [f64; 4])> = poses.at.iter().step_by(poses.at.len().div_ceil(POSES_KEPT).max(1)).collect();
             let q: Vec<usize> = (0..4).map(|part| store.values(kept.iter().map(|(_, q)| q[part]))).collect();
             json!({
                 "name": poses.name, "colour": poses.colour % COLOURS.len(), "t": store.fine(kept.iter().map(|(t, _)| *t)), "q": q,

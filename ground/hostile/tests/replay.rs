@@ -13,7 +13,7 @@ use std::{
 use hostile::TARGETS;
 
 /// Fewer inputs are no corpus.
-const LEAST: usize = 5;
+const FEWEST_INPUTS: usize = 5;
 
 /// An input that takes longer hangs: the slowest needs 0.1 s alone, and the rest is a margin for company.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -26,7 +26,7 @@ fn replay(name: &str) {
         .map(|entry| entry.expect("an entry").path())
         .collect();
     inputs.sort();
-    assert!(inputs.len() >= LEAST, "{name}: {} inputs", inputs.len());
+    assert!(inputs.len() >= FEWEST_INPUTS, "{name}: {} inputs", inputs.len());
     let mut found = Vec::new();
     for input in &inputs {
         let bytes = fs::read(input).expect("read");

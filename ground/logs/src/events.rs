@@ -36,7 +36,7 @@ const MODE: &str = "mode ";
 const IN_A_ROW: u32 = 3;
 
 /// Events that are kept.
-const MOST: usize = 500;
+const EVENTS_KEPT: usize = 500;
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -242,7 +242,7 @@ impl Events {
     }
 
     fn keep(&mut self, event: Event) {
-        if self.closed.len() < MOST {
+        if self.closed.len() < EVENTS_KEPT {
             self.closed.push(event);
         } else {
             self.left_out += 1;

@@ -2,7 +2,7 @@
 //!
 //! In: items of a stream, each packet with its number. Out: a [`Flight`] whose time is the packet's number times the cycle, plus when
 //! in its cycle the gyros were read. Where a derived frame has an attitude, that is taken: it was made with the unit's own
-//! calibration and site. Where it has not, the unit's estimation runs here, with the calibration that is compiled in. Of more than [`MOST`]
+//! calibration and site. Where it has not, the unit's estimation runs here, with the calibration that is compiled in. Of more than [`ESTIMATES_KEPT`]
 //! estimates every second, then every fourth and so on are kept, so memory is bounded.
 
 use emems::{
@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Estimates that are kept: seven hours at 5 Hz, some 36 MB.
-pub const MOST: usize = 1 << 17;
+pub const ESTIMATES_KEPT: usize = 1 << 17;
 
 /// An attitude being followed.
 pub struct Follow {
@@ -101,7 +101,7 @@ impl Follow {
         }
         self.estimates.push(estimate);
         self.numbers.push(number);
-        if self.estimates.len() >= MOST {
+        if self.estimates.len() >= ESTIMATES_KEPT {
             self.estimates = std::mem::take(&mut self.estimates).into_iter().step_by(2).collect();
             self.numbers = self.numbers.iter().copied().step_by(2).collect();
             self.stride *= 2;

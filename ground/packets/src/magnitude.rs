@@ -113,7 +113,7 @@ impl Kind {
 
 /// Two scales whose ratio is this near to that of two units are taken to differ by them: between the nearest units of a
 /// list lies a factor of 9.8.
-const NEAR: f64 = 1.5;
+const SAME_RATIO: f64 = 1.5;
 
 /// Numbers that can hardly be in the unit that was said.
 #[derive(Clone, Debug, PartialEq)]
@@ -192,7 +192,7 @@ pub fn likely(ratio: f64, declared: &[(Kind, Unit)]) -> Option<(Kind, Unit)> {
         others.map(move |unit| (*kind, *unit, unit.size / declared.size))
     });
     let off = |factor: f64| (ratio / factor).ln().abs();
-    all.filter(|(_, _, factor)| off(*factor) < NEAR.ln())
+    all.filter(|(_, _, factor)| off(*factor) < SAME_RATIO.ln())
         .min_by(|a, b| off(a.2).total_cmp(&off(b.2)))
         .map(|(kind, unit, _)| (kind, unit))
 }

@@ -13,7 +13,7 @@ use twin::predict::Kind;
 use super::clock;
 
 /// Sigmas from which a clock is off.
-const OFF: f64 = 4.0;
+const CLOCK_OFF_SIGMAS: f64 = 4.0;
 
 /// \[s\] below which nobody minds: what a gyro at 100 deg/s turns in it is a tenth of a degree.
 const MINDED_S: f64 = 1e-3;
@@ -129,7 +129,7 @@ fn clocks(subject: &Subject, checked: &mut Checked) {
     match clock::error(subject) {
         None => checked.look("no gyro turns: nothing tells whether the clocks are one".to_owned()),
         Some(offset) => {
-            let is_off = offset.seconds.abs() > OFF * offset.sigma_s && offset.seconds.abs() > MINDED_S;
+            let is_off = offset.seconds.abs() > CLOCK_OFF_SIGMAS * offset.sigma_s && offset.seconds.abs() > MINDED_S;
             let mark = if is_off { Mark::Look } else { Mark::Ok };
             let says = format!(
                 "clocks: by the gyros the reference is {:+.4} +- {:.4} s off the log{}",

@@ -11,7 +11,7 @@ use packets::channel::CHANNEL_COUNT;
 pub const SPAN: Duration = Duration::from_secs(600);
 
 /// Most readings kept: [`SPAN`] at the unit's fastest cycle, 50 Hz.
-const MOST: usize = 30_000;
+const READINGS_KEPT: usize = 30_000;
 
 /// Readings a rate is taken over: two seconds at 5 Hz.
 const RATE_OVER: usize = 10;
@@ -30,7 +30,7 @@ impl History {
     pub fn push(&mut self, at: Duration, counts: Counts) {
         self.readings.push_back((at, counts));
         let stale = |(oldest, _): &(Duration, Counts)| oldest.saturating_add(SPAN) < at;
-        while self.readings.len() > MOST || self.readings.front().is_some_and(stale) {
+        while self.readings.len() > READINGS_KEPT || self.readings.front().is_some_and(stale) {
             self.readings.pop_front();
         }
     }
@@ -98,10 +98,10 @@ mod tests {
     fn days_of_packets_are_forgotten() {
         assert_eq!(filled(20_000).readings.len(), 1 + 600 * 5);
         let mut history = History::default();
-        for _ in 0..MOST + 10 {
+        for _ in 0..READINGS_KEPT + 10 {
             history.push(CYCLE, [None; CHANNEL_COUNT]);
         }
-        assert_eq!(history.readings.len(), MOST);
+        assert_eq!(history.readings.len(), READINGS_KEPT);
         assert_eq!(history.rate_hz(), None);
     }
 }

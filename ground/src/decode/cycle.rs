@@ -14,7 +14,7 @@ const PATIENCE: usize = 40;
 const HOPELESS: usize = 10_000;
 
 /// Counters apart at most that two frames are compared over: farther apart, one may be from after a restart.
-const NEAR: u16 = 10;
+const COUNTERS_APART: u16 = 10;
 
 /// Relative. The unit's clock is good to 100 ppm; a cycle told wrongly is another number.
 const SAME: f64 = 0.01;
@@ -104,7 +104,7 @@ impl Cycle {
         let before = self.frame.replace((counter, start_us));
         let Some((last, last_us)) = before else { return Ok(()) };
         let apart = counter.wrapping_sub(last);
-        if !(1..=NEAR).contains(&apart) || start_us <= last_us {
+        if !(1..=COUNTERS_APART).contains(&apart) || start_us <= last_us {
             return Ok(());
         }
         let seen_s = (start_us - last_us) as f64 * 1e-6 / f64::from(apart);

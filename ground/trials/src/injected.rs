@@ -35,7 +35,7 @@ const LARGEST: f64 = 10.0;
 const LARGEST_NOVEL: f64 = 20.0;
 
 /// Least ratio of a case, of the least that is asked for: a strength is found to some percent.
-const LEAST: f64 = 0.9 * SNR.0;
+const LEAST_RATIO: f64 = 0.9 * SNR.0;
 
 /// The recordings and effects of a deal, each in an order that is drawn once.
 pub struct Injected {
@@ -153,7 +153,7 @@ fn strike(
     let (strength, _) = strength::sized(wanted, power, largest, |strength| at(strength).2.ratio);
     let (mut scene, channels, plain) = at(strength);
     let sizes = std::mem::take(&mut scene.sizes);
-    (plain.ratio >= LEAST).then(|| {
+    (plain.ratio >= LEAST_RATIO).then(|| {
         let cause = Cause {
             snr_withheld: None,
             effect: injection.name.to_owned(),
@@ -289,7 +289,11 @@ mod tests {
         };
         let (one, same, healthy) = (dealt("A", 0), dealt("B", 0), dealt("C", 4));
         assert_eq!((&one.effects, one.snr_marginal), (&same.effects, same.snr_marginal));
-        assert!((LEAST..1.5 * SNR.1).contains(&one.snr_marginal), "{}", one.snr_marginal);
+        assert!(
+            (LEAST_RATIO..1.5 * SNR.1).contains(&one.snr_marginal),
+            "{}",
+            one.snr_marginal
+        );
         assert_eq!((healthy.effects.len(), healthy.snr_marginal), (0, 0.0));
         let read = |case: &str| packed::read(&place.path().join(case).join("measured.csv.gz"), 1 << 28).expect(case);
         assert_eq!(read("A"), read("B"));

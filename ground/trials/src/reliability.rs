@@ -7,9 +7,9 @@ use chart::{Axis, ChartError, Figure, Layer, Marks, Panel};
 
 use crate::{interval::clopper_pearson, score::Judged};
 
-/// Bins at most; each holds at least [`LEAST`] statements.
+/// Bins at most; each holds at least [`LEAST_IN_A_BIN`] statements.
 const BINS: usize = 10;
-const LEAST: usize = 5;
+const LEAST_IN_A_BIN: usize = 5;
 
 /// Statements of about the same probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +43,7 @@ impl Reliability {
             }));
         }
         stated.sort_by(|one, other| one.0.total_cmp(&other.0));
-        let size = stated.len().div_ceil(BINS).max(LEAST);
+        let size = stated.len().div_ceil(BINS).max(LEAST_IN_A_BIN);
         let bin = |part: &[(f64, bool)]| {
             let hits = part.iter().filter(|(_, is_right)| *is_right).count();
             Bin {

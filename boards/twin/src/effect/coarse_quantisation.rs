@@ -40,7 +40,7 @@ fn lowest(view: &View, variant: f64, residual: f64) -> f64 {
 }
 
 /// Least worth of a sample that is somewhere in a wide step.
-const LEAST: f64 = 1e-3;
+const LEAST_WORTH: f64 = 1e-3;
 
 /// Where a normal variable with mean zero, known to lie within `low` to `high`, pins its mean, and by how many samples' worth:
 /// a Newton step of its likelihood. With `m`, `v` the mean and variance of what lies there, `m / I` and `I = 1 - v / sigma^2`
@@ -60,7 +60,7 @@ fn pinned(low: f64, high: f64, sigma: f64) -> [f64; 2] {
         return [if low > 0.0 { low } else { high }, 1.0];
     }
     let mean = (density(a) - density(b)) / mass;
-    let worth = (mean * mean - (a * density(a) - b * density(b)) / mass).clamp(LEAST, 1.0);
+    let worth = (mean * mean - (a * density(a) - b * density(b)) / mass).clamp(LEAST_WORTH, 1.0);
     [sigma * mean / worth, worth]
 }
 

@@ -27,10 +27,10 @@ const PAGE: Page = Page {
 };
 
 /// Part of a blow by which it differs from sensor to sensor: they are read some milliseconds apart, and at some distance.
-const APART: f64 = 0.3;
+const SENSORS_DIFFER: f64 = 0.3;
 
 /// Part of the cycles that may be in a blow: what is off more often shakes.
-const MOST: f64 = 0.2;
+const BLOWN_CYCLES: f64 = 0.2;
 
 /// How often a blow turns the unit too, and does not go through its middle.
 const TURNS: f64 = 0.5;
@@ -59,9 +59,9 @@ impl Jolt {
     }
 
     /// ln of how much likelier this is with a vector of `size` along axes A in all, which has a covariance of
-    /// `s I + size^2 A A'`, `s = 1 + (APART size)^2`. By the matrix determinant lemma and Woodbury.
+    /// `s I + size^2 A A'`, `s = 1 + (SENSORS_DIFFER size)^2`. By the matrix determinant lemma and Woodbury.
     fn gain(&self, size: f64) -> f64 {
-        let own = 1.0 + (APART * size).powi(2);
+        let own = 1.0 + (SENSORS_DIFFER * size).powi(2);
         let inner = Matrix3::identity() + self.axes * (size * size / own);
         let common = inner
             .try_inverse()
@@ -109,7 +109,7 @@ impl Effect for Shock {
             let p = theta[0].clamp(0.0, 0.999);
             let mixed = mixture(p);
             let hits: f64 = rows.iter().map(|[usual, hit]| unusual_part(p, *usual, *hit)).sum();
-            let is_rare = hits <= MOST * rows.len() as f64;
+            let is_rare = hits <= BLOWN_CYCLES * rows.len() as f64;
             let of_row = |[usual, hit]: &[f64; 2]| if is_rare { mixed(*usual, *hit) } else { *usual };
             rows.iter().map(of_row).sum()
         })
@@ -137,7 +137,7 @@ impl Effect for Shock {
                     return *measured;
                 }
                 let blow = Vector3::from_fn(|axis, _| noise.stream(first + axis as u64).normal(at));
-                let felt = channel.axis_b.dot(&blow) + APART * own.normal(at);
+                let felt = channel.axis_b.dot(&blow) + SENSORS_DIFFER * own.normal(at);
                 measured + variant * channel.sigma() * felt
             };
             view.measured.iter().enumerate().map(sample).collect()
@@ -176,7 +176,7 @@ mod tests {
         (axes.iter().zip(values.iter())).for_each(|(axis_b, value)| jolt.add(*axis_b, *value));
         for size in [0.5, 5.0, 100.0] {
             let covariance = DMatrix::from_fn(axes.len(), axes.len(), |row, column| {
-                let own = f64::from(u8::from(row == column)) * (1.0 + (APART * size).powi(2));
+                let own = f64::from(u8::from(row == column)) * (1.0 + (SENSORS_DIFFER * size).powi(2));
                 own + size * size * axes[row].dot(&axes[column])
             });
             let factor = covariance.cholesky().unwrap();

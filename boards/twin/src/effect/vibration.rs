@@ -22,13 +22,13 @@ const FINE: usize = 8;
 pub const WANDERS: f64 = -1.0;
 
 /// Sigmas that such a sine reaches at least, and what sizes are sought in multiples of.
-const LEAST: f64 = 5.0;
+const SMALLEST_SINE: f64 = 5.0;
 const FAR: f64 = 10.0;
 
 /// Part of the samples that must be this many sigma off: of a sine that is on for a quarter of the time. What is off for seconds is
 /// no shaking.
 const LONG: f64 = 0.15;
-const OFF: f64 = 3.0;
+const OFF_SIGMAS: f64 = 3.0;
 
 /// ln of the density at `z` sigma of a sine of amplitude `a` sigma and any phase, with noise: `1/(pi sqrt(a^2 - z^2))` rounded off
 /// over a sigma at its ends, and by that a little too low everywhere.
@@ -154,12 +154,15 @@ impl Effect for Vibration {
 
 /// ln likelihood of a channel half of whose samples are off by a sine of amplitude `a` sigma and any phase.
 fn wandering(a: f64, view: &View) -> f64 {
-    if a < LEAST {
+    if a < SMALLEST_SINE {
         return view.nominal();
     }
     let sigma = view.channel.sigma();
     let (off, all) = view.residuals().fold((0.0, 0.0), |(off, all), (_, residual)| {
-        (off + f64::from(u8::from(residual.abs() > OFF * sigma)), all + 1.0)
+        (
+            off + f64::from(u8::from(residual.abs() > OFF_SIGMAS * sigma)),
+            all + 1.0,
+        )
     });
     if off < LONG * all {
         return view.nominal();

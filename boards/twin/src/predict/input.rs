@@ -10,7 +10,7 @@ use super::{Aim, Chain, Feel, Filter, Kind, Twin};
 
 /// Relative distance below which two time constants are taken as this far apart: the partial fractions of two equal
 /// low-passes divide zero by zero.
-const APART: f64 = 1e-4;
+const SEPARATION: f64 = 1e-4;
 
 /// Low-passes by kind and time constant.
 pub(super) type Filters = Vec<(Kind, f64, Filter)>;
@@ -157,7 +157,7 @@ impl Twin {
         } else if look.lag_s < 0.0 {
             // Low-pass and lead: y + |lag| y', and tau y' = u - y.
             let lead_s = -look.lag_s;
-            let tau_s = if tau_s > 0.0 { tau_s } else { lead_s * APART };
+            let tau_s = if tau_s > 0.0 { tau_s } else { lead_s * SEPARATION };
             let sharper = through(0.0);
             let softer = if slow == sharper { through(tau_s) } else { slow.clone() };
             combine(&mut slow, 1.0, &sharper, lead_s / tau_s);
@@ -194,8 +194,8 @@ fn combine(sum: &mut [f64], weight: f64, other: &[f64], other_weight: f64) {
 }
 
 fn apart(tau_s: f64, from_s: f64) -> f64 {
-    if (tau_s - from_s).abs() < APART * from_s {
-        from_s * (1.0 + APART)
+    if (tau_s - from_s).abs() < SEPARATION * from_s {
+        from_s * (1.0 + SEPARATION)
     } else {
         tau_s
     }

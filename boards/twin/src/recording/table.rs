@@ -2,7 +2,7 @@
 //!
 //! In: the file and the names of the columns that matter; all others are ignored, whatever they hold. An empty cell is
 //! "no sample". Out: [`Series`] of columns that belong together. Refuses, with line and column, what is no number, NaN and
-//! infinity, numbers beyond [`MOST`], time that stands or goes back, a ragged line, a vector that is empty in part, a damaged
+//! infinity, numbers beyond [`LARGEST_CELL`], time that stands or goes back, a ragged line, a vector that is empty in part, a damaged
 //! gzip, more than [`MAX_ROWS`] lines or [`MAX_BYTES`], and a gzip bomb ([`packed`]), so that no file can exhaust memory or
 //! patience.
 
@@ -24,7 +24,7 @@ pub const MAX_ROWS: usize = 2_000_000;
 pub const MAX_BYTES: u64 = 256 * MAX_ROWS as u64;
 
 /// Largest magnitude of a cell: f64 holds every whole number up to some 1e16, and a difference of two beyond it may overflow.
-const MOST: f64 = 1e15;
+const LARGEST_CELL: f64 = 1e15;
 /// No sample. No file can hold it, since NaN is refused.
 const EMPTY: f64 = f64::NAN;
 
@@ -236,12 +236,12 @@ fn number(record: &ByteRecord, place: usize, line: u64, column: &str) -> Result<
     }
     let quoted = || String::from_utf8_lossy(&cell[..cell.len().min(32)]).into_owned();
     match std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok()) {
-        Some(number) if number.abs() <= MOST => Ok(number),
+        Some(number) if number.abs() <= LARGEST_CELL => Ok(number),
         Some(number) if number.is_finite() => Err(Fault::Beyond {
             line,
             column: column.to_owned(),
             text: quoted(),
-            most: MOST,
+            most: LARGEST_CELL,
         }),
         Some(_) => Err(Fault::NotFinite {
             line,

@@ -10,12 +10,12 @@
 //! from the curvature of the likelihood in the logarithms, and for the ramp from its generalised least squares.
 //!
 //! A walk whose likelihood is not [`DISTINCT`] above that of no walk is refused and bounded from above. A record
-//! shorter than [`LEAST`] samples, or constant, is refused.
+//! shorter than [`FEWEST_SAMPLES`] samples, or constant, is refused.
 
 use nalgebra::Matrix2;
 
 /// Fewest samples: the curvature of shorter records does not give intervals.
-pub const LEAST: usize = 100;
+pub const FEWEST_SAMPLES: usize = 100;
 /// Twice the log-likelihood by which a walk must beat none: one-sided 99 % of its distribution at the boundary.
 const DISTINCT: f64 = 5.41;
 /// Twice the log-likelihood given up at a one-sided 95 % bound.
@@ -72,7 +72,7 @@ impl Stability {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StabilityError {
     /// Too short.
-    #[error("{0} samples; drift stability needs at least {LEAST}, and hours of them to see a walk")]
+    #[error("{0} samples; drift stability needs at least {FEWEST_SAMPLES}, and hours of them to see a walk")]
     TooShort(usize),
     /// No noise at all.
     #[error("the record is constant: its resolution hides the drift")]
@@ -81,7 +81,7 @@ pub enum StabilityError {
 
 /// Most likely white noise, walk and ramp of a record sampled every `step_s`.
 pub fn stability(record: &[f64], step_s: f64) -> Result<Stability, StabilityError> {
-    if record.len() < LEAST {
+    if record.len() < FEWEST_SAMPLES {
         return Err(StabilityError::TooShort(record.len()));
     }
     let steps: Vec<f64> = record.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -195,7 +195,7 @@ impl Likelihood {
 
 /// Deviations of the logarithms of both deviations, from the curvature of the likelihood.
 fn log_sigmas(steps: &[f64], log_w: f64, log_u: f64) -> (f64, f64) {
-    /// Wide enough for rounding, narrow against the width of any likelihood of [`LEAST`] samples.
+    /// Wide enough for rounding, narrow against the width of any likelihood of [`FEWEST_SAMPLES`] samples.
     const STEP: f64 = 1e-3;
     let log = |a: f64, b: f64| {
         let (log_w, log_u) = (log_w + a * STEP, log_u + b * STEP);

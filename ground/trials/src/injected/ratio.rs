@@ -29,7 +29,7 @@ const ORDER: usize = 8;
 const ROW_ORDER: usize = 16;
 
 /// Blocks to either side over which a level is taken, and blocks' worth of the mean level that are added.
-const NEAR: usize = 10;
+const BLOCKS_BESIDE: usize = 10;
 const PSEUDO: f64 = 4.0;
 
 /// Blocks that are one slow value: two seconds.
@@ -177,9 +177,9 @@ impl Yardstick {
                     .collect();
                 Healthy {
                     left: (energy.iter().sum::<f64>() / (3 * energy.len().max(1)) as f64).sqrt(),
-                    whitening: [0, 1, 2].map(|own| Whitening::of(&axis(&left, own), ORDER, NEAR)),
+                    whitening: [0, 1, 2].map(|own| Whitening::of(&axis(&left, own), ORDER, BLOCKS_BESIDE)),
                     rows: [0, 1, 2].map(|own| {
-                        let near = NEAR * (told::BLOCK_S / scene.step_s).round().max(1.0) as usize;
+                        let near = BLOCKS_BESIDE * (told::BLOCK_S / scene.step_s).round().max(1.0) as usize;
                         Whitening::of(&axis(&sensor.values, own), ROW_ORDER, near)
                     }),
                     written: sensor.values.clone(),

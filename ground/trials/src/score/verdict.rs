@@ -136,7 +136,7 @@ pub struct Shrink {
 }
 
 /// Names are said from this probability on.
-const SAID: f64 = 0.5;
+const SAID_FROM: f64 = 0.5;
 
 /// Alternatives from this probability on belong to the declared set, which holds at most [`LARGEST_SET`] names.
 const IN_SET: f64 = 0.05;
@@ -144,11 +144,11 @@ pub(super) const LARGEST_SET: usize = 3;
 
 impl Verdict {
     pub(super) fn said(&self) -> impl Iterator<Item = &Named> {
-        self.causes.iter().filter(|cause| cause.probability >= SAID)
+        self.causes.iter().filter(|cause| cause.probability >= SAID_FROM)
     }
 
     pub(super) fn is_unknown(&self) -> bool {
-        self.none_of_these >= SAID
+        self.none_of_these >= SAID_FROM
     }
 
     pub(super) fn declared(&self) -> Vec<&str> {

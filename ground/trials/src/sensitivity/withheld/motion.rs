@@ -15,7 +15,7 @@ const KNOT: usize = 6;
 const SUPPORT: usize = 4;
 
 /// [m/s2] and [rad/s2], [m/s3]: the least that accelerations and derivatives may change by.
-const LEAST: f64 = 0.02;
+const LEAST_CHANGE: f64 = 0.02;
 
 /// Packet by packet.
 pub fn by_packet(samples: &[Vec<Sample>]) -> DMatrix<f64> {
@@ -25,7 +25,7 @@ pub fn by_packet(samples: &[Vec<Sample>]) -> DMatrix<f64> {
         let pairs = felt
             .windows(2)
             .map(|pair| (of(&pair[1]) - of(&pair[0])).norm_squared() / 3.0);
-        (pairs.sum::<f64>() / felt.len().max(2) as f64).sqrt().max(LEAST)
+        (pairs.sum::<f64>() / felt.len().max(2) as f64).sqrt().max(LEAST_CHANGE)
     };
     // A derivative is known to what it changes by, and to what the noise of two packets makes of a slope.
     let (gyro, accelerometer) = (kind(Quantity::Rate).noise, kind(Quantity::SpecificForce).noise);
@@ -91,7 +91,7 @@ pub fn by_course(samples: &[Vec<Sample>]) -> DMatrix<f64> {
     let all = samples.iter().flatten();
     let energy: f64 = all.map(|sample| sample.felt.acceleration.norm_squared() / 3.0).sum();
     let count = samples.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-    let acceleration = (energy / count).sqrt().max(LEAST);
+    let acceleration = (energy / count).sqrt().max(LEAST_CHANGE);
     let size = KNOT * (samples.len() + SUPPORT - 1);
     let band = KNOT * SUPPORT;
     // Row `i` holds the columns `i - band + 1` to `i`.
