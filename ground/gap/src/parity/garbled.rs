@@ -10,7 +10,9 @@
 //!
 //! Far samples alone are no damage: a blow makes them. What a reversed bit makes is a power of two in codes. Of samples
 //! that are off by any size, however large, one in [`ODDS`] comes as near to one as noise lets it; more than chance allows
-//! ([`ROWS_CHANCE`]) are damage. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own
+//! ([`ROWS_CHANCE`]) are damage. Chance is that of samples that have nothing to do with each other, and damage strikes a packet's sample,
+//! not a stretch of them: a sample whose neighbour of the same part in time is far off too has no say, for what lasts (a part whose counts mean
+//! half as much, in a boost) passes slowly through powers of two, and stays near each for many packets. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own
 //! neighbours by as much. They have no say in whether there is damage.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
@@ -66,6 +68,7 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Option<Finding> {
     let far: Vec<Off> = (kinds.iter().flat_map(|kind| off(log, unit, *kind)))
         .filter(Off::is_far)
         .collect();
+    let far = alone(unit, far);
     let reversed: Vec<&Off> = far.iter().filter(|own| own.is_reversed_bit()).collect();
     let before = (reversed.len() as u64).checked_sub(1)?;
     let chance = Binomial::new(ODDS.recip(), far.len() as u64).map_or(1.0, |law| law.sf(before));
@@ -87,6 +90,16 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Option<Finding> {
         step: None,
         looks: Vec::new(),
     })
+}
+
+/// Those beside which, in the packets before and after, no sample of the same part is far off.
+fn alone(unit: &UnitDescription, far: Vec<Off>) -> Vec<Off> {
+    let part = |own: &Off| (&unit.channels[own.channel].group, unit.channels[own.channel].sensor);
+    let lasts = |own: &&Off| {
+        let is_beside = |other: &Off| own.row.abs_diff(other.row) == 1 && part(other) == part(own);
+        far.iter().any(is_beside)
+    };
+    far.iter().filter(|own| !lasts(own)).copied().collect()
 }
 
 /// Channel and row of samples that are off.
