@@ -41,6 +41,8 @@ pub struct Seen {
     pub with_reference: f64,
     /// By parity.
     pub snr: f64,
+    /// \[nats\] of having looked when it is on.
+    pub price: f64,
 }
 
 /// An effect that was taken.
@@ -157,6 +159,7 @@ impl Seen {
             score,
             with_reference: snr,
             snr,
+            price: 0.0,
         }
     }
 
@@ -187,6 +190,7 @@ impl Seen {
             with_reference: ratio(&alone),
             snr: ratio(&|index| information[(index, index)]),
             information,
+            price: 0.0,
         }
     }
 }
@@ -412,7 +416,7 @@ pub fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
     screen.information.copy_from(&seen.information);
     screen.score.copy_from(&seen.score);
     let width = hypothesis.small().len();
-    let gain = screen.of_any_size(once(0..width))?;
+    let gain = screen.of_any_size(once(0..width))? - seen.price;
     screen.settle(once(0..width));
     let estimate = screen.estimate(&(0..width).collect::<Vec<_>>())?;
     Some(Fit {
@@ -488,7 +492,7 @@ impl<'a> Beside<'a> {
         let mut parts = self.parts.clone();
         parts.push(from..from + width);
         let of_other_sizes = both.settle(parts);
-        let gain = both.log_evidence()? + of_other_sizes - self.log_evidence;
+        let gain = both.log_evidence()? + of_other_sizes - self.log_evidence - seen.price;
         let estimate = both.estimate(&(0..from + width).collect::<Vec<_>>())?;
         let theta = estimate.parameters.rows(from, width).into_owned();
         Some(Fit {
@@ -500,16 +504,10 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// The likeliest, if it is likelier than nothing by the margin of a name.
+/// The likeliest, if it is likelier than nothing by the margin of a name: of the effect that is likeliest over all its places and variants the
+/// best one. An effect with five time constants shares its prior among them, so that the best single hypothesis may be of another.
 fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<Chosen> {
     let prior = |at: usize| library.hypotheses[at].log_prior;
-    let (best, fit) = (fits.iter()).max_by(|one, other| {
-        let score = |(at, fit): &(usize, Fit)| fit.gain / TEMPERATURE + prior(*at);
-        score(one).total_cmp(&score(other))
-    })?;
-    if fit.gain + prior(*best) < EFFECT_MARGIN {
-        return None;
-    }
     let mut gains: Vec<f64> = fits.iter().map(|(_, fit)| fit.gain).collect();
     let mut priors: Vec<f64> = fits.iter().map(|(at, _)| prior(*at)).collect();
     // Nothing.
@@ -523,6 +521,15 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
             Some((_, sum)) => *sum += share,
             None => by_effect.push((effect, *share)),
         }
+    }
+    let (first, _) = by_effect.iter().max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let of_first = fits.iter().filter(|(at, _)| library.hypotheses[*at].effect() == *first);
+    let (best, fit) = of_first.max_by(|one, other| {
+        let score = |(at, fit): &(usize, Fit)| fit.gain / TEMPERATURE + prior(*at);
+        score(one).total_cmp(&score(other))
+    })?;
+    if fit.gain + prior(*best) < EFFECT_MARGIN {
+        return None;
     }
     let hypothesis = &library.hypotheses[*best];
     let own = by_effect
@@ -557,4 +564,57 @@ fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)]) -> Option<
         probability: own * doubt * itself(excess) * if is_shown { 1.0 } else { UNTOLD },
         rivals: by_effect,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use twin::{
+        effect::{Cause, Locality, by_name},
+        predict::{emems, thesis_slot_s},
+    };
+
+    use super::*;
+
+    #[test]
+    fn an_effect_of_many_variants_is_as_likely_as_all_of_them() {
+        let unit = emems(thesis_slot_s);
+        let mut library = Library::default();
+        let mut offer = |effect: &str, variant: f64, log_prior: f64| {
+            let cause = Cause {
+                effect: by_name(effect).expect("in the library"),
+                locality: Locality::All,
+                variant,
+            };
+            library.hypotheses.push(Hypothesis {
+                parameters: cause.parameters(&unit),
+                cause,
+                places: Vec::new(),
+                log_prior,
+                span: None,
+            });
+        };
+        offer("gyro-supply", 0.0, -4.0);
+        for variant in [20.0, 40.0, 80.0, 160.0] {
+            offer("gyro-warm-up", variant, -4.0 - 4f64.ln());
+        }
+        // Each time constant explains as much as the supply does, but for one that explains a little more, and has a quarter of its prior odds.
+        let fits: Vec<(usize, Fit)> = [20.0, 20.0, 21.5, 20.0, 20.0]
+            .into_iter()
+            .enumerate()
+            .map(|(at, gain)| {
+                let width = library.hypotheses[at].parameters.len();
+                let fit = Fit {
+                    gain,
+                    theta: DVector::zeros(width),
+                    covariance: DMatrix::zeros(width, width),
+                    energy: 0.0,
+                };
+                (at, fit)
+            })
+            .collect();
+        let chosen = likeliest(&library, &[], &fits).expect("likelier than nothing");
+        assert_eq!(chosen.hypothesis, 2);
+        assert_eq!(chosen.rivals[0].0, "gyro-supply");
+        assert!(chosen.rivals[0].1 < 0.5, "{:?}", chosen.rivals);
+    }
 }
