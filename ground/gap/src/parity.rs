@@ -11,7 +11,7 @@
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
 //! | 6 | [`visible`], [`nulls`] | of each effect, what this log can show at all, before anything is sought |
-//! | 7 | [`search`] (by [`walk`]) | which effects the evidence prefers among those that can be seen |
+//! | 7 | [`search`] (by [`walk`], [`again`]) | which effects the evidence prefers among those that can be seen |
 //! | 8 | [`crate::parity::smooth`], [`followed`], [`known`] | the motion along the whole log, with what else is known of it |
 //! | 9 | [`smoothed`] | which others it prefers about that motion, and what the held-out windows say |
 //! | 10 | [`findings`], [`name`] | which of them are said, and where the gap is |
@@ -31,6 +31,7 @@
 //! Columns are those of [`crate::library`], made about the smoothed motion. The held-out windows have a motion of their own, and say
 //! whether what is named is as strong there.
 
+pub mod again;
 pub mod chips;
 pub mod codes;
 pub mod course;

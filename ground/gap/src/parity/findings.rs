@@ -23,6 +23,7 @@ use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
     parity::{
+        again,
         chips::{self, Beside},
         codes::{self, Finding},
         flight::Flight,
@@ -146,10 +147,11 @@ impl Findings {
         let (space, opened) = Space::among(&problem, &motion, nulls, &offered.columns());
         let residual = projected(&space, &[]);
         progress("visible", 0.0);
-        let seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
+        let mut seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
             progress("visible", share);
         });
         let mut visible = visible::table(&library.hypotheses, &seen);
+        again::take(&space, &mut library, &residual, &mut seen);
         let chosen = search::choose(&space, &library, &residual, &seen, First::default(), &|share| {
             progress("search", share);
         });

@@ -25,6 +25,7 @@ use crate::{
     library::{hypotheses::Library, products::Entries},
     null::problem::{Component, Problem},
     parity::{
+        again,
         followed::Followed,
         name::{By, Name},
         nulls::{self, NULLS},
@@ -87,7 +88,7 @@ impl Second {
         let (twin, fit, reference) = (followed.twin(smoothed)?, followed.fit(), Reference::default());
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
-        let library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
+        let mut library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
         let offered = Offered::of(&problem, &library);
         let nulls = nulls::columns(&problem, &library);
         let (space, opened) = Space::among(&problem, motion, nulls, &offered.columns());
@@ -98,9 +99,11 @@ impl Second {
         let residual = project(&model);
         let first = First::of(&space, &model);
         let part = |from: f64, share: f64| progress("smoothed", from + (1.0 - from) * share);
-        let seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
+        let mut seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
             part(0.4, 0.7 * share)
         });
+        let visible = visible::table(&library.hypotheses, &seen);
+        again::take(&space, &mut library, &residual, &mut seen);
         let chosen = search::choose(&space, &library, &residual, &seen, first, &|share| {
             part(0.8, share);
         });
@@ -111,7 +114,7 @@ impl Second {
             left.push(Left::of(&space, &project(&model)));
         }
         Ok(Some(Self {
-            visible: visible::table(&library.hypotheses, &seen),
+            visible,
             rivals: search::rivals(&library, &chosen),
             names: said
                 .iter()

@@ -180,6 +180,18 @@ impl<'a> Space<'a> {
         apart
     }
 
+    /// Part of the energy of columns, each for a standard deviation, that the motion cannot imitate.
+    pub fn kept_by_motion(&self, columns: &[Entries], sigmas: &[f64]) -> f64 {
+        let parts = self.motion.parts(&columns.iter().collect::<Vec<_>>());
+        let sum = |own: &dyn Fn(usize) -> f64| -> f64 {
+            let all = sigmas.iter().enumerate();
+            all.map(|(at, sigma)| sigma * sigma * own(at)).sum()
+        };
+        let whole = sum(&|at| dot(&columns[at], &columns[at]));
+        let imitated = sum(&|at| parts.column(at).norm_squared());
+        if whole > 0.0 { 1.0 - imitated / whole } else { 0.0 }
+    }
+
     /// The same of one.
     fn one_apart(&self, column: &Entries, part: &DVector<f64>) -> Entries {
         let apart = self.apart(&[column], &DMatrix::from_columns(std::slice::from_ref(part)));

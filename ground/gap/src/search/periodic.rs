@@ -62,7 +62,7 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
         return None;
     }
     let step_hz = 1.0 / (STEPS * span_s);
-    let steps = ((most_hz - least_hz) / step_hz) as usize;
+    let steps = steps(span_s);
     let periods = (0..=steps).map(|step| 1.0 / (least_hz + step_hz * step as f64));
     let mut every_s = periods
         .map(|every_s| (folded.differ(every_s), every_s))
@@ -77,7 +77,7 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
         around.iter().flat_map(near).collect()
     };
     let mut all: Vec<f64> = (0..PHASES).map(|phase| phase as f64 / PHASES as f64).collect();
-    let price = ((steps * PHASES * PHASES) as f64).ln();
+    let price = price(span_s);
     let (mut found, mut hz_step, mut edge_step) = (None, 0.5 * step_hz, 1.0 / PHASES as f64);
     for round in 0..ROUNDS {
         let tried = (-2..=2).map(|index| 1.0 / (1.0 / every_s + hz_step * f64::from(index)));
@@ -115,6 +115,16 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
     };
     let is_there = gains.iter().all(is_in);
     (gain > STRETCH_MARGIN + price && is_there).then_some((on, gain - price))
+}
+
+/// Periods that are tried in so long a time, but one.
+fn steps(span_s: f64) -> usize {
+    ((1.0 / SHORTEST_S - FEWEST / span_s) * STEPS * span_s).max(0.0) as usize
+}
+
+/// \[nats\] the price of having looked at all periods and edges in so long a time.
+pub fn price(span_s: f64) -> f64 {
+    ((steps(span_s) * PHASES * PHASES).max(1) as f64).ln()
 }
 
 impl Folded<'_> {
