@@ -11,10 +11,7 @@
 //! Refuses a unit whose sensors are no more than what a motion has: one plate. Then parity is empty.
 
 use nalgebra::DVector;
-use statrs::{
-    distribution::{ChiSquared, ContinuousCDF},
-    function::erf::erfc,
-};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::predict::Kind;
 
 use crate::{
@@ -42,6 +39,10 @@ use crate::{
     probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
 };
+
+/// Sigmas that a parameter of the calibration may be off by where it is not as described: an effect of a kind may be as many times its usual
+/// size ([`crate::null::evidence`]).
+const OVERSIZE: f64 = 5.0;
 
 /// A channel of the gap.
 #[derive(Clone, Debug)]
@@ -319,13 +320,21 @@ fn projected(space: &Space, model: &[Component]) -> Projected {
     space.project_residual(residual_of(space.problem, model), &DVector::zeros(0))
 }
 
-/// Whether something is there that nothing named explains: a gap too large, or a calibration that is off by more of its own sigmas
-/// than chance gives one log in twenty over all its parameters. A magnet beside one of forty channels is lost in the gap of
-/// the whole, and found in the calibration.
-pub fn is_unexplained(Left { gap, calibration }: &Left) -> bool {
-    let most = calibration.iter().fold(0.0, |most: f64, size| most.max(size.abs()));
-    // Of a standard normal: what is fitted is off by no more than what it is fitted to.
-    *gap > PARITY_GAP || erfc(most / 2f64.sqrt()) * (calibration.len() as f64) < CHANCE
+/// Whether something is there that nothing named explains: a gap too large, or a calibration of which one parameter is likelier off by more
+/// than described than not. A magnet beside one of forty channels is lost in the gap of the whole, and found in the calibration.
+pub fn is_unexplained(left: &Left) -> bool {
+    left.gap > PARITY_GAP || off(&left.calibration) > SAID
+}
+
+/// Probability that one of these parameters, in their own sigmas, is off as what is not described may be. Of a standard normal they are off by no
+/// more than it; one that is not may be [`OVERSIZE`] times as far off, and which one nobody knows. With the prior odds of something
+/// unknown ([`UNKNOWN_PRIOR`]) that weighs a healthy unit's farthest parameter, which one log in twenty has beyond `z` with
+/// `n erfc(z / sqrt(2)) = 0.05`, as what it is: of two hundred 3.7 sigmas are three hundredths, and five are nine tenths.
+fn off(calibration: &[f64]) -> f64 {
+    let of_one = |size: &f64| (0.5 * size * size * (1.0 - OVERSIZE.powi(-2))).exp() / OVERSIZE;
+    let odds = calibration.iter().map(of_one).sum::<f64>() / calibration.len().max(1) as f64;
+    // Beyond what a number holds it is certain.
+    1.0 - (1.0 - UNKNOWN_PRIOR) / (1.0 - UNKNOWN_PRIOR + UNKNOWN_PRIOR * odds)
 }
 
 #[cfg(test)]
@@ -345,13 +354,15 @@ mod tests {
 
     #[test]
     fn a_gap_and_a_calibration_beyond_chance_are_each_enough_to_be_unexplained() {
-        // Of 400 parameters one is beyond 3.8 sigma in one log of twenty: 400 * erfc(3.8 / sqrt(2)) = 0.058, at 3.9 0.038.
+        // Of 400 parameters the odds are even at 0.05 / 0.95 exp(0.48 z^2) / 5 / 400 = 1, z = 4.68, which noise has in one log of 870. Beyond 3.9
+        // sigma is one in one log of twenty-six.
         let left = |gap: f64, most: f64| Left {
             gap,
             calibration: [vec![0.5; 399], vec![-most]].concat(),
         };
-        assert!(!is_unexplained(&left(1.0, 3.8)));
-        assert!(is_unexplained(&left(1.0, 3.9)));
+        assert!(!is_unexplained(&left(1.0, 4.6)));
+        assert!(is_unexplained(&left(1.0, 4.8)));
+        assert!(is_unexplained(&left(1.0, 1e3)));
         assert!(is_unexplained(&left(1.06, 1.0)));
         assert!(!is_unexplained(&left(1.04, 1.0)));
     }
