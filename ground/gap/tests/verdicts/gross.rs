@@ -184,6 +184,31 @@ fn what_is_far_off_by_any_size_is_not_garbled() {
     assert!(coded.iter().all(|own| own.effect != "packet-corruption"), "{coded:?}");
 }
 
+/// By a power of two, and for twelve seconds: what damages packets strikes one sample and then another.
+#[test]
+fn what_is_off_by_a_power_of_two_for_long_is_not_garbled() {
+    let coded = coded(&recoded(|channel, row, code| match (channel, row) {
+        (4, 200..260) => code + 256,
+        _ => code,
+    }));
+    assert!(coded.iter().all(|own| own.effect != "packet-corruption"), "{coded:?}");
+}
+
+/// A field that every magnetometer has of its own, on for 4.8 of every 12 s.
+#[test]
+fn a_current_that_comes_again_is_named_with_its_period() {
+    let unit = emems(thesis_slot_s);
+    let folder = recoded(|channel, row, code| {
+        let is_on = row % 60 < 24 && unit.channels[channel].sensor == Kind::Magnetometer;
+        code + i64::from(is_on) * if channel % 2 == 0 { 12 } else { -9 }
+    });
+    let (names, findings) = found(&folder, &[]);
+    assert_eq!(names, ["current-field"], "{:?}", findings.alternatives);
+    let said = findings.names[0].which.as_deref();
+    assert_eq!(said, Some("on and off, again and again"));
+    assert_eq!(findings.outcome, Outcome::Named, "{:?}", findings.gap);
+}
+
 #[test]
 fn a_bit_that_is_stuck_is_named_and_the_others_are_healthy() {
     let channel = 4;
