@@ -23,7 +23,7 @@
 //! Beside the rooms, and only for [`command`] and other programs: [`kept`] keeps what was said beside the case, [`against`] holds a
 //! corrected twin against another case.
 //!
-//! `tests/rooms.rs` holds the order and the lock: no room needs a later one, and only [`holdout`] opens the held-out samples.
+//! `tests/verdicts/rooms.rs` holds the order and the lock: no room needs a later one, and only [`holdout`] opens the held-out samples.
 //! `tests/golden.rs` holds what is said.
 //!
 //! ```

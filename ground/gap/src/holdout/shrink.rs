@@ -63,7 +63,7 @@ impl Shrink {
 }
 
 /// The largest shrink to be had, in percent: fitting `parameters` leaves a part `parameters / snr^2` of the excess energy
-/// (gap method, section 4.6), which a gap of `before` sigma over its `floor` counts as a root mean square.
+/// (`n` parameters fitted to noise of one take up `n` of its energy), which a gap of `before` sigma over its `floor` counts as a root mean square.
 pub fn ceiling_percent([before, floor]: [f64; 2], parameters: usize, snr: f64) -> f64 {
     let lost = (parameters as f64 / (snr * snr)).min(1.0);
     let [excess, least] = [before * before - floor * floor, floor * floor];

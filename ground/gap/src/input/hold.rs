@@ -1,7 +1,7 @@
 //! The samples of the hold windows, locked away.
 //!
 //! In: what [`crate::input::windows`] parts off. Out: how many there are, and to [`crate::holdout::judge`], which judges
-//! finished models, what they are. No fit reaches them: `tests/rooms.rs` finds whoever else opens them.
+//! finished models, what they are. No fit reaches them: `tests/verdicts/rooms.rs` finds whoever else opens them.
 
 use core::fmt;
 

@@ -19,8 +19,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::null::normal::log_determinant;
 
+/// The most times its usual size that an effect may have.
+pub const LARGEST_SIZE: f64 = 5.0;
+
 /// How many times its usual size an effect may have, and the probability of each.
-const SIZES: [(f64, f64); 3] = [(0.2, 0.25), (1.0, 0.5), (5.0, 0.25)];
+const SIZES: [(f64, f64); 3] = [(1.0 / LARGEST_SIZE, 0.25), (1.0, 0.5), (LARGEST_SIZE, 0.25)];
 
 /// Normal equations over every column of every hypothesis.
 #[derive(Clone, Debug)]

@@ -465,4 +465,7 @@ fn white_sigma<'a>(twin: &'a Twin, instrument: &'a Reference, index: usize) -> i
 }
 
 #[cfg(test)]
+pub(crate) mod tumbling;
+
+#[cfg(test)]
 mod tests;

@@ -18,7 +18,10 @@ use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
     library::hypotheses::Library,
-    null::problem::{Component, Problem},
+    null::{
+        evidence::LARGEST_SIZE,
+        problem::{Component, Problem},
+    },
     parity::{
         again,
         chips::{self, Beside},
@@ -39,10 +42,6 @@ use crate::{
     probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
 };
-
-/// Sigmas that a parameter of the calibration may be off by where it is not as described: an effect of a kind may be as many times its usual
-/// size ([`crate::null::evidence`]).
-const OVERSIZE: f64 = 5.0;
 
 /// A channel of the gap.
 #[derive(Clone, Debug)]
@@ -327,11 +326,11 @@ pub fn is_unexplained(left: &Left) -> bool {
 }
 
 /// Probability that one of these parameters, in their own sigmas, is off as what is not described may be. Of a standard normal they are off by no
-/// more than it; one that is not may be [`OVERSIZE`] times as far off, and which one nobody knows. With the prior odds of something
+/// more than it; one that is not may be [`LARGEST_SIZE`] times as far off, and which one nobody knows. With the prior odds of something
 /// unknown ([`UNKNOWN_PRIOR`]) that weighs a healthy unit's farthest parameter, which one log in twenty has beyond `z` with
 /// `n erfc(z / sqrt(2)) = 0.05`, as what it is: of two hundred 3.7 sigmas are three hundredths, and five are nine tenths.
 fn off(calibration: &[f64]) -> f64 {
-    let of_one = |size: &f64| (0.5 * size * size * (1.0 - OVERSIZE.powi(-2))).exp() / OVERSIZE;
+    let of_one = |size: &f64| (0.5 * size * size * (1.0 - LARGEST_SIZE.powi(-2))).exp() / LARGEST_SIZE;
     let odds = calibration.iter().map(of_one).sum::<f64>() / calibration.len().max(1) as f64;
     // Beyond what a number holds it is certain.
     1.0 - (1.0 - UNKNOWN_PRIOR) / (1.0 - UNKNOWN_PRIOR + UNKNOWN_PRIOR * odds)

@@ -10,10 +10,10 @@
 //!
 //! Far samples alone are no damage: a blow makes them. What a reversed bit makes is a power of two in codes. Of samples
 //! that are off by any size, however large, one in [`ODDS`] comes as near to one as noise lets it; more than chance allows
-//! ([`ROWS_CHANCE`]) are damage. Chance is that of samples that have nothing to do with each other, and damage strikes a packet's sample,
-//! not a stretch of them: a sample whose neighbour of the same part in time is far off too has no say, for what lasts (a part whose counts mean
-//! half as much, in a boost) passes slowly through powers of two, and stays near each for many packets. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own
-//! neighbours by as much. They have no say in whether there is damage.
+//! ([`ROWS_CHANCE`]) are damage. That chance is of samples that have nothing to do with each other. What lasts is no damage of packets, and passes
+//! slowly through powers of two: a part whose counts mean half as much, in a boost. So a sample has no say when the same part is far off in the packet
+//! before or after it too. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own neighbours by as much. They
+//! have no say in whether there is damage.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use statrs::distribution::{Binomial, DiscreteCDF};

@@ -260,16 +260,10 @@ fn white(information: &DMatrix<f64>, score: &DVector<f64>, size: f64) -> Option<
 
 #[cfg(test)]
 mod tests {
-    use twin::{
-        environment::Environment,
-        motion::Tumble,
-        predict::{Scene, Twin, emems},
-    };
-
     use super::*;
     use crate::{
-        input::{log::Series, reference::Reference, windows::Fit},
-        null::evidence::Screen,
+        input::reference::Reference,
+        null::{evidence::Screen, problem::tumbling},
     };
 
     const ROWS: usize = 200;
@@ -288,18 +282,9 @@ mod tests {
     /// The evidence of a walk alone, and of an effect with that walk open, is that of both together. With a larger walk alone it is not.
     #[test]
     fn a_walk_alone_and_an_effect_beside_it_are_worth_what_both_together_are() {
-        let environment = Environment::laboratory();
-        let starts_s: Vec<f64> = (0..ROWS).map(|row| row as f64 * 0.2).collect();
-        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 40.0, 0.01);
-        let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s).expect("no effect is named");
+        let twin = tumbling::twin(ROWS as u32);
         let course = |row: u32| 0.01 * (0.02 * f64::from(row)).sin() + 0.003 * (0.9 * f64::from(row)).sin();
-        let all = Series {
-            rows: (0..ROWS as u32).collect(),
-            values: (0..ROWS as u32).map(course).collect(),
-        };
-        let fit = Fit {
-            channels: vec![all; twin.unit().channels.len()],
-        };
+        let fit = tumbling::log(&twin, course);
         let exact = Reference::default();
         let problem = Problem::new(&twin, &fit, &exact);
         let gyro = gyros(&problem)[0];

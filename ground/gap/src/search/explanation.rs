@@ -90,7 +90,7 @@ impl Explanation {
         }
         let mut first = if is_alone { quiet.clone() } else { first };
         if let Some(beside) = beside {
-            // Searched with the walk open, which is not to be done again with louder white noise in its place.
+            // This was found with the walk open. It is not sought again with louder white noise in the walk's place.
             (found, *library, wanders) = (beside.found, beside.library, true);
             first = Model::around(problem, found.model(library));
             scatter = Some(beside.walk.scatter());

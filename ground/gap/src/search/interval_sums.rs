@@ -250,16 +250,10 @@ impl Stretches<'_> {
 
 #[cfg(test)]
 mod tests {
-    use twin::{
-        environment::Environment,
-        motion::Tumble,
-        predict::{Scene, Twin, emems},
-    };
-
     use super::*;
     use crate::{
-        input::{log::Series, reference::Reference, windows::Fit},
-        null::{colour::Colour, whitening::Process},
+        input::reference::Reference,
+        null::{colour::Colour, problem::tumbling, whitening::Process},
     };
 
     const ROWS: usize = 100;
@@ -274,17 +268,9 @@ mod tests {
     /// Two parameters, of which the first is in one of two channels, one white and one coloured.
     #[test]
     fn every_stretch_has_the_normal_equations_of_the_effect_switched_on_in_it() {
-        let environment = Environment::laboratory();
-        let starts_s: Vec<f64> = (0..ROWS).map(|row| row as f64 * 0.2).collect();
-        let scene = Scene::new(&Tumble::new(), &environment, 0.0, 20.0, 0.01);
-        let twin = Twin::new(emems(|_| 0.0), environment, scene, starts_s.clone()).expect("no effect is named");
-        let all = Series {
-            rows: (0..ROWS as u32).collect(),
-            values: vec![0.0; ROWS],
-        };
-        let fit = Fit {
-            channels: vec![all; twin.unit().channels.len()],
-        };
+        let twin = tumbling::twin(ROWS as u32);
+        let starts_s = twin.starts_s().to_vec();
+        let fit = tumbling::log(&twin, |_| 0.0);
         let exact = Reference::default();
         let mut problem = Problem::new(&twin, &fit, &exact);
         let slow = Process::Alike {

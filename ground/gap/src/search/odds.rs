@@ -119,6 +119,20 @@ pub fn alone(library: &Library, found: &Attribution) -> Vec<(String, f64)> {
 mod tests {
     use super::*;
 
+    /// 40 uT is what fields at two places of the Earth differ by.
+    #[test]
+    fn a_field_of_another_site_is_itself() {
+        let effect = twin::effect::by_name("field-model").expect("in the library");
+        let cause = twin::effect::Cause {
+            effect,
+            locality: twin::effect::Locality::Unit,
+            variant: 0.0,
+        };
+        let parameters = cause.parameters(&twin::predict::emems(|_| 0.0));
+        let size = oversize(effect.page(), &DVector::from_vec(vec![40.0, 0.0, 0.0]), &parameters);
+        assert!(itself(size) > 0.8, "{size}");
+    }
+
     #[test]
     fn what_is_beyond_its_largest_size_is_never_named() {
         assert!(itself(0.1) > 0.98);

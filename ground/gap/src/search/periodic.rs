@@ -3,7 +3,7 @@
 //! In: an effect's slopes, and the residual without it. Out: the stretch of time that comes again in which it explains most,
 //! and by how much more than always. Residuals are folded at each period tried, and the one in whose phases they differ most
 //! is taken (epoch folding; Leahy et al. 1983); then all stretches of phases are compared by their evidence, finer and finer,
-//! as [`crate::search::once`] does for one stretch. Having looked costs the logarithm of how many were compared.
+//! as [`crate::search::once`] does for one stretch, until it is plain that none is there. Having looked costs the logarithm of how many were compared.
 
 use crate::{
     input::windows::Span,
