@@ -105,6 +105,11 @@ impl Products {
         }
     }
 
+    /// A column as it is held.
+    pub fn held(&self, place: usize) -> &Column {
+        &self.columns[place]
+    }
+
     /// A column's values.
     pub fn column(&self, place: usize) -> Entries {
         self.columns[place].entries()

@@ -150,13 +150,13 @@ impl Findings {
         let mut seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
             progress("visible", share);
         });
+        // The second look needs as much.
+        drop((offered, opened));
         let mut visible = visible::table(&library.hypotheses, &seen);
         again::take(&space, &mut library, &residual, &mut seen);
         let chosen = search::choose(&space, &library, &residual, &seen, First::default(), &|share| {
             progress("search", share);
         });
-        // Columns of the library as they are offered: two thirds of what the memory holds, while the second look needs as many.
-        drop((offered, opened));
         let mut rivals = search::rivals(&library, &chosen);
         let by_parity = search::said(&chosen).into_iter();
         let mut causes: Vec<(Name, Fitted)> = by_parity

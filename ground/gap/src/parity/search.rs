@@ -15,12 +15,13 @@ use self::fit::{Beside, likeliest};
 pub use self::fit::{Fit, fit_alone, foremost};
 use crate::{
     library::{
+        column::Column,
         hypotheses::{Hypothesis, Library},
         products::Entries,
     },
     null::problem::{Component, Problem},
     parity::{
-        space::{Opened, Projected, Space, dot},
+        space::{Opened, Projected, Space},
         visible::may_be_named,
         walk,
     },
@@ -88,24 +89,29 @@ pub fn residual_of(problem: &Problem, model: &[Component]) -> Entries {
 }
 
 /// The columns of a library, and which of them are each hypothesis': of one that is there or not, what it does on the whole.
-pub struct Offered {
-    columns: Vec<Entries>,
+pub struct Offered<'a> {
+    /// Of the library.
+    held: Vec<&'a Column>,
+    /// Behind them, what those without parameters do.
+    made: Vec<Column>,
     sets: Vec<Vec<usize>>,
 }
 
-impl Offered {
+impl<'a> Offered<'a> {
     /// Of a problem's library.
-    pub fn of(problem: &Problem, library: &Library) -> Self {
+    pub fn of(problem: &Problem, library: &'a Library) -> Self {
         let own = 0..library.products.len();
         let mut offered = Self {
-            columns: own.map(|place| library.products.column(place)).collect(),
+            held: own.map(|place| library.products.held(place)).collect(),
+            made: Vec::new(),
             sets: Vec::new(),
         };
         let mut memory = Memory::default();
         for hypothesis in &library.hypotheses {
             if hypothesis.small().is_empty() {
-                offered.sets.push(vec![offered.columns.len()]);
-                offered.columns.push(on_the_whole(problem, hypothesis, &mut memory));
+                offered.sets.push(vec![offered.held.len() + offered.made.len()]);
+                let made = on_the_whole(problem, hypothesis, &mut memory);
+                offered.made.push(Column::of(made));
             } else {
                 offered.sets.push(hypothesis.small().to_vec());
             }
@@ -114,8 +120,8 @@ impl Offered {
     }
 
     /// All columns.
-    pub fn columns(&self) -> Vec<&Entries> {
-        self.columns.iter().collect()
+    pub fn columns(&self) -> Vec<&Column> {
+        self.held.iter().copied().chain(&self.made).collect()
     }
 
     /// Of each hypothesis, the places of its columns.
@@ -133,10 +139,11 @@ pub fn look(
     progress: &dyn Fn(f64),
 ) -> Vec<Seen> {
     let rest = space.rest(residual);
-    let all = space.within(&offered.columns(), opened, &offered.sets, progress);
+    let columns = offered.columns();
+    let all = space.within(&columns, opened, &offered.sets, progress);
     (all.into_iter().zip(&offered.sets).enumerate())
         .map(|(at, (information, set))| {
-            let columns: Vec<&Entries> = set.iter().map(|place| &offered.columns[*place]).collect();
+            let columns: Vec<&Column> = set.iter().map(|place| columns[*place]).collect();
             Seen::of(library, at, &columns, information, &rest)
         })
         .collect()
@@ -162,7 +169,7 @@ impl Seen {
     }
 
     /// Of a hypothesis with these columns, and of what motion and calibration leave of the residual.
-    fn of(library: &Library, at: usize, columns: &[&Entries], information: DMatrix<f64>, rest: &Entries) -> Self {
+    fn of(library: &Library, at: usize, columns: &[&Column], information: DMatrix<f64>, rest: &Entries) -> Self {
         let hypothesis = &library.hypotheses[at];
         let width = columns.len();
         let sigma = |index: usize| {
@@ -180,11 +187,11 @@ impl Seen {
         };
         let alone = |index: usize| match hypothesis.small().get(index) {
             Some(place) => library.products.product(*place, *place),
-            None => dot(columns[index], columns[index]),
+            None => columns[index].dot(columns[index]),
         };
         Self {
             hypothesis: at,
-            score: DVector::from_fn(width, |row, _| dot(columns[row], rest)),
+            score: DVector::from_fn(width, |row, _| columns[row].dot_entries(rest)),
             with_reference: ratio(&alone),
             snr: ratio(&|index| information[(index, index)]),
             information,

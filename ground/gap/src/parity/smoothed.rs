@@ -102,6 +102,7 @@ impl Second {
         let mut seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
             part(0.4, 0.7 * share)
         });
+        drop((offered, opened));
         let visible = visible::table(&library.hypotheses, &seen);
         again::take(&space, &mut library, &residual, &mut seen);
         let chosen = search::choose(&space, &library, &residual, &seen, first, &|share| {

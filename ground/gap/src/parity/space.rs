@@ -17,7 +17,7 @@ use std::ops::AddAssign;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-pub use self::within::Opened;
+pub use self::within::{Asked, Opened};
 use crate::{library::products::Entries, null::problem::Problem};
 
 /// Columns that are taken through the motion, and rows that are solved for, at once: what a processor's cache holds.
@@ -97,11 +97,11 @@ impl<'a> Space<'a> {
     }
 
     /// The same, and what calibration and nulls take of columns that are to be asked for.
-    pub fn among(
+    pub fn among<A: Asked>(
         problem: &'a Problem<'a>,
         motion: &'a dyn Elimination,
         nulls: Vec<Entries>,
-        columns: &[&Entries],
+        columns: &[&A],
     ) -> (Self, Opened) {
         let mut space = Self::open_still(problem, motion, nulls);
         let (inner, mut open) = space.opened(columns);
@@ -124,11 +124,11 @@ impl<'a> Space<'a> {
     }
 
     /// One in which only the motion is marginalised yet; of calibration and nulls `I + C'(I - Q Q')C`, and `C'(I - Q Q')u` of columns.
-    pub fn motion_only(
+    pub fn motion_only<A: Asked>(
         problem: &'a Problem<'a>,
         motion: &'a dyn Elimination,
         nulls: Vec<Entries>,
-        columns: &[&Entries],
+        columns: &[&A],
     ) -> (Self, DMatrix<f64>, DMatrix<f64>) {
         let space = Self::open_still(problem, motion, nulls);
         let (inner, open) = space.opened(columns);

@@ -26,7 +26,7 @@ use crate::{
     parity::{
         search::{Offered, residual_of},
         smoothed::Left,
-        space::{Elimination, Opened, Space, dot},
+        space::{Elimination, Opened, Space},
     },
     together::log::Looked,
 };
@@ -142,7 +142,7 @@ impl Heard {
                 continue;
             }
             let taken = by_columns.select_columns(set);
-            let along = set.iter().map(|place| dot(columns[*place], &rest));
+            let along = set.iter().map(|place| columns[*place].dot_entries(&rest));
             let said = Own {
                 information: product - taken.tr_mul(&taken),
                 score: DVector::from_iterator(set.len(), along) - taken.tr_mul(&by_rest),

@@ -5,11 +5,13 @@
 //! taken from the other side: `(I - Q Q')C` is made once, a block of its columns at a time, and of it a column `u` needs only the few
 //! channels that it touches, while `(I - Q Q')u` has samples in all.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::{
-    library::products::Entries,
+    library::{column::Column, products::Entries},
     parity::space::{AT_ONCE, Space, dot},
 };
 
@@ -20,14 +22,44 @@ const BLOCK: usize = 128;
 /// Columns whose parts in the motion are held at once, unless one set has more: 20 MiB for five minutes of packets.
 const HELD: usize = 128;
 
+/// A column that is asked for. Its values may be made only where they are needed: those of a whole library at once were a quarter of all
+/// memory that a diagnosis took.
+pub trait Asked: Sync {
+    /// All of its values.
+    fn whole(&self) -> Cow<'_, Entries>;
+
+    /// The same in one channel.
+    fn within(&self, channel: usize) -> Option<Cow<'_, DVector<f64>>>;
+}
+
+impl Asked for Entries {
+    fn whole(&self) -> Cow<'_, Entries> {
+        Cow::Borrowed(self)
+    }
+
+    fn within(&self, channel: usize) -> Option<Cow<'_, DVector<f64>>> {
+        let own = self.iter().find(|(own, _)| *own == channel);
+        own.map(|(_, values)| Cow::Borrowed(values))
+    }
+}
+
+impl Asked for Column {
+    fn whole(&self) -> Cow<'_, Entries> {
+        Cow::Owned(self.entries())
+    }
+
+    fn within(&self, channel: usize) -> Option<Cow<'_, DVector<f64>>> {
+        self.values(channel)
+    }
+}
+
 /// A column in a channel that it touches.
 #[derive(Clone, Copy)]
-struct Touching<'a> {
+struct Touching {
     /// Its place.
     at: usize,
     /// The first sample that is not zero.
     begun: usize,
-    values: &'a DVector<f64>,
 }
 
 /// `c_u` of columns, a column each.
@@ -42,9 +74,9 @@ impl Opened {
 
 impl Space<'_> {
     /// `<u, v>` of the columns of each set, which names them by their places.
-    pub fn within(
+    pub fn within<A: Asked>(
         &self,
-        columns: &[&Entries],
+        columns: &[&A],
         Opened(open): &Opened,
         sets: &[Vec<usize>],
         progress: &dyn Fn(f64),
@@ -67,8 +99,8 @@ impl Space<'_> {
                 places = with;
                 last += 1;
             }
-            let held: Vec<&Entries> = places.iter().map(|place| columns[*place]).collect();
-            let parts = self.motion.parts(&held);
+            let held: Vec<Cow<Entries>> = places.iter().map(|place| columns[*place].whole()).collect();
+            let parts = self.motion.parts(&held.iter().map(|own| &**own).collect::<Vec<_>>());
             for (place, set) in order[done..last].iter().map(|place| (*place, &sets[*place])) {
                 let at: Vec<usize> = set
                     .iter()
@@ -77,7 +109,7 @@ impl Space<'_> {
                 let mut own = DMatrix::zeros(set.len(), set.len());
                 for row in 0..set.len() {
                     for column in 0..=row {
-                        own[(row, column)] = dot(columns[set[row]], columns[set[column]])
+                        own[(row, column)] = dot(&held[at[row]], &held[at[column]])
                             - parts.column(at[row]).dot(&parts.column(at[column]))
                             - open.column(set[row]).dot(&open.column(set[column]));
                     }
@@ -92,13 +124,13 @@ impl Space<'_> {
     }
 
     /// `I + C'(I - Q Q')C`, and `C'(I - Q Q')u` of each column.
-    pub(super) fn opened(&self, columns: &[&Entries]) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(super) fn opened<A: Asked>(&self, columns: &[&A]) -> (DMatrix<f64>, DMatrix<f64>) {
         let frames = &self.problem.frames;
         let mut touching: Vec<Vec<Touching>> = vec![Vec::new(); frames.len()];
         for (at, column) in columns.iter().enumerate() {
-            for (channel, values) in column.iter() {
+            for (channel, values) in column.whole().iter() {
                 if let Some(begun) = values.iter().position(|own| *own != 0.0) {
-                    touching[*channel].push(Touching { at, begun, values });
+                    touching[*channel].push(Touching { at, begun });
                 }
             }
         }
@@ -127,8 +159,10 @@ impl Space<'_> {
                 let products = touching[channel].chunks(HELD).map(|touching| {
                     let begun = touching.first().map_or(0, |own| own.begun);
                     let samples = apart.ncols() - begun;
-                    let columns = touching.iter().map(|own| own.values.rows(begun, samples));
-                    let values = DMatrix::from_columns(&columns.collect::<Vec<_>>());
+                    let own = touching.iter().filter_map(|own| columns[own.at].within(channel));
+                    let own: Vec<Cow<DVector<f64>>> = own.collect();
+                    let values: Vec<_> = own.iter().map(|own| own.rows(begun, samples)).collect();
+                    let values = DMatrix::from_columns(&values);
                     apart.columns(begun, samples) * values
                 });
                 (own, products.collect::<Vec<DMatrix<f64>>>())
