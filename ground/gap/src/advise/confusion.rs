@@ -68,23 +68,29 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
 pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pair> {
     let other = |chosen: &Chosen| {
         let own = library.hypotheses[chosen.hypothesis].effect();
-        chosen
-            .rivals
-            .iter()
-            .find(|rival| library.hypotheses[rival.hypothesis].effect() != own)
-            .map(|rival| (rival.hypothesis, chosen.gain - rival.gain))
+        (chosen.rivals.iter())
+            .filter(|rival| library.hypotheses[rival.hypothesis].effect() != own)
+            .map(|rival| (rival.hypothesis, chosen.gain - rival.in_its_place()))
+            .min_by(|one, other| one.1.total_cmp(&other.1))
     };
     let is_said = |chosen: &&Chosen| said.contains(&library.hypotheses[chosen.hypothesis].effect());
     let pairs = (found.chosen.iter().filter(is_said))
         .filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
-    let (chosen, rival, _) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
+    let (chosen, rival, gap) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
+    // Columns of what is large say nothing of a rival's at zero: where exact fits are as good they are not apart.
+    let by_columns = nats_apart(library, chosen, rival)?;
+    let nats = if gap < SET_APART {
+        by_columns.min(gap.max(0.0))
+    } else {
+        by_columns
+    };
     Some(Pair {
         own: (
             library.hypotheses[chosen.hypothesis].cause.clone(),
             chosen.theta.iter().copied().collect(),
         ),
         rival: library.hypotheses[rival].cause.clone(),
-        nats: nats_apart(library, chosen, rival)?,
+        nats,
     })
 }
 

@@ -137,6 +137,19 @@ fn refine_at(problem: &Problem, library: &Library, set: &[usize], start: &[DVect
     })
 }
 
+/// Evidence that a set with these parameters promises, were it linear with the columns of the library, `last` in the place of its last member's.
+pub fn promised(problem: &Problem, library: &Library, set: &[usize], thetas: &[DVector<f64>], last: &[Entries]) -> f64 {
+    let others = set.iter().rev().skip(1).rev();
+    let own = others.flat_map(|hypothesis| library.hypotheses[*hypothesis].places.iter().copied());
+    let slopes: Vec<Entries> = (0..library.reference)
+        .chain(own)
+        .map(|place| library.products.column(place))
+        .chain(last.iter().cloned())
+        .collect();
+    let point = Point::at(problem, library, set, thetas, &slopes, Size::Usual);
+    point.log_evidence + point.to_gain
+}
+
 fn is_zero(entries: &Entries) -> bool {
     entries
         .iter()

@@ -58,7 +58,7 @@ pub fn itself(excess: f64) -> f64 {
 
 /// Probabilities of the effects among rivals, places added up; what is missing from one is "nothing", or has no name.
 pub fn by_effect(library: &Library, rivals: &[Rival]) -> Vec<(&'static str, f64)> {
-    let mut gains: Vec<f64> = rivals.iter().map(|rival| rival.gain).collect();
+    let mut gains: Vec<f64> = rivals.iter().map(Rival::in_its_place).collect();
     gains.push(0.0);
     let shares = probabilities(&gains, &vec![0.0; gains.len()], TEMPERATURE);
     let mut sums: Vec<(&'static str, f64)> = Vec::new();

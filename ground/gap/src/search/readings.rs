@@ -10,6 +10,7 @@
 //! stretch of time in which it explains most (`intervals`): one that is on for a quarter of the log looks like a step of
 //! another if it has to be on throughout.
 
+mod alike;
 mod chosen;
 mod columns;
 mod intervals;
@@ -25,9 +26,9 @@ pub use self::{
     screen::are_physical,
 };
 use self::{
-    columns::always,
+    columns::{always, renew},
     intervals::{Passing, bounded, fitted, stretches, taken},
-    rivals::compare,
+    rivals::{Found, compare},
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::is_any_same,
 };
@@ -117,10 +118,20 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
             _ => break,
         }
     }
-    let mut chosen = Vec::new();
-    for at in 0..set.len() {
-        chosen.push(compare(&passing, library, &scores, &set, &best, nothing, at));
-    }
+    let compared = |library: &mut Library, scores: &[f64], set: &[usize], best: &Refined| -> Vec<Chosen> {
+        let beside = gains(problem, library, scores, set);
+        let found = Found {
+            set,
+            best,
+            scores,
+            beside: &beside,
+            nothing,
+        };
+        (0..set.len())
+            .map(|at| compare(&passing, library, &found, at))
+            .collect()
+    };
+    let mut chosen = compared(library, &scores, &set, &best);
     // A rival that does better in the place of a chosen one takes it; the comparison is then made anew.
     for _ in 0..MOST_EFFECTS {
         let swap = chosen.iter().enumerate().find(|(at, chosen)| {
@@ -129,18 +140,21 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
                 .first()
                 .is_some_and(|rival| rival.hypothesis != set[*at] && rival.gain > chosen.gain)
         });
-        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0])) else {
+        let Some((at, winner)) = swap.map(|(at, chosen)| (at, chosen.rivals[0].clone())) else {
             break;
         };
         always(problem, library, set.remove(at));
         set.push(winner.hypothesis);
         let mut start = best.thetas.clone();
         start.remove(at);
+        // Columns at zero lead elsewhere where the winner is large.
+        if winner.span.is_none() && !winner.theta.is_empty() {
+            start.push(winner.theta);
+            renew(problem, library, &set, &start);
+        }
         best = taken(problem, library, &set, &start, winner.span);
         scores = renewed_scores(problem, library, &set, &best);
-        chosen = (0..set.len())
-            .map(|at| compare(&passing, library, &scores, &set, &best, nothing, at))
-            .collect();
+        chosen = compared(library, &scores, &set, &best);
     }
     chosen.sort_by(|one, other| other.gain.total_cmp(&one.gain));
     Attribution { chosen, scores, alone }

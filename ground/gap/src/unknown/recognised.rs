@@ -10,6 +10,8 @@
 
 use std::iter::once;
 
+use nalgebra::DVector;
+
 use super::{
     remainder::{Setting, courses, judged},
     slow::{Beside, Slow},
@@ -67,7 +69,9 @@ pub fn recognised(
         let gain = evidence + of_other_sizes + own.log_prior;
         rivals.push(Rival {
             hypothesis,
+            theta: estimate.parameters.clone(),
             gain,
+            beside: f64::NEG_INFINITY,
             span: own.span,
             is_named: true,
         });
@@ -87,7 +91,9 @@ pub fn recognised(
     let several = (slow.len() as f64).ln();
     rivals.extend(slow.iter().filter(is_rival).map(|one| Rival {
         hypothesis: best.hypothesis,
+        theta: DVector::zeros(0),
         gain: one.posterior.log_bayes_factor - several,
+        beside: f64::NEG_INFINITY,
         span: None,
         is_named: false,
     }));

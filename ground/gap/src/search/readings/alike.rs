@@ -53,7 +53,9 @@ pub(super) fn most_alike(
             .map(|(place, own)| Like::of(own, &library.products.column(*place)))
             .collect()
     };
-    let likeness = |hypothesis: usize| match library.hypotheses[hypothesis].small().len() == own.len() && is_possible(hypothesis) {
+    let likeness = |hypothesis: usize| match library.hypotheses[hypothesis].small().len() == own.len()
+        && is_possible(hypothesis)
+    {
         true => like(hypothesis).iter().map(|like| like.square_of_cosine).product(),
         false => f64::NEG_INFINITY,
     };

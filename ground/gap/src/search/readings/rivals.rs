@@ -2,31 +2,52 @@
 //!
 //! In: a refined set and one of its members. Out: the member as [`Chosen`], with its [`Rival`]s.
 
+use nalgebra::DVector;
+
 use super::{
+    alike::{at_zero, most_alike},
     chosen::{Chosen, Rival},
+    columns::{always, renew},
     intervals::{Passing, fitted, lent, stretches},
     screen::{CANDIDATES, gains, is_physical, leading},
     variant::{is_any_same, without_its_physics},
 };
 use crate::{
     library::hypotheses::Library,
+    null::problem::Problem,
     search::gauss_newton::{Refined, refine},
 };
 
 /// \[nats\] behind the chosen effect from which a rival is not worth an exact fit, where the screen is right.
 const FAR: f64 = 50.0;
 
-/// One member against all that could stand in its place; `nothing` is the evidence of a set without members.
-pub(super) fn compare(
-    passing: &Passing,
-    library: &mut Library,
-    scores: &[f64],
-    set: &[usize],
-    best: &Refined,
-    nothing: f64,
-    at: usize,
-) -> Chosen {
+/// \[nats\] by which the evidence of two effects differs at least where the log tells them apart at all: odds of 1.6.
+const APART: f64 = 0.5;
+
+/// What was found.
+pub(super) struct Found<'a> {
+    /// Hypotheses of the set.
+    pub set: &'a [usize],
+    /// The set, refined.
+    pub best: &'a Refined,
+    /// Of all columns, about it.
+    pub scores: &'a [f64],
+    /// What each hypothesis gains over it.
+    pub beside: &'a [f64],
+    /// Evidence of a set without members.
+    pub nothing: f64,
+}
+
+/// One member against all that could stand in its place.
+pub(super) fn compare(passing: &Passing, library: &mut Library, found: &Found, at: usize) -> Chosen {
     let problem = passing.problem;
+    let Found {
+        set,
+        best,
+        scores,
+        beside,
+        nothing,
+    } = *found;
     let (mut others, mut thetas) = (set.to_vec(), best.thetas.clone());
     let own = others.remove(at);
     thetas.remove(at);
@@ -34,7 +55,9 @@ pub(super) fn compare(
     let own_gain = best.log_evidence - without.log_evidence + library.hypotheses[own].log_prior;
     let mut rivals = vec![Rival {
         hypothesis: own,
+        theta: best.thetas[at].clone(),
         gain: own_gain,
+        beside: f64::NEG_INFINITY,
         span: library.hypotheses[own].span,
         is_named: true,
     }];
@@ -45,7 +68,7 @@ pub(super) fn compare(
         rivals.push(Rival {
             gain,
             is_named: false,
-            ..rivals[0]
+            ..rivals[0].clone()
         });
     }
     let mut linear = gains(problem, library, scores, &others);
@@ -60,11 +83,21 @@ pub(super) fn compare(
         lent(passing, library, (&others, &without), when, &mut stretches, &mut linear);
     }
     let is_contested = library.hypotheses[own].span.is_some() || stretches.iter().any(Option::is_some);
-    let candidates = leading(&linear, CANDIDATES);
-    for (number, rival) in candidates.iter().copied().enumerate() {
-        let with_gain = |gain: f64| Rival {
+    let mut candidates = leading(&linear, CANDIDATES);
+    let mut begins = vec![None; candidates.len()];
+    if let Some(small) = at_zero(problem, library, &last, best, &about, FAR) {
+        let is_new = |index: usize| linear[index].is_finite() && !candidates.contains(&index);
+        for (alike, begin) in most_alike(library, &small, &best.thetas[at], is_new, CANDIDATES) {
+            candidates.push(alike);
+            begins.push(Some(begin));
+        }
+    }
+    for (number, (rival, begin)) in candidates.iter().copied().zip(begins).enumerate() {
+        let with = |theta: DVector<f64>, gain: f64| Rival {
             hypothesis: rival,
+            theta,
             gain,
+            beside: beside[rival],
             span: stretches[rival],
             is_named: true,
         };
@@ -75,16 +108,22 @@ pub(super) fn compare(
             || library.hypotheses[rival]
                 .values_between(problem.twin.starts_s())
                 .is_none();
-        if is_settled && linear[rival] < far {
-            rivals.push(with_gain(linear[rival]));
+        if begin.is_none() && is_settled && linear[rival] < far {
+            rivals.push(with(DVector::zeros(0), linear[rival]));
             continue;
         }
         let mut tried = others.clone();
         tried.push(rival);
-        let refined = fitted(problem, library, &tried, &thetas, stretches[rival], is_moved);
+        let refined = match begin {
+            Some(begin) => begun(problem, library, &tried, &[thetas.as_slice(), &[begin]].concat()),
+            None => fitted(problem, library, &tried, &thetas, stretches[rival], is_moved),
+        };
         if is_physical(library, &tried, &refined) {
-            let gain = refined.log_evidence - without.log_evidence + library.hypotheses[rival].log_prior;
-            rivals.push(with_gain(gain));
+            // Where no sample tells two effects apart, nor do the places where one of them is not.
+            let is_same = (refined.log_evidence - best.log_evidence).abs() < APART;
+            let prior = library.hypotheses[if is_same { own } else { rival }].log_prior;
+            let theta = refined.thetas[others.len()].clone();
+            rivals.push(with(theta, refined.log_evidence - without.log_evidence + prior));
         }
     }
     rivals.sort_by(|one, other| other.gain.total_cmp(&one.gain));
@@ -101,4 +140,12 @@ pub(super) fn compare(
         gain: own_gain,
         rivals,
     }
+}
+
+/// A set fitted from where its last member begins. The library is left as it was.
+fn begun(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>]) -> Refined {
+    renew(problem, library, set, start);
+    let refined = refine(problem, library, set, start);
+    always(problem, library, set[set.len() - 1]);
+    refined
 }
