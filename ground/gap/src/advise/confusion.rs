@@ -77,7 +77,7 @@ pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pai
     let pairs = (found.chosen.iter().filter(is_said))
         .filter_map(|chosen| other(chosen).map(|(rival, gap)| (chosen, rival, gap)));
     let (chosen, rival, gap) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
-    // Columns of what is large say nothing of a rival's at zero: where exact fits are as good they are not apart.
+    // The chosen effect has its columns where it is, its rival at zero. Where the effect is large they differ, though the exact fits may not.
     let by_columns = nats_apart(library, chosen, rival)?;
     let nats = if gap < SET_APART {
         by_columns.min(gap.max(0.0))

@@ -105,7 +105,7 @@ impl Products {
         }
     }
 
-    /// A column as it is held.
+    /// A column as the library holds it; [`Self::column`] copies its values.
     pub fn held(&self, place: usize) -> &Column {
         &self.columns[place]
     }

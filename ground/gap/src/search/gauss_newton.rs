@@ -137,7 +137,8 @@ fn refine_at(problem: &Problem, library: &Library, set: &[usize], start: &[DVect
     })
 }
 
-/// Evidence that a set with these parameters promises, were it linear with the columns of the library, `last` in the place of its last member's.
+/// Evidence that a set would have at its best parameters if it were linear about these, with the library's columns and, for its last member,
+/// those of `last`.
 pub fn promised(problem: &Problem, library: &Library, set: &[usize], thetas: &[DVector<f64>], last: &[Entries]) -> f64 {
     let others = set.iter().rev().skip(1).rev();
     let own = others.flat_map(|hypothesis| library.hypotheses[*hypothesis].places.iter().copied());

@@ -147,7 +147,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
         set.push(winner.hypothesis);
         let mut start = best.thetas.clone();
         start.remove(at);
-        // Columns at zero lead elsewhere where the winner is large.
+        // A fit of a large effect that begins at zero may end beside the best: this one begins where the comparison ended.
         if winner.span.is_none() && !winner.theta.is_empty() {
             start.push(winner.theta);
             renew(problem, library, &set, &start);

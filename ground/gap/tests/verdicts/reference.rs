@@ -258,3 +258,13 @@ fn gyros_alone_are_not_late_by_less_than_a_row_of_the_record() {
     assert_eq!(late(0.01), Vec::<&str>::new());
     assert!(!late(0.1).is_empty());
 }
+
+/// The two are the same effect there. By what it does where it is small the one that was not chosen has nothing of so long a delay.
+#[test]
+fn late_gyros_and_a_late_unit_of_gyros_alone_are_not_told_apart() {
+    let late_s = 0.4;
+    let (_, diagnosis) = diagnosed_in(&beside_reference(|t_s| rate(t_s - late_s) - rate(t_s)), &[]);
+    let sets = &diagnosis.indistinguishable;
+    let is_one_set = |set: &Vec<_>| set.contains(&"latency") && set.contains(&"gyro-latency");
+    assert!(sets.iter().any(is_one_set), "{sets:?}");
+}

@@ -2,9 +2,10 @@
 //!
 //! In: a chosen effect of a refined set. Out: the hypotheses whose columns at zero are most like its own there, and where their fit begins.
 //!
-//! A screen takes effects for linear. Of gyros that are late by 14 ms on a rocket it has 20 nats of 577 for `gyro-latency`, and as little for
-//! `latency`, which is the same in a unit of gyros alone. The one that was chosen is fitted exactly, and what else leads the screen is not the
-//! other. How like two effects are where they are small is the square of the cosine between their columns, which are in units of noise.
+//! A screen takes effects for linear. Where gyros were late by 14 ms on a rocket, `gyro-latency` gained 577 nats and 20 by the screen. It has as
+//! little of `latency`, which is the same in a unit of gyros alone. So the one that was chosen is fitted exactly, and the other is not among
+//! those that lead the screen. How like two effects are where they are small is the square of the cosine between their columns, in units of
+//! noise.
 //!
 //! A fit that begins at zero may end beside the best (of 18 ms on a rocket it found 6). So it begins where the columns say the same as the
 //! chosen effect: at `theta c'd / d'd`, for `c` its column and `d` the rival's.
@@ -13,7 +14,7 @@ use nalgebra::DVector;
 
 use super::screen::leading;
 use crate::{
-    library::{hypotheses::Library, products::Entries},
+    library::{column::Column, hypotheses::Library, products::Entries},
     null::problem::Problem,
     search::gauss_newton::{Refined, model_of, promised},
 };
@@ -42,22 +43,24 @@ pub(super) fn at_zero(
 /// parameters that say the same as these.
 pub(super) fn most_alike(
     library: &Library,
-    own: &[Entries],
+    own: Vec<Entries>,
     theta: &DVector<f64>,
     is_possible: impl Fn(usize) -> bool,
     count: usize,
 ) -> Vec<(usize, DVector<f64>)> {
+    let own: Vec<Column> = own.into_iter().map(Column::of).collect();
     let like = |hypothesis: usize| -> Vec<Like> {
-        let places = library.hypotheses[hypothesis].small().iter().zip(own);
+        let places = library.hypotheses[hypothesis].small().iter().zip(&own);
         places
-            .map(|(place, own)| Like::of(own, &library.products.column(*place)))
+            .map(|(place, own)| Like::of(own, library.products.held(*place)))
             .collect()
     };
-    let likeness = |hypothesis: usize| match library.hypotheses[hypothesis].small().len() == own.len()
-        && is_possible(hypothesis)
-    {
-        true => like(hypothesis).iter().map(|like| like.square_of_cosine).product(),
-        false => f64::NEG_INFINITY,
+    let likeness = |hypothesis: usize| {
+        let has_as_many = library.hypotheses[hypothesis].small().len() == own.len();
+        match has_as_many && is_possible(hypothesis) {
+            true => like(hypothesis).iter().map(|like| like.square_of_cosine).product(),
+            false => f64::NEG_INFINITY,
+        }
     };
     let alike: Vec<f64> = (0..library.hypotheses.len()).map(likeness).collect();
     let said = |hypothesis: usize| {
@@ -70,18 +73,13 @@ pub(super) fn most_alike(
 /// How like a column is to another.
 struct Like {
     square_of_cosine: f64,
-    /// Of the other that comes nearest to one.
+    /// The multiple of the other column that comes nearest to the one.
     factor: f64,
 }
 
 impl Like {
-    fn of(one: &Entries, other: &Entries) -> Self {
-        let square = |column: &Entries| column.iter().map(|(_, values)| values.norm_squared()).sum::<f64>();
-        let both = one.iter().filter_map(|(channel, values)| {
-            let (_, others) = other.iter().find(|(known, _)| known == channel)?;
-            Some(values.dot(others))
-        });
-        let (both, own, others) = (both.sum::<f64>(), square(one), square(other));
+    fn of(one: &Column, other: &Column) -> Self {
+        let (both, own, others) = (one.dot(other), one.dot(one), other.dot(other));
         let over = |value: f64, square: f64| if square > 0.0 { value / square } else { 0.0 };
         Like {
             square_of_cosine: over(both.powi(2), own * others),
@@ -96,9 +94,9 @@ mod tests {
 
     #[test]
     fn likeness_is_of_all_channels() {
-        let column = |entries: &[(usize, [f64; 2])]| -> Entries {
+        let column = |entries: &[(usize, [f64; 2])]| {
             let entry = |(channel, values): &(usize, [f64; 2])| (*channel, DVector::from_row_slice(values));
-            entries.iter().map(entry).collect()
+            Column::of(entries.iter().map(entry).collect())
         };
         let own = column(&[(0, [3.0, 0.0]), (1, [0.0, 4.0])]);
         let is = |other: &[(usize, [f64; 2])], square: f64, factor: f64| {

@@ -28,7 +28,8 @@ pub struct Rival {
     pub theta: DVector<f64>,
     /// \[nats\] over the model with neither, prior odds included.
     pub gain: f64,
-    /// \[nats\] over the model with the chosen one, prior odds included; none where it is not known.
+    /// \[nats\] over the model with the chosen one, by the screen and with what is always on, prior odds included; minus infinity where it is
+    /// not known.
     pub beside: f64,
     /// When it would be on; `None` for always.
     pub span: Option<Interval>,
@@ -37,7 +38,7 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// \[nats\] of it in the place of the chosen one, prior odds included: not at all of what it explains as well beside that one.
+    /// \[nats\] of it in the place of the chosen one, prior odds included, without what it would explain beside that one too.
     ///
     /// Of two effects i and j each is there or not. With gains `g` (over neither; of j over i alone `g_j|i`) the odds of j without i against
     /// i, with j or without, are `exp(g_j) / (exp(g_i) (1 + exp(g_j|i)))`. So a rival that explains something else, `g_j|i = g_j`, has at

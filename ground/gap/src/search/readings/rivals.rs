@@ -21,18 +21,19 @@ use crate::{
 /// \[nats\] behind the chosen effect from which a rival is not worth an exact fit, where the screen is right.
 const FAR: f64 = 50.0;
 
-/// \[nats\] by which the evidence of two effects differs at least where the log tells them apart at all: odds of 1.6.
-const APART: f64 = 0.5;
+/// \[nats\] within which two effects explain a log alike, by convention: odds of 1.6, and less than the nat for which a fit takes new slopes
+/// ([`crate::search::gauss_newton`]).
+const SAME: f64 = 0.5;
 
-/// What was found.
+/// A set, and what is known about it.
 pub(super) struct Found<'a> {
-    /// Hypotheses of the set.
+    /// Its hypotheses.
     pub set: &'a [usize],
-    /// The set, refined.
+    /// It, refined.
     pub best: &'a Refined,
-    /// Of all columns, about it.
+    /// Scores of all columns about it.
     pub scores: &'a [f64],
-    /// What each hypothesis gains over it.
+    /// \[nats\] that each hypothesis would gain beside all of it, by the screen.
     pub beside: &'a [f64],
     /// Evidence of a set without members.
     pub nothing: f64,
@@ -87,7 +88,7 @@ pub(super) fn compare(passing: &Passing, library: &mut Library, found: &Found, a
     let mut begins = vec![None; candidates.len()];
     if let Some(small) = at_zero(problem, library, &last, best, &about, FAR) {
         let is_new = |index: usize| linear[index].is_finite() && !candidates.contains(&index);
-        for (alike, begin) in most_alike(library, &small, &best.thetas[at], is_new, CANDIDATES) {
+        for (alike, begin) in most_alike(library, small, &best.thetas[at], is_new, CANDIDATES) {
             candidates.push(alike);
             begins.push(Some(begin));
         }
@@ -119,8 +120,8 @@ pub(super) fn compare(passing: &Passing, library: &mut Library, found: &Found, a
             None => fitted(problem, library, &tried, &thetas, stretches[rival], is_moved),
         };
         if is_physical(library, &tried, &refined) {
-            // Where no sample tells two effects apart, nor do the places where one of them is not.
-            let is_same = (refined.log_evidence - best.log_evidence).abs() < APART;
+            // Prior odds count the places where an effect may be. They decide nothing between two effects that explain the log alike.
+            let is_same = (refined.log_evidence - best.log_evidence).abs() < SAME;
             let prior = library.hypotheses[if is_same { own } else { rival }].log_prior;
             let theta = refined.thetas[others.len()].clone();
             rivals.push(with(theta, refined.log_evidence - without.log_evidence + prior));
@@ -142,7 +143,7 @@ pub(super) fn compare(passing: &Passing, library: &mut Library, found: &Found, a
     }
 }
 
-/// A set fitted from where its last member begins. The library is left as it was.
+/// A set fitted from `start`, with the columns that its last member has there. The library is left as it was.
 fn begun(problem: &Problem, library: &mut Library, set: &[usize], start: &[DVector<f64>]) -> Refined {
     renew(problem, library, set, start);
     let refined = refine(problem, library, set, start);
