@@ -7,6 +7,7 @@
 //! simpler methods would name is in [`baseline`].
 
 pub mod baseline;
+pub mod between;
 pub mod bias_walk;
 pub mod explanation;
 pub mod gauss_newton;

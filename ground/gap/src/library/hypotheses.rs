@@ -246,6 +246,12 @@ impl Made {
     }
 }
 
+/// The columns of a cause at zero, a column a parameter.
+pub fn columns_of(problem: &Problem, cause: &Cause) -> Vec<Column> {
+    let columns = columns(problem, cause, &Carrier::of(problem, cause)).into_iter();
+    columns.map(|(column, _)| column).collect()
+}
+
 /// The columns of a cause at zero, each with the sigma of its parameter.
 fn columns(problem: &Problem, cause: &Cause, carrier: &Option<Carrier>) -> Vec<(Column, f64)> {
     if let Some((carrier, wave)) = carrier.as_ref().zip(cause.effect.wave(cause.variant)) {

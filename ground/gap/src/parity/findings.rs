@@ -154,7 +154,7 @@ impl Findings {
         drop((offered, opened));
         let mut visible = visible::table(&library.hypotheses, &seen);
         again::take(&space, &mut library, &residual, &mut seen);
-        let chosen = search::choose(&space, &library, &residual, &seen, First::default(), &|share| {
+        let chosen = search::choose(&space, &mut library, &residual, &mut seen, First::default(), &|share| {
             progress("search", share);
         });
         let mut rivals = search::rivals(&library, &chosen);
@@ -168,6 +168,12 @@ impl Findings {
         if let Some(second) = Second::look(followed, withheld, &named, progress)? {
             visible::add(&mut visible, &second.visible);
             rivals.extend(second.rivals);
+            let told = causes.iter_mut().zip(second.told);
+            for ((name, fitted), (told, anew)) in told.filter_map(|(own, told)| Some((own, told?))) {
+                // That it is this effect parity says.
+                let probability = name.probability;
+                (*name, *fitted) = (Name { probability, ..told }, anew);
+            }
             causes.extend(second.names);
             smoothed = second.left;
         }
@@ -190,8 +196,10 @@ impl Findings {
         let before = gap(&kept);
         let left = Left::of(&space, &projected(&space, &model));
         // About the smoothed motion only where a name rests on it: without one its prior may leave something by itself.
-        let by_smoothing = causes.iter().filter(|(name, _)| name.by == By::Smoothing).count();
-        let about = smoothed.get(by_smoothing).filter(|_| by_smoothing > 0);
+        let by_smoothing = causes.iter().any(|(name, _)| name.by == By::Smoothing);
+        let about = smoothed
+            .get(causes.len().saturating_sub(named.len()))
+            .filter(|_| by_smoothing);
         let is_unexplained = [Some(&left), about].into_iter().flatten().any(is_unexplained);
         let names: Vec<Name> = coded
             .iter()

@@ -1,18 +1,23 @@
 //! Which effects the evidence prefers, among those that can be seen.
 //!
 //! In: the [`Space`], the library, the residual. Out: every hypothesis as it is [`Seen`], and the [`Chosen`] ones. One effect is
-//! taken at a time, the likeliest by evidence and prior odds ([`Fit`]); those taken before stay in the fit of the next.
+//! taken at a time, the likeliest by evidence and prior odds ([`Fit`]); those taken before stay in the fit of the next. Before that, what comes
+//! near the likeliest is moved to where it explains most, between the values that were tried ([`between`]).
 //!
 //! The evidence is that of [`crate::null::evidence`], with its sizes; an effect without parameters has `<d, r> - <d, d> / 2`, `d`
 //! being what it does to the readings.
 
+mod between;
 mod fit;
 
 use nalgebra::{DMatrix, DVector};
 use twin::{effect::Nature, predict::Memory};
 
-use self::fit::{Beside, likeliest};
-pub use self::fit::{Fit, fit_alone, foremost};
+use self::fit::{Round, likeliest};
+pub use self::{
+    between::told_anew,
+    fit::{Fit, fit_alone, foremost},
+};
 use crate::{
     library::{
         column::Column,
@@ -200,6 +205,15 @@ impl Seen {
     }
 }
 
+/// Sees hypotheses about another residual, of which motion and calibration leave this; those without columns stay as they are.
+pub fn rescore(seen: &mut [Seen], library: &Library, rest: &Entries) {
+    for one in seen {
+        for (row, place) in library.hypotheses[one.hypothesis].small().iter().enumerate() {
+            one.score[row] = library.products.held(*place).dot_entries(rest);
+        }
+    }
+}
+
 /// What an effect that is there or not does to the readings, in units of noise.
 fn on_the_whole(problem: &Problem, hypothesis: &Hypothesis, memory: &mut Memory) -> Entries {
     let twin = problem.twin;
@@ -327,42 +341,38 @@ pub fn opened(problem: &Problem, all: &[Free]) -> Vec<Entries> {
 /// Takes effects while the evidence asks for one, beside those that are in already.
 pub fn choose(
     space: &Space,
-    library: &Library,
+    library: &mut Library,
     residual: &Projected,
-    seen: &[Seen],
+    seen: &mut [Seen],
     first: First,
     progress: &dyn Fn(f64),
 ) -> Vec<Chosen> {
-    let eligible: Vec<&Seen> = (seen.iter())
-        .filter(|one| {
-            let hypothesis = &library.hypotheses[one.hypothesis];
-            // A law that is too small to be named is there all the same, and what has a shape must not be named in its place.
-            may_be_named(hypothesis, one.snr) || walk::is_law(hypothesis)
-        })
-        .collect();
     let rest = space.rest(residual);
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut products = vec![Vec::new(); library.products.len()];
     let First { effects, mut taken } = first;
     while effects.len() + chosen.len() < MOST_CAUSES {
         progress(chosen.len() as f64 / MOST_CAUSES as f64);
-        let fit = |one: &&Seen, fit: Option<Fit>| fit.map(|fit| (one.hypothesis, fit));
-        let fits: Vec<(usize, Fit)> = if chosen.is_empty() && taken.is_empty() {
-            let alone = |one: &&Seen| fit(one, fit_alone(library, one));
-            eligible.iter().filter_map(alone).collect()
-        } else {
-            let is_other = |one: &&&Seen| {
-                let mut known = chosen.iter().map(|own| library.hypotheses[own.hypothesis].effect());
-                let effect = library.hypotheses[one.hypothesis].effect();
-                known.all(|own| own != effect) && !effects.contains(&effect) && !library.is_discrete(one.hypothesis)
-            };
-            let others: Vec<&Seen> = eligible.iter().filter(is_other).copied().collect();
-            let Some(beside) = Beside::of(&taken, &rest) else {
-                break;
-            };
-            let beside = |one: &&Seen| fit(one, beside.fit(library, one, &mut products));
-            others.iter().filter_map(beside).collect()
+        let Some(mut round) = Round::of(&taken, &rest, &mut products) else {
+            break;
         };
+        let is_offered = |one: &Seen, library: &Library| {
+            let hypothesis = &library.hypotheses[one.hypothesis];
+            let known = chosen.iter().map(|own| library.hypotheses[own.hypothesis].effect());
+            let is_other = effects
+                .iter()
+                .copied()
+                .chain(known)
+                .all(|own| own != hypothesis.effect());
+            // A law that is too small to be named is there all the same, and what has a shape must not be named in its place.
+            let is_eligible = may_be_named(hypothesis, one.snr) || walk::is_law(hypothesis);
+            is_eligible && is_other && (taken.is_empty() || !library.is_discrete(one.hypothesis))
+        };
+        let mut fits: Vec<(usize, Fit)> = (seen.iter())
+            .filter(|one| is_offered(one, library))
+            .filter_map(|one| Some((one.hypothesis, round.fit(library, one)?)))
+            .collect();
+        between::move_near(space, library, &rest, &mut round, seen, &mut fits);
         let Some(next) = likeliest(library, seen, &fits) else {
             break;
         };

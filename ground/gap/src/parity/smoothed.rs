@@ -43,6 +43,8 @@ pub type Fitted = (Component, DMatrix<f64>);
 pub struct Second {
     /// What can be seen.
     pub visible: Vec<Row>,
+    /// Of each effect that parity names the same with another value, where the course as a whole has it there.
+    pub told: Vec<Option<(Name, Fitted)>>,
     /// What it names beside what parity does, likeliest first, its parameters fitted.
     pub names: Vec<(Name, Fitted)>,
     /// Other effects with their probabilities.
@@ -97,15 +99,26 @@ impl Second {
         let project = |model: &[Component]| space.project_residual(residual_of(&problem, model), &prior);
         let mut model: Vec<Component> = named.iter().map(|(component, _)| component.clone()).collect();
         let residual = project(&model);
-        let first = First::of(&space, &model);
         let part = |from: f64, share: f64| progress("smoothed", from + (1.0 - from) * share);
         let mut seen = search::look(&space, &library, (&offered, &opened), &residual, &|share| {
             part(0.4, 0.7 * share)
         });
         drop((offered, opened));
         let visible = visible::table(&library.hypotheses, &seen);
+        let told = search::told_anew(&space, &mut library, &model, &seen, &project);
+        let told: Vec<Option<(Name, Fitted)>> = (told.iter())
+            .map(|own| Some(Name::of(&problem, &library, own.as_ref()?, By::Parity)))
+            .collect();
+        for (own, told) in model.iter_mut().zip(&told) {
+            if let Some((_, (component, _))) = told {
+                *own = component.clone();
+            }
+        }
+        let residual = project(&model);
+        search::rescore(&mut seen, &library, &space.rest(&residual));
+        let first = First::of(&space, &model);
         again::take(&space, &mut library, &residual, &mut seen);
-        let chosen = search::choose(&space, &library, &residual, &seen, first, &|share| {
+        let chosen = search::choose(&space, &mut library, &residual, &mut seen, first, &|share| {
             part(0.8, share);
         });
         let said: Vec<&Chosen> = search::said(&chosen);
@@ -116,6 +129,7 @@ impl Second {
         }
         Ok(Some(Self {
             visible,
+            told,
             rivals: search::rivals(&library, &chosen),
             names: said
                 .iter()
@@ -129,7 +143,7 @@ impl Second {
 /// By what factor each cause is stronger in a space than it was fitted; none of one that makes nothing there. `prior` is what prior
 /// rows of the motion are off by.
 ///
-/// With `d` what a cause adds, everything in the model, `r` what that leaves, and `s` the derivatives of `d` by its parameters, whose
+/// With `d` what a cause adds, it and those before it in the model, `r` what these leave, and `s` the derivatives of `d` by its parameters, whose
 /// covariance is `C`, the factor is `1 + <d, r> / <d, d>` and its variance `(<d, d> + <s, d>' C <s, d>) / <d, d>^2`, as in
 /// [`crate::holdout::strength`], the motion marginalised.
 pub fn strengths(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Option<Promise>> {
@@ -173,15 +187,17 @@ impl Strength {
 
 /// The sums of [`strengths`].
 fn measured(space: &Space, prior: &DVector<f64>, causes: &[Fitted]) -> Vec<Strength> {
-    let model: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
-    let rest = space.rest(&space.project_residual(residual_of(space.problem, &model), prior));
+    let all: Vec<Component> = causes.iter().map(|(component, _)| component.clone()).collect();
     let strength = |(at, (component, _)): (usize, &Fitted)| {
-        let added = space.problem.contribution(&model, &[at]);
+        // What was found beside it may not be there.
+        let model = &all[..=at];
+        let rest = space.rest(&space.project_residual(residual_of(space.problem, model), prior));
+        let added = space.problem.contribution(model, &[at]);
         let own_rest = space.rest(&space.project(added.clone()));
         let energy = dot(&added, &own_rest);
         let is_sized = component.active.cause.effect.page().nature != Nature::Discrete;
         let slopes = if is_sized {
-            space.problem.slopes(&model, at)
+            space.problem.slopes(model, at)
         } else {
             Vec::new()
         };

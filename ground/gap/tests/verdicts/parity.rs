@@ -6,12 +6,21 @@ use clap::Parser;
 use gap::{
     command::{GapArguments, run},
     input::case::Subject,
+    null::problem::Component,
     parity::{
-        analysed, findings::Findings, flight::Flight, followed::Followed, name::By, smooth::told::Told, visible::Row,
+        analysed,
+        findings::Findings,
+        flight::Flight,
+        followed::Followed,
+        name::By,
+        smooth::told::Told,
+        smoothed::{Fitted, promises},
+        visible::Row,
     },
     probability::outcome::Outcome,
     thresholds::PARITY_SNR,
 };
+use nalgebra::DMatrix;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;
@@ -251,6 +260,87 @@ fn what_the_held_out_windows_do_not_keep_is_not_named_by_smoothing() {
     let active = [felt()];
     let findings = found(&flown_in("tumble", 20.0, 4, (&active, &[]), 60.0, |_| true));
     assert!(findings.names.is_empty(), "{:?}", findings.names);
+}
+
+/// A load that all gyros feel from an instant on, between those tried.
+#[test]
+fn a_step_is_found_where_it_is_and_is_no_walk() {
+    let active = Active {
+        cause: Cause {
+            effect: by_name("gyro-supply").expect("an effect"),
+            locality: Locality::All,
+            // The log counts from 20 s on.
+            variant: 63.0,
+        },
+        theta: vec![4e-3, 0.0, -3e-3, 0.0, 5e-3, 0.0, 3e-3, 0.0],
+    };
+    let findings = found(&flown("tumble", 20.0, 4, &[active], |_| true));
+    let [name] = findings.names.as_slice() else {
+        panic!("{:?} or {:?}", findings.names, findings.alternatives);
+    };
+    assert_eq!(name.effect, "gyro-supply");
+    let which = name.which.as_deref().expect("when");
+    assert!(["a step at 43 s", "a step at 42 s"].contains(&which), "{which}");
+}
+
+/// A line whose slow image is between two that were tried: halfway it has turned over at the end of the fit windows.
+#[test]
+fn a_line_of_the_mains_is_found_at_its_frequency_and_goes_on_in_the_held_out_windows() {
+    let active = [Active {
+        cause: Cause {
+            effect: by_name("mains-alias").expect("an effect"),
+            locality: Locality::Unit,
+            variant: 50.012,
+        },
+        theta: vec![0.5, -0.3, 0.4, 0.2, 0.4, -0.5],
+    }];
+    for motion in ["tumble", "rate-table"] {
+        let findings = found(&flown_in(motion, 20.0, 4, (&active, &active), 60.0, |_| true));
+        let [name] = findings.names.as_slice() else {
+            panic!("{motion}: {:?} or {:?}", findings.names, findings.alternatives);
+        };
+        assert_eq!(name.effect, "mains-alias");
+        let promise = name.promise.expect("the held-out windows are asked");
+        assert!(
+            (promise.factor - 1.0).abs() < 0.2,
+            "{motion}: {:?} {promise:?}",
+            name.which
+        );
+    }
+}
+
+#[test]
+fn what_is_found_beside_a_cause_does_not_speak_against_it() {
+    let iron = iron("plate 3", [1.0, -0.8, 0.6]);
+    let active = std::slice::from_ref(&iron);
+    let folder = flown_in("tumble", 20.0, 4, (active, active), 60.0, |_| true);
+    let flight = Flight::open(folder.path()).expect("opens");
+    let held = flight.held.as_ref().expect("is judged");
+    let followed = Followed::of(&flight, held, &[]);
+    let fitted = |active: &Active, sigma: f64| {
+        let component = Component {
+            active: active.clone(),
+            span: None,
+        };
+        let width = active.theta.len();
+        (component, DMatrix::from_diagonal_element(width, width, sigma * sigma))
+    };
+    let not_there = Active {
+        cause: Cause {
+            effect: by_name("soft-iron").expect("an effect"),
+            locality: Locality::Group("plate 3".to_owned()),
+            variant: 0.0,
+        },
+        theta: vec![0.05; 6],
+    };
+    let of = |causes: &[Fitted]| promises(&followed, causes, &|_| ()).expect("has promises");
+    let [alone] = of(&[fitted(&iron, 0.05)])[..] else {
+        panic!("one cause has one promise");
+    };
+    let beside = of(&[fitted(&iron, 0.05), fitted(&not_there, 0.01)]);
+    assert_eq!(beside[0], alone);
+    let [kept, refuted] = [beside[0], beside[1]].map(|promise| promise.expect("is there").factor);
+    assert!((kept - 1.0).abs() < 0.2 && refuted.abs() < 0.2, "{beside:?}");
 }
 
 #[test]

@@ -70,8 +70,43 @@ pub fn fit_alone(library: &Library, seen: &Seen) -> Option<Fit> {
     })
 }
 
+/// One round of the search: what was taken before, and how columns of the library lie to that.
+pub(super) struct Round<'a> {
+    /// None in the first.
+    beside: Option<Beside<'a>>,
+    /// Of each column, by its place, products with those that are taken, as far as they are known: many hypotheses have a column in common.
+    products: &'a mut Vec<Vec<f64>>,
+}
+
+impl<'a> Round<'a> {
+    /// None where those that are taken say nothing together.
+    pub(super) fn of(taken: &'a [Taken], rest: &Entries, products: &'a mut Vec<Vec<f64>>) -> Option<Self> {
+        let beside = match taken {
+            [] => None,
+            _ => Some(Beside::of(taken, rest)?),
+        };
+        Some(Self { beside, products })
+    }
+
+    /// A hypothesis, alone or beside those.
+    pub(super) fn fit(&mut self, library: &Library, seen: &Seen) -> Option<Fit> {
+        match &self.beside {
+            Some(beside) => beside.fit(library, seen, self.products),
+            None => fit_alone(library, seen),
+        }
+    }
+
+    /// These columns are made anew.
+    pub(super) fn forget(&mut self, places: &[usize]) {
+        for place in places {
+            self.products.resize_with(self.products.len().max(place + 1), Vec::new);
+            self.products[*place].clear();
+        }
+    }
+}
+
 /// Effects that were taken, whose parameters are free in the fit of another.
-pub(super) struct Beside<'a> {
+struct Beside<'a> {
     columns: Vec<&'a Entries>,
     rests: Vec<&'a Entries>,
     parts: Vec<Range<usize>>,
@@ -81,7 +116,7 @@ pub(super) struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    pub(super) fn of(taken: &'a [Taken], rest: &Entries) -> Option<Self> {
+    fn of(taken: &'a [Taken], rest: &Entries) -> Option<Self> {
         let columns: Vec<&Entries> = taken.iter().flat_map(|one| &one.columns).collect();
         let rests: Vec<&Entries> = taken.iter().flat_map(|one| &one.rests).collect();
         let mut parts = Vec::new();
@@ -106,9 +141,8 @@ impl<'a> Beside<'a> {
         })
     }
 
-    /// A hypothesis beside them. `products` are those of each column of the library with theirs, as far as they are known: many hypotheses
-    /// have a column in common.
-    pub(super) fn fit(&self, library: &Library, seen: &Seen, products: &mut [Vec<f64>]) -> Option<Fit> {
+    /// A hypothesis beside them. `products` are those of each column of the library with theirs, as far as they are known.
+    fn fit(&self, library: &Library, seen: &Seen, products: &mut [Vec<f64>]) -> Option<Fit> {
         let places = library.hypotheses[seen.hypothesis].small();
         let (from, width) = (self.columns.len(), places.len());
         let sigmas = places.iter().map(|place| library.prior_sigmas[*place]);

@@ -7,20 +7,16 @@ use nalgebra::DVector;
 
 use super::columns::renew;
 use crate::{
-    library::hypotheses::{Hypothesis, Library},
+    library::hypotheses::Library,
     null::problem::Problem,
-    search::gauss_newton::{Refined, refine},
+    search::{
+        between::{climbed, half_ways},
+        gauss_newton::{Refined, refine},
+    },
 };
-
-/// Times the distance between values tried is halved: an onset in a log of ten minutes to a cycle, a limit to a part in
-/// ten thousand.
-const HALVINGS: usize = 10;
 
 /// Values tried by which two of an effect with values between them are apart at least: either may move some way to the other.
 const APART: usize = 5;
-
-/// \[nats\] that make another value a better one; where both neighbours are as good but for less, no value between is.
-const SHARPER: f64 = 0.1;
 
 /// Moves the variant of the member added last to where it explains most, if values between its variants are possible: a step
 /// that is seconds off, or a limit that is a percent off, leaves more than most effects make.
@@ -28,39 +24,17 @@ pub(super) fn sharpened(problem: &Problem, library: &mut Library, set: &[usize],
     let Some(last) = set.last().copied() else {
         return best;
     };
-    let mut variant = library.hypotheses[last].cause.variant;
-    let Some(mut step) = half_way(problem, &library.hypotheses[last]) else {
+    let Some(steps) = half_ways(&library.hypotheses[last], problem.twin.starts_s()) else {
         return best;
     };
-    let mut best = best;
-    for _ in 0..HALVINGS {
-        let mut is_flat = true;
-        for tried in [variant - step, variant + step] {
-            let refined = at_variant(problem, library, set, &best, tried);
-            is_flat &= (refined.log_evidence - best.log_evidence).abs() < SHARPER;
-            if refined.log_evidence > best.log_evidence + SHARPER {
-                (variant, best) = (tried, refined);
-                break;
-            }
-        }
-        if is_flat {
-            break;
-        }
-        step *= 0.5;
-    }
+    let variant = library.hypotheses[last].cause.variant;
+    let (variant, best) = climbed(
+        (variant, best),
+        steps,
+        |best| best.log_evidence,
+        |tried, best| at_variant(problem, library, set, best, tried),
+    );
     at_variant(problem, library, set, &best, variant)
-}
-
-/// Half the way to the farther neighbour of a hypothesis' variant; `None` where there is nothing between.
-fn half_way(problem: &Problem, hypothesis: &Hypothesis) -> Option<f64> {
-    let grid = hypothesis.values_between(problem.twin.starts_s())?;
-    let variant = hypothesis.cause.variant;
-    let at = grid.iter().position(|value| *value == variant)?;
-    let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
-    let distances = neighbours
-        .filter_map(|index| grid.get(index))
-        .map(|value| (value - variant).abs());
-    Some(0.5 * distances.fold(0.0, f64::max))
 }
 
 /// Whether two hypotheses are one with values between the variants tried: a warm-up of 80 s and one of 160 s are both one of
