@@ -12,7 +12,7 @@
 
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use twin::predict::Kind;
+use twin::{effect::Nature, predict::Kind};
 
 use crate::{
     holdout::strength::Promise,
@@ -34,7 +34,7 @@ use crate::{
         packet::Motion,
         phases::shown,
         search::{self, First, Free, Offered, residual_of},
-        smoothed::{Fitted, Left, Second, promises, strengths},
+        smoothed::{Fitted, Left, Second, promises, strengths, walked_on},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
         walk, wired,
@@ -246,7 +246,8 @@ struct Doubts {
     untold: f64,
 }
 
-/// Believes causes as far as the held-out windows, and of those that smoothing alone names parity too, keep what they promise.
+/// Believes causes as far as the held-out windows, and of those that smoothing alone names parity too, keep what they promise. What a walk came to
+/// promises nothing there, but it goes on: they have one of their own, or not.
 fn weigh(
     flight: &Flight,
     coded: &[Finding],
@@ -258,24 +259,36 @@ fn weigh(
         return Ok(Doubts::default());
     }
     let fitted: Vec<Fitted> = causes.iter().map(|(_, fitted)| fitted.clone()).collect();
+    let mut walked = vec![None; fitted.len()];
     let held = match &flight.held {
         Some(log) => {
             let held = Followed::of(flight, log, coded);
-            promises(&held, &fitted, &|share| progress("held out", share))?
+            let promises = promises(&held, &fitted, &|share| progress("held out", share))?;
+            let model: Vec<Component> = fitted.iter().map(|(component, _)| component.clone()).collect();
+            for (at, walked) in walked.iter_mut().enumerate() {
+                let active = &model[at].active;
+                if active.cause.effect.page().nature == Nature::Spread {
+                    *walked = walked_on(&held, &model[..at], active)?;
+                }
+            }
+            promises
         }
         None => vec![None; fitted.len()],
     };
     let by_parity = strengths(parity, &DVector::zeros(0), &fitted);
     let (mut kept, mut first_untold) = (1.0, None);
-    for ((name, _), (held, by_parity)) in causes.iter_mut().zip(held.into_iter().zip(by_parity)) {
+    for ((name, _), ((held, by_parity), walked)) in causes.iter_mut().zip(held.into_iter().zip(by_parity).zip(walked)) {
         let believed = name.probability;
         name.promise = held;
-        name.probability *= confidence(name.by, held, by_parity);
+        name.probability *= match walked {
+            Some(nats) => walks_on(name.by, nats),
+            None => confidence(name.by, held, by_parity),
+        };
         if name.by == By::Parity {
             kept *= 1.0 - (believed - name.probability);
         }
         if first_untold.is_none() && name.probability < SAID {
-            let is_shown = held.is_some_and(is_shown);
+            let is_shown = held.is_some_and(is_shown) || walked.is_some();
             let untold = if is_shown { 0.0 } else { name.probability / UNTOLD };
             first_untold = Some(untold);
         }
@@ -299,6 +312,16 @@ pub fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> 
         By::Codes | By::Axes => 1.0,
         By::Parity => of(held).unwrap_or(1.0),
         By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0),
+    }
+}
+
+/// How far a walk is believed that gains so many nats on the held-out windows: as likely as not where they show nothing. What parity names they may
+/// refute; of what smoothing alone names they have to show something.
+fn walks_on(by: By, nats: f64) -> f64 {
+    let goes_on = 1.0 / (1.0 + (-nats).exp());
+    match by {
+        By::Smoothing => goes_on,
+        By::Codes | By::Axes | By::Parity => (2.0 * goes_on).min(1.0),
     }
 }
 

@@ -17,13 +17,16 @@
 //! that prior or something outside the library is to blame, which one log does not tell: nothing is said but that it may be.
 
 use nalgebra::{DMatrix, DVector};
-use twin::effect::{LIBRARY, Nature};
+use twin::effect::{Active, LIBRARY, Nature};
 
 use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
     library::{hypotheses::Library, products::Entries},
-    null::problem::{Component, Problem},
+    null::{
+        evidence::Screen,
+        problem::{Component, Problem},
+    },
     parity::{
         again,
         followed::Followed,
@@ -33,6 +36,7 @@ use crate::{
         search::{self, Chosen, First, Offered, residual_of},
         space::{self, Projected, Space, dot},
         visible::{self, Row},
+        walk,
     },
 };
 
@@ -91,6 +95,8 @@ impl Second {
         let problem = Problem::new(&twin, &fit, &reference);
         let motion = followed.motion(smoothed, &problem);
         let mut library = Library::new(&problem, withheld, &|share| progress("smoothed", 0.3 * share));
+        // Nothing with a shape is named in the place of a walk.
+        walk::offer(&problem, &mut library, withheld);
         let offered = Offered::of(&problem, &library);
         let nulls = nulls::columns(&problem, &library);
         let (space, opened) = Space::among(&problem, motion, nulls, &offered.columns());
@@ -240,6 +246,33 @@ pub fn held_out(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> R
     let motion = held.motion(smoothed, &problem);
     let space = Space::new(&problem, motion, exact_nulls(&problem));
     Ok(measured(&space, &motion.prior(), causes))
+}
+
+/// \[nats\] that a walk as strong as it was fitted gains on the held-out windows with these effects in the model, its course there its own; none where
+/// the motion did not settle.
+///
+/// # Errors
+/// When the unit's description names an effect there is not.
+pub fn walked_on(held: &Followed, model: &[Component], walk: &Active) -> Result<Option<f64>, CaseError> {
+    let smoothed = held.smoothed(&|_| ())?;
+    if !smoothed.is_settled() {
+        return Ok(None);
+    }
+    let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
+    let problem = Problem::new(&twin, &fit, &reference);
+    let motion = held.motion(smoothed, &problem);
+    let space = Space::new(&problem, motion, exact_nulls(&problem));
+    let rest = space.rest(&space.project_residual(residual_of(&problem, model), &motion.prior()));
+    let (columns, sigmas): (Vec<Entries>, Vec<f64>) = walk::as_strong_as(&problem, walk).into_iter().unzip();
+    let rests = space.rests(&columns);
+    let mut screen = Screen::zeros(sigmas);
+    for (row, column) in columns.iter().enumerate() {
+        screen.score[row] = dot(column, &rest);
+        for (other, rest) in rests.iter().enumerate() {
+            screen.information[(row, other)] = dot(column, rest);
+        }
+    }
+    Ok(screen.log_evidence())
 }
 
 /// Columns of the exact nulls of a problem.

@@ -11,11 +11,12 @@
 //!
 //! so the evidence of that many free columns with these sigmas is the evidence of the law; a law pays for its freedom, and one course that is
 //! right pays less. The first [`TERMS`] hold all but 2 % of its energy (the rest is `2/pi^2 sum 1/(k - 1/2)^2`). What it comes to in
-//! another stretch of time nothing says, so the held-out windows are not asked.
+//! another stretch of time nothing says. The held-out windows are asked whether they have a walk of their own
+//! ([`crate::parity::smoothed::walked_on`]).
 
 use nalgebra::{DMatrix, DVector};
 use twin::{
-    effect::{Cause, LIBRARY, Locality, Nature, Parameter, by_name},
+    effect::{Active, Cause, LIBRARY, Locality, Nature, Parameter, by_name},
     predict::Kind,
 };
 
@@ -88,6 +89,16 @@ pub fn columns(problem: &Problem, cause: &Cause) -> Vec<(Entries, f64)> {
         .into_iter()
         .flat_map(|channel| of_channel(problem, channel, sigma))
         .collect()
+}
+
+/// Its columns with the sigmas that go with its parameters, of a cause that is one.
+pub fn as_strong_as(problem: &Problem, walk: &Active) -> Vec<(Entries, f64)> {
+    let usual = prior_sigma(&walk.cause, problem);
+    let mut columns = columns(problem, &walk.cause);
+    for (own, size) in columns.chunks_mut(TERMS).zip(&walk.theta) {
+        own.iter_mut().for_each(|(_, sigma)| *sigma *= size / usual);
+    }
+    columns
 }
 
 fn prior_sigma(cause: &Cause, problem: &Problem) -> f64 {

@@ -18,7 +18,7 @@ use crate::{
         hypotheses::{Library, columns_of},
         products::Entries,
     },
-    null::problem::Component,
+    null::{interval::begins_s, problem::Component},
     parity::space::{Projected, Space, dot},
     search::between::{climbed, half_ways},
     thresholds::EFFECT_MARGIN,
@@ -92,6 +92,11 @@ pub fn told_anew(
     let starts_s = space.problem.twin.starts_s();
     let mut anew = |at: usize| -> Option<Chosen> {
         let cause = &model[at].active.cause;
+        // A ramp, or what comes again, has no value that could be another.
+        let has_others = cause.effect.has_values_between() || begins_s(cause, starts_s).is_some();
+        if !has_others || model[at].span.is_some() {
+            return None;
+        }
         let is_same = |one: &&Seen| {
             let own = &library.hypotheses[one.hypothesis];
             let is_its = own.effect() == cause.effect.page().name && own.cause.locality == cause.locality;
