@@ -170,9 +170,17 @@ impl Findings {
             rivals.extend(second.rivals);
             let told = causes.iter_mut().zip(second.told);
             for ((name, fitted), (told, anew)) in told.filter_map(|(own, told)| Some((own, told?))) {
-                // That it is this effect parity says.
-                let probability = name.probability;
-                (*name, *fitted) = (Name { probability, ..told }, anew);
+                // That it is this effect, and how surely, parity says.
+                let (probability, gain, snr) = (name.probability, name.gain, name.snr);
+                (*name, *fitted) = (
+                    Name {
+                        probability,
+                        gain,
+                        snr,
+                        ..told
+                    },
+                    anew,
+                );
             }
             causes.extend(second.names);
             smoothed = second.left;
