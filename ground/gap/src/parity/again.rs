@@ -13,7 +13,7 @@
 //! Having looked at so many periods and edges costs the logarithm of their number, off the nats that it gains. That it comes again is one law of its
 //! effect, as it is one law to begin at some instant: its prior odds are those of a law ([`as_a_law`]), and not of one instant among many.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use twin::effect::Cause;
 
 use crate::{
@@ -24,8 +24,8 @@ use crate::{
     },
     null::interval::{Interval, begins_s},
     parity::{
-        search::Seen,
-        space::{Projected, Space, dot},
+        search::{Seen, seen_of},
+        space::{Projected, Space},
     },
     search::{interval_sums::Residual, periodic},
 };
@@ -55,10 +55,7 @@ pub fn take(space: &Space, library: &mut Library, residual: &Projected, seen: &m
         let left = Residual::of(space.problem, &left);
         let (on, _) = periodic::again(space.problem, &left, &times(&always, kept), &sigmas)?;
         let columns: Vec<Entries> = always.iter().map(|column| within(space, column, on)).collect();
-        let rests = space.rests(&columns);
-        let of = |row: usize, column: usize| dot(&columns[row], &rests[column]);
-        let information = DMatrix::from_fn(columns.len(), columns.len(), of);
-        let score = DVector::from_fn(columns.len(), |row, _| dot(&columns[row], &rest));
+        let (information, score) = seen_of(space, &columns, &rest);
         let own = columns.into_iter().zip(sigmas);
         let places = own.map(|(column, sigma)| {
             library.prior_sigmas.push(sigma);

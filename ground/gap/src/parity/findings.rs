@@ -204,10 +204,10 @@ impl Findings {
         let before = gap(&kept);
         let left = Left::of(&space, &projected(&space, &model));
         // About the smoothed motion only where a name rests on it: without one its prior may leave something by itself.
-        let by_smoothing = causes.iter().any(|(name, _)| name.by == By::Smoothing);
+        let is_by_smoothing = causes.iter().any(|(name, _)| name.by == By::Smoothing);
         let about = smoothed
             .get(causes.len().saturating_sub(named.len()))
-            .filter(|_| by_smoothing);
+            .filter(|_| is_by_smoothing);
         let is_unexplained = [Some(&left), about].into_iter().flatten().any(is_unexplained);
         let names: Vec<Name> = coded
             .iter()
@@ -415,5 +415,13 @@ mod tests {
         assert!(!is_said(By::Smoothing, broken, kept) && !is_said(By::Smoothing, kept, broken));
         assert!(is_said(By::Parity, None, None) && is_said(By::Parity, not_shown, None));
         assert!(!is_said(By::Parity, broken, None));
+    }
+
+    #[test]
+    fn a_walk_is_refuted_by_held_out_windows_without_one_and_by_smoothing_needs_theirs() {
+        assert_eq!([By::Parity, By::Smoothing].map(|by| walks_on(by, 0.0)), [1.0, 0.5]);
+        for by in [By::Parity, By::Smoothing] {
+            assert!(walks_on(by, 10.0) > 0.99 && walks_on(by, -10.0) < 0.01);
+        }
     }
 }

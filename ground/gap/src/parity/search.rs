@@ -26,7 +26,7 @@ use crate::{
     },
     null::problem::{Component, Problem},
     parity::{
-        space::{Opened, Projected, Space},
+        space::{Opened, Projected, Space, dot},
         visible::may_be_named,
         walk,
     },
@@ -212,6 +212,17 @@ pub fn rescore(seen: &mut [Seen], library: &Library, rest: &Entries) {
             one.score[row] = library.products.held(*place).dot_entries(rest);
         }
     }
+}
+
+/// Information and score of columns, motion and calibration marginalised, beside a residual of which these leave `left`.
+pub fn seen_of(space: &Space, columns: &[Entries], left: &Entries) -> (DMatrix<f64>, DVector<f64>) {
+    let rests = space.rests(columns);
+    let of = |row: usize, column: usize| dot(&columns[row], &rests[column]);
+    let score = columns.iter().map(|column| dot(column, left));
+    (
+        DMatrix::from_fn(columns.len(), columns.len(), of),
+        DVector::from_iterator(columns.len(), score),
+    )
 }
 
 /// What an effect that is there or not does to the readings, in units of noise.

@@ -23,10 +23,7 @@ use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
     library::{hypotheses::Library, products::Entries},
-    null::{
-        evidence::Screen,
-        problem::{Component, Problem},
-    },
+    null::problem::{Component, Problem},
     parity::{
         again,
         followed::Followed,
@@ -34,7 +31,8 @@ use crate::{
         nulls::{self, NULLS},
         packet::Motion,
         search::{self, Chosen, First, Offered, residual_of},
-        space::{self, Projected, Space, dot},
+        smooth::Smoothed,
+        space::{self, Projected, Space, dot, screen},
         visible::{self, Row},
         walk,
     },
@@ -241,11 +239,7 @@ pub fn held_out(held: &Followed, causes: &[Fitted], progress: &dyn Fn(f64)) -> R
         let space = Space::new(&problem, &motion, exact_nulls(&problem));
         return Ok(measured(&space, &DVector::zeros(0), causes));
     }
-    let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
-    let problem = Problem::new(&twin, &fit, &reference);
-    let motion = held.motion(smoothed, &problem);
-    let space = Space::new(&problem, motion, exact_nulls(&problem));
-    Ok(measured(&space, &motion.prior(), causes))
+    about_smoothed(held, smoothed, |space, prior| measured(space, prior, causes))
 }
 
 /// \[nats\] that a walk as strong as it was fitted gains on the held-out windows with these effects in the model, its course there its own; none where
@@ -258,21 +252,27 @@ pub fn walked_on(held: &Followed, model: &[Component], walk: &Active) -> Result<
     if !smoothed.is_settled() {
         return Ok(None);
     }
+    about_smoothed(held, smoothed, |space, prior| {
+        let left = space.rest(&space.project_residual(residual_of(space.problem, model), prior));
+        let columns = walk::as_strong_as(space.problem, walk);
+        let (columns, sigmas): (Vec<Entries>, Vec<f64>) = columns.into_iter().unzip();
+        let rests = space.rests(&columns);
+        let [columns, rests] = [&columns, &rests].map(|all| all.iter().collect::<Vec<_>>());
+        screen(&columns, &rests, sigmas, &left).log_evidence()
+    })
+}
+
+/// What is said in a space about the smoothed motion of a log, and of what its prior rows are off by.
+fn about_smoothed<T>(
+    held: &Followed,
+    smoothed: &Smoothed,
+    say: impl FnOnce(&Space, &DVector<f64>) -> T,
+) -> Result<T, CaseError> {
     let (twin, fit, reference) = (held.twin(smoothed)?, held.fit(), Reference::default());
     let problem = Problem::new(&twin, &fit, &reference);
     let motion = held.motion(smoothed, &problem);
     let space = Space::new(&problem, motion, exact_nulls(&problem));
-    let rest = space.rest(&space.project_residual(residual_of(&problem, model), &motion.prior()));
-    let (columns, sigmas): (Vec<Entries>, Vec<f64>) = walk::as_strong_as(&problem, walk).into_iter().unzip();
-    let rests = space.rests(&columns);
-    let mut screen = Screen::zeros(sigmas);
-    for (row, column) in columns.iter().enumerate() {
-        screen.score[row] = dot(column, &rest);
-        for (other, rest) in rests.iter().enumerate() {
-            screen.information[(row, other)] = dot(column, rest);
-        }
-    }
-    Ok(screen.log_evidence())
+    Ok(say(&space, &motion.prior()))
 }
 
 /// Columns of the exact nulls of a problem.

@@ -18,7 +18,10 @@ use std::ops::AddAssign;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 pub use self::within::{Asked, Opened};
-use crate::{library::products::Entries, null::problem::Problem};
+use crate::{
+    library::products::Entries,
+    null::{evidence::Screen, problem::Problem},
+};
 
 /// Columns that are taken through the motion, and rows that are solved for, at once: what a processor's cache holds.
 const AT_ONCE: usize = 64;
@@ -429,4 +432,16 @@ pub fn dot(one: &Entries, other: &Entries) -> f64 {
         .iter()
         .filter_map(|(channel, values)| Some(values.dot(&on(*channel)?.1)));
     both.sum()
+}
+
+/// Normal equations of columns whose rests these are, beside a residual of which motion and calibration leave `left`.
+pub fn screen(columns: &[&Entries], rests: &[&Entries], prior_sigmas: Vec<f64>, left: &Entries) -> Screen {
+    let mut screen = Screen::zeros(prior_sigmas);
+    for (row, column) in columns.iter().enumerate() {
+        screen.score[row] = dot(column, left);
+        for (other, rest) in rests.iter().enumerate() {
+            screen.information[(row, other)] = dot(column, rest);
+        }
+    }
+    screen
 }

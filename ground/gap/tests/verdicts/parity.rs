@@ -132,8 +132,7 @@ fn check_healthy(name: &str, from_s: f64) {
     assert!(!named.is_empty() && !small.is_empty());
     let is_seen = |row: &&Row| row.snr.max(row.smoothed.unwrap_or(0.0)) >= PARITY_SNR;
     assert!(named.iter().all(is_seen), "{name}: {named:?}");
-    let mut others = named.iter().filter(|row| row.effect != "gyro-bias-walk");
-    assert!(others.all(|row| row.smoothed.is_some()), "{name} did not settle");
+    assert!(named.iter().all(|row| row.smoothed.is_some()), "{name} did not settle");
 }
 
 /// Takes the windows out of a case.
@@ -154,9 +153,10 @@ fn a_log_without_windows_is_parted_in_the_middle_and_a_healthy_one_is_given_no_n
     assert!(flight.log.start_s[299] < held.start_s[0]);
     let findings = Findings::of(&flight, &[], &|_, _| ()).expect("has redundancy");
     assert!(findings.names.is_empty(), "{:?}", findings.names);
-    // A walk is sought by parity alone.
-    let mut others = findings.visible.iter().filter(|row| row.effect != "gyro-bias-walk");
-    assert!(others.all(|row| row.smoothed.is_some()), "did not settle");
+    assert!(
+        findings.visible.iter().all(|row| row.smoothed.is_some()),
+        "did not settle"
+    );
     let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is analysed");
     let (_, screen) = texts.iter().find(|(name, _)| name == "all.txt").expect("a screen");
     assert!(screen.contains("WINDOWS none in case.toml"), "{screen}");

@@ -13,7 +13,11 @@ use super::{Chosen, Seen, Taken};
 use crate::{
     library::{hypotheses::Library, products::Entries},
     null::evidence::{Screen, probabilities},
-    parity::{space::dot, visible::may_be_named, walk},
+    parity::{
+        space::{dot, screen},
+        visible::may_be_named,
+        walk,
+    },
     search::odds::{itself, oversize},
     thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, TEMPERATURE, UNTOLD},
 };
@@ -125,13 +129,8 @@ impl<'a> Beside<'a> {
             parts.push(from..from + one.columns.len());
             from += one.columns.len();
         }
-        let mut screen = Screen::zeros(taken.iter().flat_map(|one| one.sigmas.clone()).collect());
-        for (row, column) in columns.iter().enumerate() {
-            screen.score[row] = dot(column, rest);
-            for (other, rest) in rests.iter().enumerate() {
-                screen.information[(row, other)] = dot(column, rest);
-            }
-        }
+        let sigmas = taken.iter().flat_map(|one| one.sigmas.clone()).collect();
+        let screen = screen(&columns, &rests, sigmas, rest);
         Some(Self {
             log_evidence: screen.of_any_size(parts.clone())?,
             columns,
