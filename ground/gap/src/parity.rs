@@ -6,7 +6,7 @@
 //! | step | file | gives |
 //! |---|---|---|
 //! | 1 | [`flight`] (by [`phases`], [`turning`]) | the fit windows of the log, and the unit in its environment; what it did when |
-//! | 2 | [`codes`], [`garbled`], [`wired`] | samples sent twice, lost, stuck and reversed bits; plates and axes that are exchanged |
+//! | 2 | [`beforehand`] (by [`codes`], [`garbled`], [`wired`], [`bending`]) | samples sent twice, lost, stuck and reversed bits; plates and axes that are exchanged; a part that would bend the motion |
 //! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
@@ -32,6 +32,8 @@
 //! whether what is named is as strong there.
 
 pub mod again;
+pub mod beforehand;
+pub mod bending;
 pub mod chips;
 pub mod codes;
 pub mod course;
@@ -63,8 +65,8 @@ use std::path::Path;
 use crate::{
     input::case::CaseError,
     parity::{
-        findings::Findings, flight::Flight, followed::Followed, plate::sensors::Sensors, smooth::told::Told,
-        verdict::Verdict,
+        beforehand::Beforehand, findings::Findings, flight::Flight, followed::Followed, plate::sensors::Sensors,
+        smooth::told::Told, verdict::Verdict,
     },
 };
 
@@ -103,9 +105,9 @@ pub fn analysed(
     if let Some(sensors) = Sensors::of(&flight.unit) {
         return of_plate(&flight, sensors, withheld, progress);
     }
-    let coded = Findings::coded(&flight, withheld)?;
-    let followed = Followed::of(&flight, &flight.log, &coded);
-    let findings = Findings::along(&flight, withheld, &coded, &followed, progress)?;
+    let beforehand = Beforehand::of(&flight, withheld)?;
+    let followed = Followed::of(&flight, &flight.log, &beforehand);
+    let findings = Findings::along(&flight, withheld, &beforehand, &followed, progress)?;
     let told = Told::explained(&followed, &findings, &|share| progress("attitude", share))?;
     let verdict = serde_json::to_string_pretty(&Verdict::new(&flight, &findings, &told))?;
     let screen = text::screen(&flight, &findings, &told);

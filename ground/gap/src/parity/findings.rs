@@ -24,11 +24,10 @@ use crate::{
     },
     parity::{
         again,
+        beforehand::Beforehand,
         chips::{self, Beside},
-        codes::{self, Finding},
         flight::Flight,
         followed::Followed,
-        garbled,
         name::{By, Name},
         nulls,
         packet::Motion,
@@ -37,7 +36,7 @@ use crate::{
         smoothed::{Fitted, Left, Second, promises, strengths, walked_on},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
-        walk, wired,
+        walk,
     },
     probability::outcome::Outcome,
     thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
@@ -75,6 +74,8 @@ pub struct Findings {
     pub rows: usize,
     /// Degrees of freedom a packet that the motion leaves: gyros, accelerometers, magnetometers, thermometers.
     pub free: [f64; 4],
+    /// Channels of a part that the motion is made without.
+    pub bending: Vec<usize>,
     /// \[sigma\] before anything is named, and after.
     pub gap: [f64; 2],
     /// Each channel, before.
@@ -101,35 +102,19 @@ impl Findings {
     /// # Errors
     /// When the unit has no redundancy, or its description names an effect there is not.
     pub fn of(flight: &Flight, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Result<Self, CaseError> {
-        let coded = Self::coded(flight, withheld)?;
-        let followed = Followed::of(flight, &flight.log, &coded);
-        Self::along(flight, withheld, &coded, &followed, progress)
+        let beforehand = Beforehand::of(flight, withheld)?;
+        let followed = Followed::of(flight, &flight.log, &beforehand);
+        Self::along(flight, withheld, &beforehand, &followed, progress)
     }
 
-    /// What is told before anything is followed: by the codes of a flight, and by where its sensors look.
-    ///
-    /// # Errors
-    /// When the unit's description names an effect there is not.
-    pub fn coded(flight: &Flight, withheld: &[String]) -> Result<Vec<Finding>, CaseError> {
-        let mut coded = codes::look_along(&flight.log, &flight.whole, &flight.unit);
-        coded.retain(|finding| withheld.iter().all(|name| name != finding.effect));
-        let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
-        codes::taken_out(&mut log, &mut unit, &coded);
-        coded.extend(garbled::look(&log, &unit));
-        coded.retain(|finding| withheld.iter().all(|name| name != finding.effect));
-        let wired = wired::look(flight, &coded, withheld)?;
-        coded.extend(wired);
-        Ok(coded)
-    }
-
-    /// Of a flight whose motion is followed, and of whose codes this is known.
+    /// Of a flight whose motion is followed, and of which this is known.
     ///
     /// # Errors
     /// When the unit has no redundancy, or its description names an effect there is not.
     pub fn along(
         flight: &Flight,
         withheld: &[String],
-        coded: &[Finding],
+        beforehand: &Beforehand,
         followed: &Followed,
         progress: &dyn Fn(&'static str, f64),
     ) -> Result<Self, CaseError> {
@@ -185,7 +170,7 @@ impl Findings {
             causes.extend(second.names);
             smoothed = second.left;
         }
-        let doubts = weigh(flight, coded, &space, &mut causes, progress)?;
+        let doubts = weigh(flight, beforehand, &space, &mut causes, progress)?;
         rivals.extend(causes.iter().map(|(name, _)| (name.effect, name.probability)));
         let mut is_believed = true;
         causes.retain(|(name, _)| {
@@ -209,8 +194,7 @@ impl Findings {
             .get(causes.len().saturating_sub(named.len()))
             .filter(|_| is_by_smoothing);
         let is_unexplained = [Some(&left), about].into_iter().flatten().any(is_unexplained);
-        let names: Vec<Name> = coded
-            .iter()
+        let names: Vec<Name> = (beforehand.found.iter())
             .map(Name::by_codes)
             .chain(causes.into_iter().map(|(name, _)| name))
             .collect();
@@ -230,6 +214,7 @@ impl Findings {
         Ok(Self {
             rows: problem.twin.starts_s().len(),
             free,
+            bending: beforehand.bending.clone(),
             channels: (twin.unit().channels.iter().zip(&kept))
                 .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
                 .collect(),
@@ -258,7 +243,7 @@ struct Doubts {
 /// promises nothing there, but it goes on: they have one of their own, or not.
 fn weigh(
     flight: &Flight,
-    coded: &[Finding],
+    beforehand: &Beforehand,
     parity: &Space,
     causes: &mut [(Name, Fitted)],
     progress: &dyn Fn(&'static str, f64),
@@ -270,7 +255,7 @@ fn weigh(
     let mut walked = vec![None; fitted.len()];
     let held = match &flight.held {
         Some(log) => {
-            let held = Followed::of(flight, log, coded);
+            let held = Followed::of(flight, log, beforehand);
             let promises = promises(&held, &fitted, &|share| progress("held out", share))?;
             let model: Vec<Component> = fitted.iter().map(|(component, _)| component.clone()).collect();
             for (at, walked) in walked.iter_mut().enumerate() {

@@ -4,21 +4,23 @@
 
 use std::cell::OnceCell;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use twin::{
     environment::Environment,
     predict::{Twin, UnitDescription},
 };
 
 use crate::{
-    input::{case::CaseError, log::Log, windows::Fit},
+    input::{case::CaseError, log::Log, reference::Reference, windows::Fit},
     null::problem::Problem,
     parity::{
-        codes::{self, Finding},
+        beforehand::Beforehand,
+        bending, codes,
         course::{Course, Start},
         flight::Flight,
         known::Known,
-        search::Free,
+        packet::Motion,
+        search::{Free, residual_of},
         smooth::{self, About, Smoothed, smoothing::Smoothing},
         space::Space,
         turning::Holes,
@@ -29,6 +31,8 @@ use crate::{
 pub struct Followed {
     /// What is left of the log.
     pub log: Log,
+    /// The same without a part that would bend the motion.
+    steady: Log,
     /// The unit, its noise with what codes lose.
     pub unit: UnitDescription,
     /// About which parity is linear.
@@ -43,20 +47,22 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// Rows of a flight, in whose codes this was found.
-    pub fn of(flight: &Flight, log: &Log, coded: &[Finding]) -> Self {
+    /// Rows of a flight, of which this is known.
+    pub fn of(flight: &Flight, log: &Log, beforehand: &Beforehand) -> Self {
         let (mut log, mut unit) = (log.clone(), flight.unit.clone());
-        codes::taken_out(&mut log, &mut unit, coded);
+        codes::taken_out(&mut log, &mut unit, &beforehand.found);
+        let steady = bending::without(&log, &beforehand.bending);
         let environment = flight.environment;
-        let (course, mut start) = Course::of(&log, &unit, &environment);
+        let (course, mut start) = Course::of(&steady, &unit, &environment);
         start.holes.clone_from(&flight.holes);
         Self {
             course,
             smoothed: OnceCell::new(),
             motion: OnceCell::new(),
             calibrated: OnceCell::new(),
-            rests: flight.rests(&log, &unit),
+            rests: flight.rests(&steady, &unit),
             log,
+            steady,
             unit,
             environment,
             known: flight.known.clone(),
@@ -82,7 +88,7 @@ impl Followed {
 
     fn about(&self) -> About<'_> {
         About {
-            log: &self.log,
+            log: &self.steady,
             unit: &self.unit,
             environment: &self.environment,
             course: &self.course,
@@ -110,6 +116,19 @@ impl Followed {
     pub fn twin_of_course(&self) -> Result<Twin, CaseError> {
         let (scene, starts_s) = (self.course.scene.clone(), self.log.start_s.clone());
         Ok(Twin::new(self.unit.clone(), self.environment, scene, starts_s)?)
+    }
+
+    /// What packets keep of each channel once motion and calibration are eliminated: its energy and its degrees of freedom.
+    ///
+    /// # Errors
+    /// When the unit's description names an effect there is not.
+    pub fn kept_by_packets(&self) -> Result<Vec<(f64, f64)>, CaseError> {
+        let (twin, fit, reference) = (self.twin_of_course()?, self.fit(), Reference::default());
+        let problem = Problem::new(&twin, &fit, &reference);
+        let motion = Motion::of(&problem, &self.course);
+        let space = Space::new(&problem, &motion, Vec::new());
+        let residual = space.project_residual(residual_of(&problem, &[]), &DVector::zeros(0));
+        Ok(space.kept(&residual))
     }
 
     /// The twin along a smoothed motion of it.

@@ -43,6 +43,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     );
     out += &parted(flight);
     out += &unturned(flight);
+    out += &made_without(flight, findings);
     out += &flight.phases_line();
     out += &seen_and_not(findings);
     let _ = writeln!(
@@ -57,6 +58,17 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     out += &told.known_lines(&flight.known);
     let _ = writeln!(out, "NEXT    {}", next(findings).trim_end());
     wrapped(&out)
+}
+
+/// The part that would bend the motion, in a line.
+fn made_without(flight: &Flight, findings: &Findings) -> String {
+    match flight.names(&findings.bending).join(" ") {
+        names if names.is_empty() => String::new(),
+        names => format!(
+            "WITHOUT  {names}: with them no motion fits all sensors, and without them all others agree; the motion is made of the others, \
+             and these are judged about it\n"
+        ),
+    }
 }
 
 /// Packets that were left out because nobody knows how fast the unit turned, in a line.

@@ -33,6 +33,9 @@ pub struct Verdict {
     /// Packets of the fit windows whose rate nobody knows.
     #[serde(skip_serializing_if = "Option::is_none")]
     left_out: Option<usize>,
+    /// Channels of a part that the motion is made without.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    motion_without: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     chips: Vec<serde_json::Value>,
     #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
@@ -151,6 +154,7 @@ impl Verdict {
             phases: phases::rounded(&flight.phases),
             phases_from: phases::told_by(flight.are_phases_told),
             left_out: Some(flight.unturned).filter(|rows| *rows > 0),
+            motion_without: flight.names(&findings.bending),
             chips: chips::text::json(&findings.chips),
             motion_known: told.known_json(&flight.known),
             attitude: Attitude {

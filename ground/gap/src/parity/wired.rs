@@ -24,15 +24,13 @@ use twin::{
 };
 
 use crate::{
-    input::{case::CaseError, log::Log, reference::Reference},
-    null::problem::Problem,
+    input::{case::CaseError, log::Log},
     parity::{
+        beforehand::Beforehand,
         codes::{self, Finding, Look},
         flight::Flight,
         followed::Followed,
-        packet::Motion,
-        search::residual_of,
-        space::{Space, gap},
+        space::gap,
     },
     thresholds::PARITY_GAP,
 };
@@ -62,25 +60,19 @@ pub fn look(flight: &Flight, coded: &[Finding], withheld: &[String]) -> Result<O
         looks: looks.clone(),
     };
     let with: Vec<Finding> = coded.iter().cloned().chain([finding(String::new())]).collect();
-    let before = left(&Followed::of(flight, &flight.log, coded))?;
-    let after = left(&Followed::of(flight, &flight.log, &with))?;
+    let left = |log: &Log, found: &[Finding]| -> Result<f64, CaseError> {
+        let followed = Followed::of(flight, log, &Beforehand::found(found));
+        Ok(gap(&followed.kept_by_packets()?))
+    };
+    let before = left(&flight.log, coded)?;
+    let after = left(&flight.log, &with)?;
     let held = match &flight.held {
-        Some(log) => left(&Followed::of(flight, log, &with))?,
+        Some(log) => left(log, &with)?,
         None => after,
     };
     let told = cause.effect.told(cause.variant).unwrap_or_default();
     Ok((before > PARITY_GAP && after.max(held) <= PARITY_GAP)
         .then(|| finding(format!("{told}; with it {after:.2} sigma are left of {before:.2}"))))
-}
-
-/// \[sigma\] what motion and calibration leave of each packet.
-fn left(followed: &Followed) -> Result<f64, CaseError> {
-    let (twin, fit, reference) = (followed.twin_of_course()?, followed.fit(), Reference::default());
-    let problem = Problem::new(&twin, &fit, &reference);
-    let motion = Motion::of(&problem, &followed.course);
-    let space = Space::new(&problem, &motion, Vec::new());
-    let residual = space.project_residual(residual_of(&problem, &[]), &DVector::zeros(0));
-    Ok(gap(&space.kept(&residual)))
 }
 
 /// What the channels of a kind read.

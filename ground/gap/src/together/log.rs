@@ -15,8 +15,8 @@ use crate::{
     },
     null::problem::{Component, Problem},
     parity::{
+        beforehand::Beforehand,
         codes::Finding,
-        findings::Findings,
         flight::Flight,
         followed::Followed,
         nulls,
@@ -60,7 +60,7 @@ pub struct Logged {
 
 enum Known {
     Reference(Box<Subject>),
-    Nothing(Box<Followed>, Box<Flight>, Vec<Finding>),
+    Nothing(Box<Followed>, Box<Flight>, Beforehand),
 }
 
 /// A motion that a reference knows: nothing of it is eliminated.
@@ -94,9 +94,9 @@ impl Logged {
         let name = opened.text.name.clone();
         let known = if is_blind || opened.is_without_motion() {
             let flight = Flight::open(case)?;
-            let coded = Findings::coded(&flight, withheld)?;
-            let followed = Followed::of(&flight, &flight.log, &coded);
-            Known::Nothing(Box::new(followed), Box::new(flight), coded)
+            let beforehand = Beforehand::of(&flight, withheld)?;
+            let followed = Followed::of(&flight, &flight.log, &beforehand);
+            Known::Nothing(Box::new(followed), Box::new(flight), beforehand)
         } else {
             Known::Reference(Box::new(Subject::open(case)?))
         };
@@ -116,7 +116,7 @@ impl Logged {
     pub fn coded(&self) -> &[Finding] {
         match &self.known {
             Known::Reference(_) => &[],
-            Known::Nothing(_, _, coded) => coded,
+            Known::Nothing(_, _, beforehand) => &beforehand.found,
         }
     }
 
@@ -198,11 +198,11 @@ impl Logged {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn held_out(&self, causes: &[Fitted], progress: &dyn Fn(f64)) -> Result<Option<Vec<Strength>>, CaseError> {
-        let Known::Nothing(_, flight, coded) = &self.known else {
+        let Known::Nothing(_, flight, beforehand) = &self.known else {
             return Ok(None);
         };
         let Some(log) = &flight.held else { return Ok(None) };
-        let held = Followed::of(flight, log, coded);
+        let held = Followed::of(flight, log, beforehand);
         held_out(&held, causes, progress).map(Some)
     }
 }

@@ -246,7 +246,7 @@ fn three_chips_of_a_rocket_lie_where_they_lie() {
         let _ = writeln!(text, "{:.3},{}", t_s - rows[0].0, cells.join(","));
     }
     let folder = case(&unit(3, false), &text);
-    // Coloured noise of the boost fits gyros that feel forces; the rest of the flight, where no motion settles, must refute it.
+    // Coloured noise of the boost fits gyros that feel forces; the rest of the flight must refute it.
     let texts = analysed(folder.path(), &[], &|_, _| ()).expect("is told");
     let verdict = &texts
         .iter()
@@ -255,7 +255,16 @@ fn three_chips_of_a_rocket_lie_where_they_lie() {
         .1;
     let verdict: Value = serde_json::from_str(verdict).expect("a verdict");
     let causes = verdict["causes"].as_array().expect("causes");
-    assert!(causes.iter().all(|cause| cause["effect"] == "lever-arm"), "{causes:?}");
+    // Chip 0 did send samples twice: of 16 rows in which all six axes repeat, ten are in the boost or the fall, where the other two chips change by 50 to
+    // 4000 counts and it does by about twice as much in the row after.
+    let (stale, others): (Vec<&Value>, Vec<&Value>) = causes.iter().partition(|cause| cause["by"] == "codes");
+    for cause in stale {
+        assert_eq!(
+            (&cause["effect"], &cause["channels"][0]),
+            (&Value::from("stale-sample"), &Value::from("a0x"))
+        );
+    }
+    assert!(others.iter().all(|cause| cause["effect"] == "lever-arm"), "{others:?}");
     let found = seen(&folder);
     print!("{}", text::lines(&found));
     // What the data's own note says: 6.01 and 12.14 mm along -y, 0.84 and 0.58 deg.

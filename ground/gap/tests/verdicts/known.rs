@@ -4,7 +4,9 @@ use std::{fmt::Write, fs, path::Path};
 
 use crate::twin_case::Log;
 use gap::parity::{
-    analysed, codes,
+    analysed,
+    beforehand::Beforehand,
+    codes,
     flight::Flight,
     followed::Followed,
     known::{simulated::Belief, ties::Use},
@@ -124,7 +126,7 @@ fn tracked(folder: &Path, motion: &Thrown, sigma_m: f64) {
 fn told(folder: &TempDir) -> Told {
     let flight = Flight::open(folder.path()).expect("opens");
     let coded = codes::look(&flight.log, &flight.unit);
-    Told::along(&Followed::of(&flight, &flight.log, &coded), &|_| ()).expect("follows")
+    Told::along(&Followed::of(&flight, &flight.log, &Beforehand::found(&coded)), &|_| ()).expect("follows")
 }
 
 /// Error and stated sigma of an attitude as root mean squares \[deg\].

@@ -9,6 +9,7 @@ use gap::{
     null::problem::Component,
     parity::{
         analysed,
+        beforehand::Beforehand,
         findings::Findings,
         flight::Flight,
         followed::Followed,
@@ -262,6 +263,29 @@ fn what_the_held_out_windows_do_not_keep_is_not_named_by_smoothing() {
     assert!(findings.names.is_empty(), "{:?}", findings.names);
 }
 
+/// Accelerometers of one plate that lose gravity would turn the motion with them: it is made of the others, and is told.
+#[test]
+fn a_part_that_would_bend_the_motion_is_judged_about_that_of_the_others() {
+    let active = [Active {
+        cause: Cause {
+            effect: by_name("accel-high-pass").expect("an effect"),
+            locality: Locality::Group("plate 3".to_owned()),
+            variant: 0.125,
+        },
+        theta: Vec::new(),
+    }];
+    let folder = flown_in("tumble", 20.0, 4, (&active, &active), 60.0, |_| true);
+    let flight = Flight::open(folder.path()).expect("opens");
+    let beforehand = Beforehand::of(&flight, &[]).expect("packets");
+    assert_eq!(flight.names(&beforehand.bending), ["a3x", "a3y", "a3z"]);
+    let findings = found(&folder);
+    let first = findings.names.first().expect("a name");
+    assert_eq!(first.effect, "accel-high-pass", "{:?}", findings.names);
+    assert_eq!(first.channels, beforehand.bending);
+    let followed = Followed::of(&flight, &flight.log, &beforehand);
+    assert!(followed.smoothed(&|_| ()).expect("a motion").is_settled());
+}
+
 /// A load that all gyros feel from an instant on, between those tried.
 #[test]
 fn a_step_is_found_where_it_is_and_is_no_walk() {
@@ -316,7 +340,7 @@ fn what_is_found_beside_a_cause_does_not_speak_against_it() {
     let folder = flown_in("tumble", 20.0, 4, (active, active), 60.0, |_| true);
     let flight = Flight::open(folder.path()).expect("opens");
     let held = flight.held.as_ref().expect("is judged");
-    let followed = Followed::of(&flight, held, &[]);
+    let followed = Followed::of(&flight, held, &Beforehand::default());
     let fitted = |active: &Active, sigma: f64| {
         let component = Component {
             active: active.clone(),
@@ -398,7 +422,7 @@ fn an_attitude_is_smoothed_beside_what_is_named_and_not_told_where_something_is_
         findings.names,
         findings.alternatives
     );
-    let followed = Followed::of(&flight, &flight.log, &[]);
+    let followed = Followed::of(&flight, &flight.log, &Beforehand::default());
     let without = held_against(&Told::along(&followed, &|_| ()).expect("is smoothed"), "tumble", 20.0);
     let told = Told::explained(&followed, &findings, &|_| ()).expect("is smoothed");
     let with = held_against(&told, "tumble", 20.0);

@@ -13,6 +13,7 @@ use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::Problem,
     parity::{
+        beforehand::Beforehand,
         findings::Findings,
         flight::Flight,
         followed::Followed,
@@ -96,8 +97,8 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn of(flight: &Flight, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
-        let coded = Findings::coded(flight, &[])?;
-        Self::along(&Followed::of(flight, &flight.log, &coded), progress)
+        let beforehand = Beforehand::of(flight, &[])?;
+        Self::along(&Followed::of(flight, &flight.log, &beforehand), progress)
     }
 
     /// Of a log whose motion is followed.
