@@ -53,6 +53,7 @@ pub mod smooth;
 pub mod smoothed;
 pub mod space;
 pub mod spline;
+mod taken_out;
 pub mod text;
 pub mod turning;
 pub mod verdict;
@@ -65,8 +66,8 @@ use std::path::Path;
 use crate::{
     input::case::CaseError,
     parity::{
-        beforehand::Beforehand, findings::Findings, flight::Flight, followed::Followed, plate::sensors::Sensors,
-        smooth::told::Told, verdict::Verdict,
+        findings::Findings, flight::Flight, followed::Followed, plate::sensors::Sensors, smooth::told::Told,
+        verdict::Verdict,
     },
 };
 
@@ -105,7 +106,7 @@ pub fn analysed(
     if let Some(sensors) = Sensors::of(&flight.unit) {
         return of_plate(&flight, sensors, withheld, progress);
     }
-    let beforehand = Beforehand::of(&flight, withheld)?;
+    let beforehand = beforehand::look(&flight, withheld)?;
     let followed = Followed::of(&flight, &flight.log, &beforehand);
     let findings = Findings::along(&flight, withheld, &beforehand, &followed, progress)?;
     let told = Told::explained(&followed, &findings, &|share| progress("attitude", share))?;
@@ -145,7 +146,7 @@ fn of_plate(
         ("shrink.txt", NO_SHRINK.to_owned()),
     ];
     let mut texts: Vec<(String, String)> = texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
-    let attitude = plate::told::attitude(&findings).csv();
+    let attitude = plate::attitude::attitude(&findings).csv();
     texts.extend(attitude.map(|text| (ATTITUDE.to_owned(), text)));
     Ok(texts)
 }

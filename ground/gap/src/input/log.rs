@@ -95,6 +95,15 @@ pub struct Log {
 }
 
 impl Log {
+    /// The same without the samples of some channels.
+    pub fn without(&self, channels: &[usize]) -> Log {
+        let mut others = self.clone();
+        for channel in channels {
+            others.channels[*channel] = Series::default();
+        }
+        others
+    }
+
     /// A log without rows for so many channels.
     pub fn empty(channels: usize) -> Self {
         Log {

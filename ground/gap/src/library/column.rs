@@ -12,10 +12,10 @@ use std::{borrow::Cow, sync::Arc};
 use nalgebra::DVector;
 use twin::effect::{Active, Cause, Wave};
 
-use crate::{
-    library::products::Entries,
-    null::problem::{Frame, Problem},
-};
+use crate::null::problem::{Frame, Problem};
+
+/// A column: for each channel it touches, its values in units of noise.
+pub type Entries = Vec<(usize, DVector<f64>)>;
 
 /// A course or a wave, which many columns have in common.
 type Series = Arc<DVector<f64>>;

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::{
-    library::column::Column,
+    library::column::{Column, Entries},
     null::{
         evidence::Screen,
         problem::{Frame, Problem},
@@ -21,9 +21,6 @@ use crate::{
 
 /// Columns that are taken from colour to colour together: what happens at a sample is then read once for all of them.
 const BLOCK: usize = 32;
-
-/// A column: for each channel it touches, its values in units of noise.
-pub type Entries = Vec<(usize, DVector<f64>)>;
 
 /// Columns and the products known so far.
 #[derive(Debug, Default)]

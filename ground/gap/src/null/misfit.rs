@@ -9,7 +9,7 @@
 //!
 //! It never makes evidence stronger, and a channel within [`MISFIT_CALM`] of white is left alone.
 
-use crate::thresholds::MISFIT_CALM;
+use crate::{null::problem::Frame, thresholds::MISFIT_CALM};
 use nalgebra::DVector;
 
 /// Factor of the variance beyond which it does not count: such a channel says nothing anyway.
@@ -21,6 +21,14 @@ const LONGEST: usize = 8;
 /// Factors of the noise, one a channel.
 pub fn factors(rest: &[DVector<f64>]) -> Vec<f64> {
     rest.iter().map(|rest| factor(rest.as_slice())).collect()
+}
+
+/// Frames whose noise is so many times what it was, one factor a channel.
+pub fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
+    for (frame, factor) in frames.iter_mut().zip(factors).filter(|(_, factor)| **factor != 1.0) {
+        frame.reweigh(&frame.weights.map(|_| *factor));
+    }
+    frames
 }
 
 fn factor(rest: &[f64]) -> f64 {

@@ -18,9 +18,8 @@ use twin::effect::Cause;
 
 use crate::{
     library::{
-        column::Column,
+        column::{Column, Entries},
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
     null::interval::{Interval, begins_s},
     parity::{

@@ -16,11 +16,13 @@ use std::collections::BTreeMap;
 use twin::predict::Kind;
 
 use crate::{
-    input::{
-        case::CaseError,
-        log::{Log, Series},
+    input::{case::CaseError, log::Log},
+    parity::{
+        codes::Finding,
+        flight::Flight,
+        followed::{Beforehand, Followed},
+        space::gap,
     },
-    parity::{beforehand::Beforehand, codes::Finding, flight::Flight, followed::Followed, space::gap},
     thresholds::{PARITY_FREE, PARITY_GAP},
 };
 
@@ -43,7 +45,7 @@ pub fn look(flight: &Flight, found: &[Finding]) -> Result<Vec<usize>, CaseError>
     };
     let kind = flight.unit.channels[part[0]].sensor;
     for log in [Some(&flight.log), flight.held.as_ref()].into_iter().flatten() {
-        let others = kept(&without(log, &part))?;
+        let others = kept(&log.without(&part))?;
         let of_kind = flight
             .unit
             .channels
@@ -70,13 +72,4 @@ fn loudest(flight: &Flight, kept: &[(f64, f64)]) -> Option<Vec<usize>> {
     parts
         .into_values()
         .max_by(|one, other| gap_of(one).total_cmp(&gap_of(other)))
-}
-
-/// A log without the samples of some channels.
-pub fn without(log: &Log, channels: &[usize]) -> Log {
-    let mut others = log.clone();
-    for channel in channels {
-        others.channels[*channel] = Series::default();
-    }
-    others
 }

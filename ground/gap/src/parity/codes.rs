@@ -30,7 +30,6 @@ use crate::{
         log::{Log, Series},
         repeats,
     },
-    parity::garbled,
     thresholds::ROWS_CHANCE,
 };
 
@@ -94,46 +93,6 @@ pub fn look_along(log: &Log, whole: &Log, unit: &UnitDescription) -> Vec<Finding
     found
 }
 
-/// The log without what was found: old samples, faulty channels and the time in which one is stuck are left out, lost bits are rounding;
-/// channels look where they do.
-pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
-    if found.iter().any(|finding| finding.effect == "packet-corruption") {
-        for (channel, spoilt) in garbled::spoilt(log, unit) {
-            let series = &mut log.channels[channel];
-            *series = series.only(|row| row as u32 != spoilt);
-        }
-    }
-    for look in found.iter().flat_map(|finding| &finding.looks) {
-        let own = &mut unit.channels[look.channel];
-        (own.axis_b, own.lever_m) = (look.axis_b, look.lever_m);
-    }
-    for finding in found
-        .iter()
-        .filter(|finding| finding.looks.is_empty() && finding.effect != "packet-corruption")
-    {
-        let repeated = repeated(log, &finding.channels);
-        for channel in finding.channels.iter().copied() {
-            let own = &mut unit.channels[channel];
-            let series = &mut log.channels[channel];
-            match (finding.effect, finding.step) {
-                (_, Some(step)) => {
-                    let coarse = step as f64 * own.lsb;
-                    own.noise_sigma = own.noise_sigma.hypot(coarse / 12f64.sqrt());
-                    // Cut off instead of rounded, they are off by half a step.
-                    own.bias_sigma = own.bias_sigma.hypot(0.5 * coarse);
-                }
-                ("stale-sample", _) => *series = series.only(|row| repeated.binary_search(&(row as u32)).is_err()),
-                ("stuck-channel", _) => {
-                    let last = series.rows.len() - alike_at_end(series);
-                    series.rows.truncate(last);
-                    series.values.truncate(last);
-                }
-                _ => *series = Series::default(),
-            }
-        }
-    }
-}
-
 fn code(channel: &Channel, value: f64) -> i64 {
     (value / channel.lsb).round() as i64
 }
@@ -144,7 +103,7 @@ pub fn sends_codes(channel: &Channel) -> bool {
 }
 
 /// Rows whose values are those of the row before in all of these channels.
-fn repeated(log: &Log, channels: &[usize]) -> Vec<u32> {
+pub(super) fn repeated(log: &Log, channels: &[usize]) -> Vec<u32> {
     let Some(first) = channels.first().map(|channel| &log.channels[*channel]) else {
         return Vec::new();
     };
@@ -260,7 +219,7 @@ fn of_parts(unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Finding> {
 }
 
 /// Samples at the end that are all one.
-fn alike_at_end(series: &Series) -> usize {
+pub(super) fn alike_at_end(series: &Series) -> usize {
     let Some(end) = series.values.last() else { return 0 };
     series.values.iter().rev().take_while(|value| *value == end).count()
 }
@@ -321,6 +280,7 @@ fn greatest_common_factor(one: i64, other: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parity::taken_out::taken_out;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 

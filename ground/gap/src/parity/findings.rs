@@ -23,17 +23,16 @@ use crate::{
         problem::{Component, Problem},
     },
     parity::{
-        again,
-        beforehand::Beforehand,
+        again, beforehand,
         chips::{self, Beside},
         flight::Flight,
-        followed::Followed,
-        name::{By, Name},
+        followed::{Beforehand, Followed},
+        name::{By, Fitted, Name},
         nulls,
         packet::Motion,
         phases::shown,
         search::{self, First, Free, Offered, residual_of},
-        smoothed::{Fitted, Left, Second, promises, strengths, walked_on},
+        smoothed::{Left, Second, promises, strengths, walked_on},
         space::{Elimination, Projected, Space, gap},
         visible::{self, Row},
         walk,
@@ -102,7 +101,7 @@ impl Findings {
     /// # Errors
     /// When the unit has no redundancy, or its description names an effect there is not.
     pub fn of(flight: &Flight, withheld: &[String], progress: &dyn Fn(&'static str, f64)) -> Result<Self, CaseError> {
-        let beforehand = Beforehand::of(flight, withheld)?;
+        let beforehand = beforehand::look(flight, withheld)?;
         let followed = Followed::of(flight, &flight.log, &beforehand);
         Self::along(flight, withheld, &beforehand, &followed, progress)
     }

@@ -14,8 +14,7 @@ use crate::{
     input::{case::CaseError, log::Log, reference::Reference, windows::Fit},
     null::problem::Problem,
     parity::{
-        beforehand::Beforehand,
-        bending, codes,
+        codes::Finding,
         course::{Course, Start},
         flight::Flight,
         known::Known,
@@ -23,9 +22,29 @@ use crate::{
         search::{Free, residual_of},
         smooth::{self, About, Smoothed, smoothing::Smoothing},
         space::Space,
+        taken_out::taken_out,
         turning::Holes,
     },
 };
+
+/// What a motion is made with.
+#[derive(Clone, Debug, Default)]
+pub struct Beforehand {
+    /// Effects that need no motion to be named. They are taken out.
+    pub found: Vec<Finding>,
+    /// Channels of a part that would bend the motion. They are judged about the motion of the others.
+    pub bending: Vec<usize>,
+}
+
+impl Beforehand {
+    /// Of these findings alone.
+    pub fn found(found: &[Finding]) -> Self {
+        Self {
+            found: found.to_vec(),
+            bending: Vec::new(),
+        }
+    }
+}
 
 /// A log and what its unit did meanwhile.
 pub struct Followed {
@@ -50,8 +69,8 @@ impl Followed {
     /// Rows of a flight, of which this is known.
     pub fn of(flight: &Flight, log: &Log, beforehand: &Beforehand) -> Self {
         let (mut log, mut unit) = (log.clone(), flight.unit.clone());
-        codes::taken_out(&mut log, &mut unit, &beforehand.found);
-        let steady = bending::without(&log, &beforehand.bending);
+        taken_out(&mut log, &mut unit, &beforehand.found);
+        let steady = log.without(&beforehand.bending);
         let environment = flight.environment;
         let (course, mut start) = Course::of(&steady, &unit, &environment);
         start.holes.clone_from(&flight.holes);

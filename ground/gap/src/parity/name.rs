@@ -2,14 +2,14 @@
 //!
 //! In: what codes say ([`crate::parity::codes`]), or what a search chose ([`crate::parity::search`]). Out: a [`Name`].
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use twin::effect::{Parameter, by_name};
 
 use crate::{
     holdout::strength::Promise,
     library::hypotheses::{Hypothesis, Library},
     null::problem::{Component, Problem},
-    parity::{codes::Finding, phases::shown::Alone, search::Chosen, smoothed::Fitted, walk},
+    parity::{codes::Finding, phases::shown::Alone, search::Chosen, walk},
     probability::cause::Sized,
 };
 
@@ -28,6 +28,9 @@ pub enum By {
     /// All packets, about the smoothed motion.
     Smoothing,
 }
+
+/// A cause with the covariance of its parameters.
+pub type Fitted = (Component, DMatrix<f64>);
 
 /// An effect that is said.
 #[derive(Clone, Debug)]

@@ -8,8 +8,8 @@ use twin::effect::Locality;
 
 use crate::{
     library::{
+        column::Entries,
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
     null::problem::Problem,
 };

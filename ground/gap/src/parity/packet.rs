@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use twin::predict::{Feel, Kind};
 
 use crate::{
-    library::products::Entries,
+    library::column::Entries,
     null::problem::Problem,
     parity::{course::Course, space::Elimination},
 };

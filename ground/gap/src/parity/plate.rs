@@ -15,6 +15,7 @@
 //! The library's search is not used: of its effects, those that all sensors of a kind share are another motion
 //! ([`crate::parity::nulls`]), and with one plate all are shared. What is left is what no motion does.
 
+pub mod attitude;
 pub mod filter;
 pub mod magnets;
 pub mod node;
@@ -40,6 +41,9 @@ use crate::{
     probability::outcome::Outcome,
     thresholds::{FIELD_MISFIT, KNOCKS, LINE_OVER, VELOCITY_MISFIT},
 };
+
+/// Names that one plate can be given.
+pub const CAN_BE_NAMED: [&str; 4] = ["shock", "vibration", "hard-iron", "field-gradient"];
 
 /// \[s\] between samples from which on gyros cannot be integrated: a hand turns a unit by a tenth of a radian in it.
 const SLOWEST_S: f64 = 0.05;

@@ -20,9 +20,8 @@ pub use self::{
 };
 use crate::{
     library::{
-        column::Column,
+        column::{Column, Entries},
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
     null::problem::{Component, Problem},
     parity::{

@@ -42,7 +42,7 @@ use twin::{
 
 use crate::{
     input::{case::CaseError, log::Log, reference::Reference, windows::Fit},
-    library::products::Entries,
+    library::column::Entries,
     null::problem::Problem,
     parity::{
         course::{Course, Start},

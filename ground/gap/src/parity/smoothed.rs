@@ -22,12 +22,12 @@ use twin::effect::{Active, LIBRARY, Nature};
 use crate::{
     holdout::strength::Promise,
     input::{case::CaseError, reference::Reference},
-    library::{hypotheses::Library, products::Entries},
+    library::{column::Entries, hypotheses::Library},
     null::problem::{Component, Problem},
     parity::{
         again,
         followed::Followed,
-        name::{By, Name},
+        name::{By, Fitted, Name},
         nulls::{self, NULLS},
         packet::Motion,
         search::{self, Chosen, First, Offered, residual_of},
@@ -37,9 +37,6 @@ use crate::{
         walk,
     },
 };
-
-/// A cause with the covariance of its parameters.
-pub type Fitted = (Component, DMatrix<f64>);
 
 /// What the second look says.
 pub struct Second {

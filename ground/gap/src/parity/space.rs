@@ -19,7 +19,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 pub use self::within::{Asked, Opened};
 use crate::{
-    library::products::Entries,
+    library::column::Entries,
     null::{evidence::Screen, problem::Problem},
 };
 

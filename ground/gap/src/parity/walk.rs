@@ -22,9 +22,8 @@ use twin::{
 
 use crate::{
     library::{
-        column::Column,
+        column::{Column, Entries},
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
     null::problem::Problem,
 };

@@ -26,11 +26,11 @@ use twin::{
 use crate::{
     input::{case::CaseError, log::Log},
     parity::{
-        beforehand::Beforehand,
-        codes::{self, Finding, Look},
+        codes::{Finding, Look},
         flight::Flight,
-        followed::Followed,
+        followed::{Beforehand, Followed},
         space::gap,
+        taken_out::taken_out,
     },
     thresholds::PARITY_GAP,
 };
@@ -47,7 +47,7 @@ const KINDS: [Kind; 3] = [Kind::Accelerometer, Kind::Gyro, Kind::Magnetometer];
 /// When the unit's description names an effect there is not.
 pub fn look(flight: &Flight, coded: &[Finding], withheld: &[String]) -> Result<Option<Finding>, CaseError> {
     let (mut log, mut unit) = (flight.log.clone(), flight.unit.clone());
-    codes::taken_out(&mut log, &mut unit, coded);
+    taken_out(&mut log, &mut unit, coded);
     let read = KINDS.map(|kind| Read::of(&log, &unit, kind));
     let Some((cause, looks)) = likeliest(&unit, &flight.environment, &log, &read, withheld) else {
         return Ok(None);

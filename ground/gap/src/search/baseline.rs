@@ -17,7 +17,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use twin::effect::LIBRARY;
 
 use crate::{
-    library::{hypotheses::Library, products::Entries},
+    library::{column::Entries, hypotheses::Library},
     null::problem::Problem,
 };
 

@@ -17,15 +17,15 @@ use crate::{
     input::case::SlowErrors,
     library::hypotheses::Library,
     null::{
-        misfit,
+        misfit::{self, weighed},
         model::{Courses, Model},
-        problem::{Component, Frame, Problem},
+        problem::{Component, Problem},
     },
     search::{
         gauss_newton::refine,
         in_colour::{attribute_in_colour, reframe},
         odds::probability_of_any,
-        readings::{Attribution, Chosen, attribute},
+        readings::{Attribution, Chosen, attribute, total_gain},
         scatter::{Scatter, scatters},
         walked::{Contest, walked, walked_in_colour},
     },
@@ -72,7 +72,7 @@ impl Explanation {
         let mut scatter = best_scatter(problem, &first, withheld);
         // Of effects that hold each other up each is worth more than its share: together no more than they take off.
         let together = 0.5 * (quiet.left() - first.left()).max(0.0);
-        let explained = gains(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
+        let explained = total_gain(&found.chosen).min(together) + scatter.as_ref().map_or(0.0, |scatter| scatter.gain);
         let alone = best_scatter(problem, quiet, withheld)
             .filter(|alone| !found.chosen.is_empty() && alone.gain > explained && is_whole(problem, alone));
         let is_inexact = errors.attitude_sigma_rad > 0.0;
@@ -126,7 +126,7 @@ impl Explanation {
         let (kept, refused): (Vec<Chosen>, Vec<Chosen>) = std::mem::take(&mut found.chosen)
             .into_iter()
             .partition(|chosen| probability_of_any(library, chosen) >= SAID);
-        let is_refused = gains(&refused) > gains(&kept);
+        let is_refused = total_gain(&refused) > total_gain(&kept);
         found.chosen = kept;
         let loud = weighed(described.clone(), &louder);
         reframe(problem, library, described);
@@ -138,7 +138,7 @@ impl Explanation {
         if scatter.is_some() && !wanders {
             // What a large effect's law leaves looks like scatter, and would be held to what that claims.
             scatter = best_scatter(problem, &first, withheld)
-                .filter(|scatter| scatter.gain > REMAINDER * gains(&found.chosen));
+                .filter(|scatter| scatter.gain > REMAINDER * total_gain(&found.chosen));
         }
         let own = scatter.as_ref().map(|scatter| scatter.recalibrated(problem, &first));
         // What is left is judged with the noise as described, or a misfit would excuse itself.
@@ -221,7 +221,7 @@ impl Explanation {
         // In channels that scatter more than described an effect on readings explained what it gained over that scatter.
         let by_readings = |scatter: &Scatter| {
             self.energy_without(quiet, &scatter.channels)
-                .max(2.0 * gains(&self.found.chosen))
+                .max(2.0 * total_gain(&self.found.chosen))
         };
         match &self.scatter {
             // Louder noise takes in whatever is there, and a walk whatever is slow: that it does is no sign of its law.
@@ -296,14 +296,10 @@ impl Explanation {
     }
 }
 
-pub(super) fn gains(chosen: &[Chosen]) -> f64 {
-    chosen.iter().map(|chosen| chosen.gain).sum()
-}
-
 /// How many different effects are in the channels of one of them, at most, the effect on the scatter included. An effect counts once, wherever and
 /// however often it was found, and if it brings more than a fiftieth of all: less may be what the laws of the others leave.
 fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Option<&Scatter>) -> usize {
-    let least = COUNTED_PART * gains(chosen);
+    let least = COUNTED_PART * total_gain(chosen);
     let component = |one: &Chosen| library.hypotheses[one.hypothesis].component(&one.theta);
     let model: Vec<Component> = chosen.iter().map(component).collect();
     let mut places: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
@@ -324,14 +320,6 @@ fn company(problem: &Problem, library: &Library, chosen: &[Chosen], scatter: Opt
     }
     let meets = |own: &BTreeSet<usize>| places.values().filter(|other| !other.is_disjoint(own)).count();
     places.values().map(meets).max().unwrap_or(0)
-}
-
-/// Frames whose noise is so many times what it was, one factor a channel.
-pub(super) fn weighed(mut frames: Vec<Frame>, factors: &[f64]) -> Vec<Frame> {
-    for (frame, factor) in frames.iter_mut().zip(factors).filter(|(_, factor)| **factor != 1.0) {
-        frame.reweigh(&frame.weights.map(|_| *factor));
-    }
-    frames
 }
 
 /// Factors of the noise for a search: of a misfit, or of the effect on the scatter. What that says of samples takes the place of

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
 
 use crate::{
-    library::{hypotheses::Library, products::Entries},
+    library::{column::Entries, hypotheses::Library},
     null::{
         evidence::{Estimate, Screen},
         problem::{Component, Problem},

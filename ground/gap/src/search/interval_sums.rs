@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    library::products::Entries,
+    library::column::Entries,
     null::{
         evidence::Screen,
         problem::{Frame, Problem},

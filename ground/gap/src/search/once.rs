@@ -8,7 +8,7 @@
 
 use crate::{
     input::windows::Span,
-    library::products::Entries,
+    library::column::Entries,
     null::problem::Problem,
     search::interval_sums::{Residual, Steps, Stretches, Touched},
     thresholds::{LEAST_PART, STRETCH_MARGIN},

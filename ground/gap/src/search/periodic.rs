@@ -7,7 +7,7 @@
 
 use crate::{
     input::windows::Span,
-    library::products::Entries,
+    library::column::Entries,
     null::{
         interval::{Interval, phase},
         problem::Problem,

@@ -22,7 +22,7 @@ use nalgebra::{DMatrix, DVector};
 use twin::predict::Memory;
 
 pub use self::{
-    chosen::{Chosen, Rival},
+    chosen::{Chosen, Rival, total_gain},
     screen::are_physical,
 };
 use self::{

@@ -12,17 +12,16 @@ use crate::{
     input::case::SlowErrors,
     library::hypotheses::Library,
     null::{
-        misfit,
+        misfit::{self, weighed},
         model::Model,
         problem::{Frame, Problem},
         tint::tinted,
     },
     search::{
         bias_walk::Walk,
-        explanation::{gains, weighed},
         gauss_newton::refine,
         in_colour::reframe,
-        readings::{Attribution, Chosen, attribute},
+        readings::{Attribution, Chosen, attribute, total_gain},
         scatter::Scatter,
     },
     thresholds::TEMPERATURE,
@@ -44,7 +43,7 @@ pub struct Walked {
 impl Walked {
     /// \[nats\] of all of it.
     pub fn gain(&self) -> f64 {
-        self.walk.gain + gains(&self.found.chosen)
+        self.walk.gain + total_gain(&self.found.chosen)
     }
 }
 

@@ -7,15 +7,14 @@ use crate::{
     holdout::strength::Promise,
     library::hypotheses::Library,
     parity::{
-        name::By,
+        name::{By, Fitted},
         search::{self, Chosen, Seen},
-        smoothed::Fitted,
     },
     probability::cause::Sized,
     together::{
-        heard::{Heard, key},
+        heard::{Heard, Look, key},
         joint::{Apart, Joint},
-        log::{Logged, Look},
+        log::Logged,
     },
 };
 

@@ -19,17 +19,37 @@ use twin::effect::{Nature, onsets};
 
 use crate::{
     library::{
+        column::Entries,
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
-    null::problem::Problem,
+    null::problem::{Component, Problem},
     parity::{
         search::{Offered, residual_of},
         smoothed::Left,
         space::{Elimination, Opened, Space},
     },
-    together::log::Looked,
 };
+
+/// How a log is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// By parity where there is no reference.
+    First,
+    /// About the smoothed motion where there is none, if it settled.
+    Second,
+}
+
+/// What is looked for beside what.
+pub struct Looked<'a> {
+    /// Which look.
+    pub look: Look,
+    /// Effects that are in.
+    pub model: &'a [Component],
+    /// Whether their parameters are free about what they are.
+    pub are_free: bool,
+    /// Effects that are left out of the library.
+    pub withheld: &'a [String],
+}
 
 /// Calibration that is one in all logs: the beginning of a column's name.
 const LASTING: [&str; 3] = ["scale_", "axis_1_", "axis_2_"];

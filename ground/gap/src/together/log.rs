@@ -10,44 +10,24 @@ use nalgebra::{DMatrix, DVector};
 use crate::{
     input::case::{CaseError, Opened, Subject},
     library::{
+        column::Entries,
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
-    null::problem::{Component, Problem},
+    null::problem::Problem,
     parity::{
-        beforehand::Beforehand,
+        beforehand,
         codes::Finding,
         flight::Flight,
-        followed::Followed,
+        followed::{Beforehand, Followed},
+        name::Fitted,
         nulls,
         packet::Motion,
         search::Offered,
-        smoothed::{Fitted, Strength, held_out},
+        smoothed::{Strength, held_out},
         space::Elimination,
     },
-    together::heard::Heard,
+    together::heard::{Heard, Look, Looked},
 };
-
-/// How a log is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// By parity where there is no reference.
-    First,
-    /// About the smoothed motion where there is none, if it settled.
-    Second,
-}
-
-/// What is looked for beside what.
-pub struct Looked<'a> {
-    /// Which look.
-    pub look: Look,
-    /// Effects that are in.
-    pub model: &'a [Component],
-    /// Whether their parameters are free about what they are.
-    pub are_free: bool,
-    /// Effects that are left out of the library.
-    pub withheld: &'a [String],
-}
 
 /// A log.
 pub struct Logged {
@@ -94,7 +74,7 @@ impl Logged {
         let name = opened.text.name.clone();
         let known = if is_blind || opened.is_without_motion() {
             let flight = Flight::open(case)?;
-            let beforehand = Beforehand::of(&flight, withheld)?;
+            let beforehand = beforehand::look(&flight, withheld)?;
             let followed = Followed::of(&flight, &flight.log, &beforehand);
             Known::Nothing(Box::new(followed), Box::new(flight), beforehand)
         } else {

@@ -15,9 +15,9 @@ use crate::{
     thresholds::{MOST_CAUSES, PARITY_SNR, SAID},
     together::{
         cause::Cause,
-        heard::{Heard, key},
+        heard::{Heard, Look, Looked, key},
         joint::Joint,
-        log::{Logged, Look, Looked},
+        log::Logged,
     },
 };
 

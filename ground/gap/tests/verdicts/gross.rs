@@ -5,7 +5,7 @@ use std::fs;
 
 use crate::twin_case::Log;
 use gap::{
-    parity::{beforehand::Beforehand, codes::Finding, findings::Findings, flight::Flight},
+    parity::{beforehand, codes::Finding, findings::Findings, flight::Flight},
     probability::outcome::Outcome,
 };
 use rand_distr::{Distribution, StandardNormal, Uniform};
@@ -62,7 +62,7 @@ fn rewritten(folder: TempDir, change: impl Fn(usize, usize, i64) -> i64) -> Temp
 
 fn coded(folder: &TempDir) -> Vec<Finding> {
     let flight = Flight::open(folder.path()).expect("opens");
-    Beforehand::of(&flight, &[]).expect("followed").found
+    beforehand::look(&flight, &[]).expect("followed").found
 }
 
 fn found(folder: &TempDir, withheld: &[&str]) -> (Vec<&'static str>, Findings) {

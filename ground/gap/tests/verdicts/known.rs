@@ -4,11 +4,9 @@ use std::{fmt::Write, fs, path::Path};
 
 use crate::twin_case::Log;
 use gap::parity::{
-    analysed,
-    beforehand::Beforehand,
-    codes,
+    analysed, codes,
     flight::Flight,
-    followed::Followed,
+    followed::{Beforehand, Followed},
     known::{simulated::Belief, ties::Use},
     smooth::told::Told,
 };

@@ -8,14 +8,13 @@ use gap::{
     input::case::Subject,
     null::problem::Component,
     parity::{
-        analysed,
-        beforehand::Beforehand,
+        analysed, beforehand,
         findings::Findings,
         flight::Flight,
-        followed::Followed,
-        name::By,
+        followed::{Beforehand, Followed},
+        name::{By, Fitted},
         smooth::told::Told,
-        smoothed::{Fitted, promises},
+        smoothed::promises,
         visible::Row,
     },
     probability::outcome::Outcome,
@@ -276,7 +275,7 @@ fn a_part_that_would_bend_the_motion_is_judged_about_that_of_the_others() {
     }];
     let folder = flown_in("tumble", 20.0, 4, (&active, &active), 60.0, |_| true);
     let flight = Flight::open(folder.path()).expect("opens");
-    let beforehand = Beforehand::of(&flight, &[]).expect("packets");
+    let beforehand = beforehand::look(&flight, &[]).expect("packets");
     assert_eq!(flight.names(&beforehand.bending), ["a3x", "a3y", "a3z"]);
     let findings = found(&folder);
     let first = findings.names.first().expect("a name");

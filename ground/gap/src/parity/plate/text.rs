@@ -10,11 +10,11 @@ use crate::{
         flight::Flight,
         nulls::NULLS,
         plate::{
-            Findings,
+            CAN_BE_NAMED, Findings,
+            attitude::attitude,
             filter::At,
             magnets::Added,
             shaken::{Knock, Line},
-            told::{CAN_BE_NAMED, attitude},
         },
     },
     probability::outcome::Outcome,

@@ -9,8 +9,7 @@ use crate::{
         flight::Flight,
         nulls::NULLS,
         phases,
-        plate::{Findings, filter::At, text},
-        smooth::told::{Attitude, Told},
+        plate::{CAN_BE_NAMED, Findings, attitude::attitude, filter::At, text},
     },
     report::verdict::rounded,
 };
@@ -25,9 +24,6 @@ const UNSAID: f64 = 4.0 / 16.0;
 
 /// \[uT\] that are drawn: a thousandth of a magnetometer's step.
 const LEAST_UT: f64 = 1e-4;
-
-/// Names that one plate can be given.
-pub const CAN_BE_NAMED: [&str; 4] = ["shock", "vibration", "hard-iron", "field-gradient"];
 
 /// The verdict as it is written: `gap-verdict/2` with `"from": "one-plate"`.
 pub fn verdict(flight: &Flight, findings: &Findings) -> serde_json::Value {
@@ -64,36 +60,6 @@ pub fn verdict(flight: &Flight, findings: &Findings) -> serde_json::Value {
         "never_named": never,
         "next_experiment": text::next(flight, findings),
     })
-}
-
-/// The attitude in the form of [`Told`]; nothing in it where there is none.
-pub fn attitude(findings: &Findings) -> Told {
-    let one = |at: &At| Attitude {
-        t_s: at.t_s,
-        q_nb: at.q_nb,
-        sigmas_b_deg: at.sigmas_b().map(f64::to_degrees),
-    };
-    Told {
-        attitudes: findings.attitude.iter().flatten().map(one).collect(),
-        rests: rests(&findings.field),
-        ..Told::default()
-    }
-}
-
-/// \[s\] spans of rest.
-pub fn rests(nodes: &[At]) -> Vec<(f64, f64)> {
-    let mut spans: Vec<(f64, f64)> = Vec::new();
-    let mut was = false;
-    for pair in nodes.windows(2) {
-        let is_rest = pair[1].is_rest;
-        match spans.last_mut().filter(|_| was && is_rest) {
-            Some(last) => last.1 = pair[1].t_s,
-            None if is_rest => spans.push((pair[0].t_s, pair[1].t_s)),
-            None => {}
-        }
-        was = is_rest;
-    }
-    spans
 }
 
 /// The page.

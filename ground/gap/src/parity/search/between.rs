@@ -13,8 +13,8 @@ use super::{
 };
 use crate::{
     library::{
+        column::Entries,
         hypotheses::{Library, columns_of},
-        products::Entries,
     },
     null::{interval::begins_s, problem::Component},
     parity::space::{Projected, Space},

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Chosen, Seen, Taken};
 use crate::{
-    library::{hypotheses::Library, products::Entries},
+    library::{column::Entries, hypotheses::Library},
     null::evidence::{Screen, probabilities},
     parity::{
         space::{dot, screen},

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use twin::predict::{Feel, Kind};
 
 use crate::{
-    library::products::Entries,
+    library::column::Entries,
     null::problem::Problem,
     parity::smooth::{
         banded::{Banded, Factor, Inverse, LANES, Panel},

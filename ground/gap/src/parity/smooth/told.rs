@@ -13,7 +13,7 @@ use crate::{
     input::{case::CaseError, reference::Reference},
     null::problem::Problem,
     parity::{
-        beforehand::Beforehand,
+        beforehand,
         findings::Findings,
         flight::Flight,
         followed::Followed,
@@ -97,7 +97,7 @@ impl Told {
     /// # Errors
     /// When the unit's description names an effect there is not.
     pub fn of(flight: &Flight, progress: &dyn Fn(f64)) -> Result<Self, CaseError> {
-        let beforehand = Beforehand::of(flight, &[])?;
+        let beforehand = beforehand::look(flight, &[])?;
         Self::along(&Followed::of(flight, &flight.log, &beforehand), progress)
     }
 

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::{
-    library::{column::Column, products::Entries},
+    library::column::{Column, Entries},
     parity::space::{AT_ONCE, Space, dot},
 };
 

@@ -14,7 +14,10 @@ use nalgebra::DVector;
 
 use super::screen::leading;
 use crate::{
-    library::{column::Column, hypotheses::Library, products::Entries},
+    library::{
+        column::{Column, Entries},
+        hypotheses::Library,
+    },
     null::problem::Problem,
     search::gauss_newton::{Refined, model_of, promised},
 };

@@ -49,6 +49,11 @@ impl Rival {
     }
 }
 
+/// \[nats\] of all of them.
+pub fn total_gain(chosen: &[Chosen]) -> f64 {
+    chosen.iter().map(|chosen| chosen.gain).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

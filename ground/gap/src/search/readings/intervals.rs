@@ -15,8 +15,8 @@ use super::{
 use crate::{
     input::windows::Span,
     library::{
+        column::Entries,
         hypotheses::{Hypothesis, Library},
-        products::Entries,
     },
     null::{interval::Interval, problem::Problem},
     search::{
