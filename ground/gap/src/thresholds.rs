@@ -234,9 +234,9 @@ thresholds! {
         larger: "wrong laws pass",
         smaller: "true effects are doubted on another motion",
         Assumed("the calibration fitted beside it is not exact on another motion, and a real law is only nearly the library's");
-    /// Standard deviation of that strength above which the held-out windows say nothing.
+    /// Standard deviation of that strength above which the held-out windows confirm nothing.
     STRENGTH_SHOWN: f64 = 0.5, in "1",
-        larger: "noise refutes effects",
+        larger: "windows that hardly show an effect confirm it",
         smaller: "weak hold windows confirm nothing",
         Convention("half of what is asked");
     /// Probability of more events than are looked for.

@@ -11,7 +11,7 @@ use super::recurrences::Said;
 use crate::{
     holdout::{events::Events, fit_error::FitError},
     input::hold::Held,
-    thresholds::{STRENGTH_SHOWN, STRENGTH_TOLERATED},
+    thresholds::STRENGTH_TOLERATED,
     unknown::adequacy::odds,
 };
 
@@ -50,9 +50,6 @@ pub struct Promise {
 impl Promise {
     /// How far a true effect may be as far from one, 0 to 1: the odds that the probability of that leaves it.
     pub fn confidence(&self) -> f64 {
-        if self.sigma > STRENGTH_SHOWN {
-            return 1.0;
-        }
         let away = ((self.factor - 1.0).abs() - STRENGTH_TOLERATED).max(0.0);
         odds(
             erfc(away / self.sigma / core::f64::consts::SQRT_2)
@@ -261,11 +258,16 @@ mod tests {
     }
 
     #[test]
-    fn windows_that_hardly_show_an_effect_say_nothing() {
-        let promise = Promise {
-            factor: -2.0,
+    fn windows_that_hardly_show_an_effect_refute_it_only_far_off() {
+        let near = Promise {
+            factor: 0.2,
             sigma: 0.8,
         };
-        assert_eq!(promise.confidence(), 1.0);
+        assert!(near.confidence() > 0.4, "{}", near.confidence());
+        let far = Promise {
+            factor: -47.0,
+            sigma: 0.74,
+        };
+        assert!(far.confidence() < 1e-6, "{}", far.confidence());
     }
 }
