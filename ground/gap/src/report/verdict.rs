@@ -61,7 +61,9 @@ struct Remainder {
 
 #[derive(Debug, Serialize)]
 struct Sized {
+    /// If it is there.
     value: f64,
+    /// From 5 %, whether it is there or not, to 95 % if it is.
     interval_90: [f64; 2],
     unit: &'static str,
 }
@@ -171,9 +173,11 @@ impl Verdict {
 }
 
 fn remainder(subject: &Subject, found: &crate::unknown::remainder::Remainder) -> Remainder {
+    // Of a mixture of nothing and of what is there, the 5 % quantile is nothing unless that is there with 95 %.
+    let is_there = found.present > 0.95;
     let sized = |[low, value, high]: [f64; 3], unit| Sized {
         value,
-        interval_90: [low, high],
+        interval_90: [if is_there { low } else { 0.0 }, high],
         unit,
     };
     Remainder {

@@ -4,6 +4,9 @@
 //! with its standard deviation: of all frequencies together, or of the octaves that stand out of the floor, whichever is surer. Where the
 //! reference errs more than the sensor scatters, in a colour that nobody knows, only all together are looked at. White, nearly Gaussian
 //! energy is noise that is louder than described and no unknown effect; it is left out.
+//!
+//! What is fast moves no attitude by itself. It matters by what it adds to the gap of the whole: one channel of 28 that scatters by a tenth more
+//! adds two thousandths of a sigma. What several channels have adds up ([`Bar`]).
 
 use super::{
     alike,
@@ -22,6 +25,8 @@ use crate::{
 pub struct Fast {
     /// Which.
     pub channel: usize,
+    /// Its samples.
+    pub count: f64,
     /// [sigma^2] mean square above the floor, and the floor.
     pub excess: f64,
     /// [sigma^2] the floor.
@@ -55,7 +60,7 @@ pub fn excesses(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &
         .collect()
 }
 
-/// Per channel, energy that no slow course can be: what is left within the stretches of [`Binned`], above the bar of the case and what the
+/// Per channel, energy that no slow course can be: what is left within the stretches of [`Binned`], above the bar of the case for this channel and what the
 /// reference may be off by, in squares of noise. None in channels whose scatter the model explains.
 pub fn within_stretches(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: &Setting) -> Vec<f64> {
     let of_channel = |channel: usize| {
@@ -74,9 +79,40 @@ pub fn within_stretches(problem: &Problem, model: &Model, floor: &[Vec<f64>], se
 }
 
 impl Fast {
-    /// [sigma^2] from which the excess matters: the user's bar, and what the reference may be off by.
-    pub fn bar(&self, bars: &Bars) -> f64 {
+    /// [sigma^2] from which the excess matters to this channel: growth of its own gap, and what the reference may be off by.
+    fn bar(&self, bars: &Bars) -> f64 {
         (self.floor.sqrt() + bars.gap_sigma).powi(2) - self.floor + REFERENCE_KNOWN * self.reference
+    }
+}
+
+/// How much energy of all channels matters to the whole.
+pub struct Bar {
+    /// [sigma^2] sum over samples by which the gap of the whole grows by the user's bar.
+    energy: f64,
+    /// [sigma^2] per channel, the same sum of what others are likelier to have above their floor than not.
+    others: Vec<f64>,
+}
+
+impl Bar {
+    /// Of all channels, of which these are likelier to have something above their floor than not.
+    pub fn of(all: &[Fast], bars: &Bars, is_there: impl Fn(&Fast) -> bool) -> Self {
+        let sum = |of: &dyn Fn(&Fast) -> f64| all.iter().map(|fast| fast.count * of(fast)).sum::<f64>();
+        let floor = sum(&|fast| fast.floor) / sum(&|_| 1.0).max(1.0);
+        let there: Vec<&Fast> = all.iter().filter(|fast| is_there(fast)).collect();
+        let channels = all.iter().map(|fast| fast.channel + 1).max().unwrap_or(0);
+        let beside = |channel: usize| {
+            let others = there.iter().filter(|fast| fast.channel != channel);
+            others.map(|fast| fast.count * fast.excess.max(0.0)).sum()
+        };
+        Self {
+            energy: sum(&|_| 1.0) * ((floor.sqrt() + bars.gap_sigma).powi(2) - floor),
+            others: (0..channels).map(beside).collect(),
+        }
+    }
+
+    /// [sigma^2] mean square of a channel from which its excess matters: what others leave of the user's bar, and what the reference may be off by.
+    pub fn over(&self, fast: &Fast) -> f64 {
+        (self.energy - self.others[fast.channel]).max(0.0) / fast.count + REFERENCE_KNOWN * fast.reference
     }
 }
 
@@ -94,6 +130,7 @@ fn excess(problem: &Problem, model: &Model, channel: usize, floor: &[f64], loude
     let above = above(rest.as_slice(), floor, !problem.is_limited(channel));
     Some(Fast {
         channel,
+        count,
         excess: above.energy / count,
         floor,
         error: above.error / count,
@@ -159,5 +196,44 @@ mod tests {
     #[test]
     fn noise_that_is_louder_than_described_is_nothing_unknown() {
         assert_eq!(above(&noise_and(1.5, 0.0), 1.0, true).log_bayes_factor, 0.0);
+    }
+
+    /// A channel of 300 samples of white noise with so much energy above its floor.
+    fn held(channel: usize, excess: f64) -> Fast {
+        Fast {
+            channel,
+            count: 300.0,
+            excess,
+            floor: 1.0,
+            error: 0.1,
+            reference: 0.0,
+            log_bayes_factor: if excess > 0.0 { 20.0 } else { -2.0 },
+            sigma: 1.0,
+        }
+    }
+
+    /// Which of 28 channels have energy that matters, where these have some above their floor.
+    fn mattering(excesses: &[f64]) -> Vec<usize> {
+        let own = |channel: usize| held(channel, excesses.get(channel).copied().unwrap_or(0.0));
+        let all: Vec<Fast> = (0..28).map(own).collect();
+        let bars = Bars {
+            attitude_deg: 0.5,
+            gap_sigma: 0.05,
+        };
+        let bar = Bar::of(&all, &bars, |fast| fast.log_bayes_factor > 0.0);
+        all.iter()
+            .filter(|fast| fast.excess > bar.over(fast))
+            .map(|fast| fast.channel)
+            .collect()
+    }
+
+    /// The bar is (1.05^2 - 1) of the mean square of all 28: 2.87 of one of them.
+    #[test]
+    fn energy_matters_by_what_it_adds_to_the_whole_and_that_of_several_adds_up() {
+        assert!(mattering(&[0.25]).is_empty());
+        assert!(mattering(&[2.8]).is_empty());
+        assert_eq!(mattering(&[2.9]), vec![0]);
+        assert!(mattering(&[0.25; 11]).is_empty());
+        assert_eq!(mattering(&[0.25; 12]), (0..12).collect::<Vec<_>>());
     }
 }

@@ -6,20 +6,21 @@
 //! With thousands of samples everything is significant, so significance decides nothing by itself. A discrepancy matters with the
 //! probability that it is there (its Bayes factor, all of them sharing even odds) times that of its size being above a bar. The bar is
 //! the user's, in degrees of attitude or in growth of the gap, whichever is smaller, but never below what the reference itself may be off
-//! by. Degrees: a specific force over gravity, a field over its horizontal part, a rate over the time constant of a filter, each as far
+//! by. A slow course goes on, and its growth is that of the gap in its own channels; what is fast is averaged, and its growth is that of the gap of the whole.
+//! Degrees: a specific force over gravity, a field over its horizontal part, a rate over the time constant of a filter, each as far
 //! as the sensor weighs among those of its kind.
 
 use nalgebra::{Matrix3, Vector3};
 use twin::predict::Kind;
 
 use super::{
-    fast::{Fast, excesses},
+    fast::{Bar, Fast, excesses},
     slow::{Beside, Slow, Where},
 };
 use crate::{
     input::case::{Bars, SlowErrors},
     null::{model::Model, problem::Problem},
-    thresholds::{FILTER_S, REFERENCE_SIGMAS},
+    thresholds::{FILTER_S, REFERENCE_SIGMAS, SAID},
 };
 
 /// Quantiles of an interval: 5 %, the middle, 95 %.
@@ -133,8 +134,10 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
             bar_over_size: bar / size[1],
         }
     });
+    let is_there = |fast: &Fast| present(fast.log_bayes_factor, several) > SAID;
+    let whole = Bar::of(&fast, setting.bars, is_there);
     let of_fast = fast.iter().map(|fast| {
-        let bar = fast.bar(setting.bars);
+        let bar = whole.over(fast);
         let sigma = GAUSSIAN.map(|many| (fast.excess + many * fast.error).max(0.0).sqrt());
         let present = present(fast.log_bayes_factor, several);
         Remainder {
