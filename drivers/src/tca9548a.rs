@@ -147,7 +147,7 @@ impl<I2C: I2c> I2c for Channel<'_, I2C> {
 }
 
 /// Why a transaction through the multiplexer failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<E> {
     /// The multiplexer itself did not answer: no part of any plate can be reached.
@@ -161,6 +161,17 @@ pub enum Error<E> {
         /// Found.
         read: u8,
     },
+}
+
+/// By hand, in the words of a derived one: that would bring core's pretty printer into the image, which is a kilobyte.
+impl<E: fmt::Debug> fmt::Debug for Error<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Select(e) => write!(f, "Select({e:?})"),
+            Error::Part(e) => write!(f, "Part({e:?})"),
+            Error::NotKept { wrote, read } => write!(f, "NotKept {{ wrote: {wrote}, read: {read} }}"),
+        }
+    }
 }
 
 impl<E: embedded_hal_async::i2c::Error> embedded_hal_async::i2c::Error for Error<E> {
