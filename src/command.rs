@@ -17,7 +17,11 @@
 
 use heapless::Vec;
 
-use crate::{packet::hex_value, rail::Rail};
+use crate::{
+    packet::hex_value,
+    rail::Rail,
+    site::{self, told::SITE_BYTES},
+};
 
 /// Letters of a word.
 pub const WORD_BYTES: usize = 4;
@@ -25,9 +29,8 @@ pub const WORD_BYTES: usize = 4;
 /// \[us\] pause after which a half word is forgotten.
 pub const HALF_WORD_TIMEOUT_US: u64 = 2_000_000;
 
-/// Digits after [`Command::DumpRange`]'s word, six for the first record, six for how many; and after
-/// [`Command::SetWord`]'s, four for the place, eight for the bytes; after [`Command::Rail`]'s those of a [`Rail`].
-const DIGITS: usize = 12;
+/// Most digits after a word: those of a [`site::Told`].
+const DIGITS: usize = 2 * SITE_BYTES;
 
 /// A word as it stands on the line.
 pub type Word = [u8; WORD_BYTES];
@@ -66,12 +69,14 @@ pub enum Command {
     LoadSet,
     /// Forget the calibration set that is kept, and use the one compiled in.
     ForgetSet,
-    /// Confirm [`Command::LoadSet`], [`Command::ForgetSet`] or [`Command::Rail`].
+    /// Confirm [`Command::LoadSet`], [`Command::ForgetSet`], [`Command::Rail`] or [`Command::Site`].
     ConfirmSet,
     /// Read the calibration set in use.
     ReadSet,
     /// The unit lies on this launch rail, or on none.
     Rail(Rail),
+    /// The unit is at this launch site, or at the one that is compiled in.
+    Site(site::Told),
     /// Stop the running task.
     Stop,
     /// Record packets.
@@ -109,7 +114,7 @@ const fn entry(word: &'static Word, command: Command, meaning: &'static str) -> 
 }
 
 /// Every word of the unit: the seven of App. A.3, then ours.
-pub const COMMANDS: [Entry; 23] = [
+pub const COMMANDS: [Entry; 24] = [
     entry(b"G_MV", Command::Flight, "to FLIGHT (send twice)"),
     entry(b"G_ME", Command::Wait, "to WAIT (send twice)"),
     entry(
@@ -143,13 +148,18 @@ pub const COMMANDS: [Entry; 23] = [
     entry(
         b"G_CK",
         Command::ConfirmSet,
-        "WAIT: confirm G_CL, G_CX or G_RA, within 10 s",
+        "WAIT: confirm G_CL, G_CX, G_RA or G_SI, within 10 s",
     ),
     entry(b"G_CR", Command::ReadSet, "WAIT: read the calibration in use"),
     entry(
         b"G_RA",
         RAIL,
         "WAIT: rail, G_RAaaaaeeeesstt (hex 0.01 deg azimuth, elevation, 0.1 deg sigmas; then G_CK)",
+    ),
+    entry(
+        b"G_SI",
+        SITE,
+        "WAIT: site, G_SIggggllllddddiiiissffffrrbb (hex mm/s2, 0.01 deg latitude, declination, dip ...; then G_CK)",
     ),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task (send twice)"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets (send twice)"),
@@ -179,12 +189,27 @@ const RAIL: Command = Command::Rail(Rail {
     elevation_sd: 0,
 });
 
-/// Whether a command's word has twelve digits behind it.
-pub fn takes_digits(command: Command) -> bool {
-    matches!(
-        command,
-        Command::DumpRange { .. } | Command::SetWord { .. } | Command::Rail(_)
-    )
+const SITE: Command = Command::Site(site::Told::of_bytes([0; SITE_BYTES]));
+
+/// How many digits a command's word has behind it. [`Command::DumpRange`]'s are six for the first record and six for how many,
+/// [`Command::SetWord`]'s four for the place and eight for the bytes, the others' those of a [`Rail`] and of a [`site::Told`].
+pub fn digits_of(command: Command) -> usize {
+    match command {
+        Command::DumpRange { .. } | Command::SetWord { .. } | Command::Rail(_) => 12,
+        Command::Site(_) => DIGITS,
+        _ => 0,
+    }
+}
+
+impl Command {
+    /// What is wrong with its numbers.
+    pub fn fault(&self) -> Option<&'static str> {
+        match self {
+            Command::Rail(rail) => rail.fault(),
+            Command::Site(site) => site.fault(),
+            _ => None,
+        }
+    }
 }
 
 /// The word of a command.
@@ -201,7 +226,7 @@ pub enum Heard {
     Command(Command),
     /// Four letters beginning with `G_` that are no word.
     Unknown(Word),
-    /// A word whose digits are not twelve upper-case hexadecimal ones: at which digit, and the byte there.
+    /// A word whose digits are not upper-case hexadecimal ones: at which digit, and the byte there.
     BadDigit {
         /// The word.
         word: Word,
@@ -273,14 +298,20 @@ impl Parser {
         self.letters.first_chunk().copied().unwrap_or_default()
     }
 
-    fn whole_word(&mut self) -> Option<Heard> {
+    /// The row of the word that has begun.
+    fn entry(&self) -> Option<&'static Entry> {
         let word = self.word();
-        let found = COMMANDS.iter().find(|entry| *entry.word == word);
-        if found.is_some_and(|entry| takes_digits(entry.command)) {
+        COMMANDS.iter().find(|entry| *entry.word == word)
+    }
+
+    fn whole_word(&mut self) -> Option<Heard> {
+        let found = self.entry().map(|entry| entry.command);
+        if found.is_some_and(|command| digits_of(command) > 0) {
             return None;
         }
+        let word = self.word();
         self.letters.clear();
-        Some(found.map_or(Heard::Unknown(word), |entry| Heard::Command(entry.command)))
+        Some(found.map_or(Heard::Unknown(word), Heard::Command))
     }
 
     fn digit(&mut self, byte: u8) -> Option<Heard> {
@@ -295,33 +326,30 @@ impl Parser {
             return Some(heard);
         }
         self.take(byte);
-        if self.letters.len() < WORD_BYTES + DIGITS {
+        let command = self.entry()?.command;
+        if self.letters.len() < WORD_BYTES + digits_of(command) {
             return None;
         }
-        let number = |from: usize, count: usize| {
-            let digits = self.letters.iter().skip(WORD_BYTES + from).take(count);
-            digits.fold(0, |value, digit| value << 4 | u32::from(hex_value(*digit).unwrap_or(0)))
-        };
-        let command = if self.word() == *word_of(SET_WORD) {
-            Command::SetWord {
-                place: number(0, 4) as u16,
-                bytes: number(4, 8).to_be_bytes(),
+        let mut bytes = [0_u8; SITE_BYTES];
+        for (at, digit) in self.letters.iter().skip(WORD_BYTES).enumerate() {
+            if let Some(byte) = bytes.get_mut(at / 2) {
+                *byte = *byte << 4 | hex_value(*digit).unwrap_or(0) as u8;
             }
-        } else if self.word() == *word_of(RAIL) {
-            Command::Rail(Rail {
-                azimuth: number(0, 4) as u16,
-                elevation: number(4, 4) as u16,
-                azimuth_sd: number(8, 2) as u8,
-                elevation_sd: number(10, 2) as u8,
-            })
-        } else {
-            Command::DumpRange {
-                first: number(0, 6),
-                count: number(6, 6),
-            }
-        };
+        }
         self.letters.clear();
-        Some(Heard::Command(command))
+        let [a, b, c, d, e, f, ..] = bytes;
+        Some(Heard::Command(match command {
+            Command::SetWord { .. } => Command::SetWord {
+                place: u16::from_be_bytes([a, b]),
+                bytes: [c, d, e, f],
+            },
+            Command::Rail(_) => Command::Rail(Rail::of_bytes([a, b, c, d, e, f])),
+            Command::Site(_) => Command::Site(site::Told::of_bytes(bytes)),
+            _ => Command::DumpRange {
+                first: u32::from_be_bytes([0, a, b, c]),
+                count: u32::from_be_bytes([0, d, e, f]),
+            },
+        }))
     }
 }
 
@@ -347,7 +375,7 @@ mod tests {
     #[test]
     fn every_word_is_its_own_command() {
         for entry in &COMMANDS {
-            if !takes_digits(entry.command) {
+            if digits_of(entry.command) == 0 {
                 assert_eq!(heard(entry.word), [Heard::Command(entry.command)]);
             }
             assert_eq!(word_of(entry.command), entry.word);
@@ -415,6 +443,25 @@ mod tests {
             found: b'G',
         };
         assert_eq!(heard(b"G_LR000G_ST"), [wrong, Heard::Command(Command::Status)]);
+    }
+
+    #[test]
+    fn a_site_takes_twenty_six_digits_and_a_rail_twelve() {
+        let site = site::Told::of_bytes([0x26, 0x34, 0xFF, 0x18, 0xF7, 0xDD, 0xFC, 0x84, 2, 0x0A, 0x40, 15, 0]);
+        let rail = Rail::of_bytes([0x1B, 0x58, 0x21, 0x34, 5, 3]);
+        assert_eq!(
+            heard(b"G_SI2634FF18F7DDFC84020A400F00G_RA1B5821340503G_CK"),
+            [Command::Site(site), Command::Rail(rail), Command::ConfirmSet].map(Heard::Command)
+        );
+        let wrong = Heard::BadDigit {
+            word: *b"G_SI",
+            digit: 25,
+            found: b'G',
+        };
+        assert_eq!(
+            heard(b"G_SI2634FF18F7DDFC84020A400F0G_ST"),
+            [wrong, Heard::Command(Command::Status)]
+        );
     }
 
     #[test]

@@ -235,11 +235,14 @@ impl<N: Nand> FlightLog<N> {
             recording,
             derived,
             rail,
+            site,
         } = mode;
-        if (kept.flight, kept.recording, kept.derived, kept.rail) == (flight, recording, derived, rail) {
+        if (kept.flight, kept.recording, kept.derived, kept.rail, kept.site) == (flight, recording, derived, rail, site)
+        {
             return Ok(());
         }
-        (kept.flight, kept.recording, kept.derived, kept.rail) = (flight, recording, derived, rail);
+        (kept.flight, kept.recording, kept.derived) = (flight, recording, derived);
+        (kept.rail, kept.site) = (rail, site);
         let outcome = self.save().await;
         self.stop_if_unsure(&outcome);
         outcome

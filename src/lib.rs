@@ -55,6 +55,7 @@ pub mod sample;
 mod settings;
 pub mod site;
 pub mod spin;
+mod told;
 pub mod triad;
 pub mod unit;
 

@@ -8,14 +8,14 @@
 //! withdraws them.
 //!
 //! The same holds for the calibration set: G_CL (use and keep the one sent) and G_CX (forget the one kept) are armed, and
-//! take effect with the different G_CK. So is and does G_RA, the launch rail.
+//! take effect with the different G_CK. So are and do G_RA, the launch rail, and G_SI, the launch site.
 //!
 //! Lift-off needs no confirmation: its debounced edge starts FLIGHT and recording. Only G_ME leaves FLIGHT.
 //!
 //! After power-on the mode is WAIT until the log was heard. What it says of the time before is taken once, and not after
 //! a command or lift-off, which know better; so a log that is mounted again later changes nothing.
 
-use crate::{command::Command, rail::Rail};
+use crate::{command::Command, rail::Rail, site};
 
 /// \[us\] time within which a confirmation counts.
 pub const CONFIRM_WITHIN_US: u64 = 10_000_000;
@@ -59,6 +59,8 @@ pub enum Cause {
     Rail,
     /// Nothing changes, but the attitude took this rail after the latest cycle that had begun by then.
     RailTaken(Rail),
+    /// Nothing changes, but the estimation began afresh at this launch site, with the cycle that began at this time.
+    SiteTaken(site::Told),
 }
 
 impl Cause {
@@ -72,6 +74,7 @@ impl Cause {
             Cause::Erased => "the log erased",
             Cause::Rail => "the launch rail set",
             Cause::RailTaken(_) => "the launch rail taken",
+            Cause::SiteTaken(_) => "the launch site taken",
         }
     }
 }
@@ -124,6 +127,8 @@ pub enum Action {
     Calibration(Command),
     /// Lie on this launch rail.
     Rail(Rail),
+    /// Be at this launch site.
+    Site(site::Told),
 }
 
 /// Why a command was refused.
@@ -181,6 +186,8 @@ pub struct Resumed {
     pub derived: bool,
     /// The launch rail it lay on.
     pub rail: Rail,
+    /// The launch site it was at.
+    pub site: site::Told,
 }
 
 /// What waits for confirmation.
@@ -299,15 +306,15 @@ impl State {
             Command::SetWord { .. } | Command::ReadSet => {
                 self.only_in(Mode::Wait, |_| Reply::Done(Action::Calibration(command)))
             }
-            Command::Rail(rail) => self.only_in(Mode::Wait, |state| match rail.fault() {
-                Some(why) => Reply::Refused(Refusal::Number(why)),
-                None => state.confirm(command, Command::ConfirmSet, now_us),
-            }),
-            Command::LoadSet | Command::ForgetSet => {
-                self.only_in(Mode::Wait, |state| state.confirm(command, Command::ConfirmSet, now_us))
+            Command::LoadSet | Command::ForgetSet | Command::Rail(_) | Command::Site(_) => {
+                self.only_in(Mode::Wait, |state| match command.fault() {
+                    Some(why) => Reply::Refused(Refusal::Number(why)),
+                    None => state.confirm(command, Command::ConfirmSet, now_us),
+                })
             }
             Command::ConfirmSet => self.only_in(Mode::Wait, |_| match armed {
                 Some(Command::Rail(rail)) => Reply::Done(Action::Rail(rail)),
+                Some(Command::Site(site)) => Reply::Done(Action::Site(site)),
                 Some(armed) => Reply::Done(Action::Calibration(armed)),
                 None => Reply::Refused(Refusal::NothingToConfirm),
             }),

@@ -1,7 +1,7 @@
 //! The launch rail as its crew measured it: where the nose points, and how well that is known.
 //!
 //! In: the twelve digits of a G_RA, or the bytes kept in retained memory. Out: a [`Rail`] whose numbers are possible, and the
-//! [`Nose`] that the filter takes. Whole numbers all the way, so that what is answered is what was sent.
+//! [`Nose`] that the filter takes.
 //!
 //! | digits | unit | from, to |
 //! |---|---|---|
@@ -14,10 +14,46 @@
 
 use core::fmt;
 
-use crate::kalman::Nose;
+use crate::{
+    kalman::Nose,
+    told::{self, Number},
+};
 
 /// Bytes of a rail that is kept.
 pub const RAIL_BYTES: usize = 6;
+
+/// In the order of the digits.
+const NUMBERS: [Number; 4] = [
+    Number {
+        before: "azimuth ",
+        decimals: 2,
+        is_byte: false,
+        least: 0,
+        most: 35_999,
+        why: "azimuth is not below 360 deg",
+    },
+    Number {
+        before: " elevation ",
+        decimals: 2,
+        is_byte: false,
+        least: 0,
+        most: 9_000,
+        why: "elevation is above 90 deg",
+    },
+    sigma(" sigma "),
+    sigma(" "),
+];
+
+const fn sigma(before: &'static str) -> Number {
+    Number {
+        before,
+        decimals: 1,
+        is_byte: true,
+        least: 1,
+        most: 255,
+        why: "a sigma is zero",
+    }
+}
 
 /// What a crew measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,17 +93,7 @@ impl Rail {
 
     /// What is wrong with it.
     pub fn fault(&self) -> Option<&'static str> {
-        if self.is_none() {
-            None
-        } else if self.azimuth >= 36_000 {
-            Some("azimuth is not below 360 deg")
-        } else if self.elevation > 9_000 {
-            Some("elevation is above 90 deg")
-        } else if self.azimuth_sd == 0 || self.elevation_sd == 0 {
-            Some("a sigma is zero")
-        } else {
-            None
-        }
+        told::fault(&NUMBERS, &self.bytes())
     }
 
     /// What the filter takes.
@@ -84,15 +110,11 @@ impl Rail {
 
 impl fmt::Display for Rail {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let hundredths = |number: u16| (number / 100, number % 100);
-        let tenths = |number: u8| (number / 10, number % 10);
-        let ((a, b), (c, d)) = (hundredths(self.azimuth), hundredths(self.elevation));
-        let ((e, g), (h, i)) = (tenths(self.azimuth_sd), tenths(self.elevation_sd));
         if self.is_none() {
-            f.write_str("no rail")
-        } else {
-            write!(f, "azimuth {a}.{b:02} elevation {c}.{d:02} sigma {e}.{g} {h}.{i} deg")
+            return f.write_str("no rail");
         }
+        told::say(&NUMBERS, &self.bytes(), f)?;
+        f.write_str(" deg")
     }
 }
 

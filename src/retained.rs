@@ -11,7 +11,7 @@
 //! | 4.. | the content |
 //! | then 4 | CRC-32 (ISO-HDLC) of the part's address, the layout's number, the length and the content |
 //!
-//! The parts, by address: [`STATE`], [`STARTS`], [`PULSE`], [`CRASH`], [`ATTITUDE`], [`SET`], [`RAIL`]. A firmware with another
+//! The parts, by address: [`STATE`], [`STARTS`], [`PULSE`], [`CRASH`], [`ATTITUDE`], [`SET`], [`RAIL`], [`SITE`]. A firmware with another
 //! layout has another number and finds nothing, as after a power cut.
 
 use crc::Digest;
@@ -56,7 +56,10 @@ pub const SET: Region = ATTITUDE.before(1280);
 /// The launch rail: [`crate::rail::Rail::bytes`].
 pub const RAIL: Region = SET.before(16);
 
-const _: () = assert!(RAIL.at + 2 * RAIL.room <= RETAINED_BYTES);
+/// The launch site: [`crate::site::Told::bytes`].
+pub const SITE: Region = RAIL.before(24);
+
+const _: () = assert!(SITE.at + 2 * SITE.room <= RETAINED_BYTES);
 
 impl Region {
     /// The part behind this one, with so many bytes a copy.
@@ -173,7 +176,7 @@ mod tests {
         }
     }
 
-    const REGIONS: [Region; 6] = [STATE, STARTS, PULSE, CRASH, ATTITUDE, SET];
+    const REGIONS: [Region; 8] = [STATE, STARTS, PULSE, CRASH, ATTITUDE, SET, RAIL, SITE];
 
     fn recalled(region: Region, memory: &Memory) -> Option<Vec<u8>> {
         let mut buffer = [0; 2048];

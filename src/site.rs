@@ -2,6 +2,10 @@
 //!
 //! What the filter is told because of it is [`crate::estimate`]'s.
 
+pub mod told;
+
+pub use told::Told;
+
 /// A place on Earth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {

@@ -22,6 +22,7 @@ mod rail;
 mod record;
 mod self_test;
 mod shared;
+mod site;
 mod telemetry;
 mod umbilical;
 mod vote;
@@ -59,10 +60,14 @@ pub async fn run<B: Board>(parts: Parts<B>, settings: Settings) -> ! {
     let shared = Shared::new(settings, start);
     calibration::recall(&shared, &memory);
     rail::recall(&shared, &memory);
+    site::recall(&shared, &memory);
     let switch = Switch::new(parts.sensor_bus);
     let gyros = Gyros::new(parts.gyros, settings, &shared.clock);
     let votes = vote::Votes::default();
-    let mut estimator = Estimator::of(&settings);
+    let mut estimator = Estimator::of(&Settings {
+        site: shared.site(),
+        ..settings
+    });
     let link = join::join4(
         telemetry::run::<B>(&shared, &votes, parts.telemetry),
         umbilical::send::<B>(&shared, &votes, parts.umbilical_tx),

@@ -17,6 +17,7 @@ use crate::{
     mode::Resumed,
     nand::{Nand, PAGES_PER_BLOCK, PageAddress},
     rail::Rail,
+    site,
 };
 
 /// Blocks below the newest boot's first that are looked at for the boot before: boots that left nothing but a torn page
@@ -61,6 +62,7 @@ impl<N: Nand> FlightLog<N> {
             recording: self.superblock.recording,
             derived: self.superblock.derived,
             rail: self.superblock.rail,
+            site: self.superblock.site,
         })
     }
 
@@ -83,6 +85,7 @@ impl<N: Nand> FlightLog<N> {
             // A newer save may say otherwise.
             self.superblock.block_before = 0;
             self.superblock.rail = Rail::default();
+            self.superblock.site = site::Told::default();
         }
         let head = match found {
             Found::Sure => match self.search_head()? {

@@ -25,8 +25,10 @@
 //!
 //! A change of mode (type 3): `14-15` flags (1 FLIGHT from then on), `16-23` \[us\] when, `24` recording from then on, `25` cause
 //! (1 command, 2 lift-off, 3 log; without a change 4 an erase was armed, 5 the log was erased, 6 the launch rail
-//! was set, 7 the attitude took it), `26-31` with cause 7 the rail ([`Rail::bytes`], big endian), the rest zero. It was taken after the
-//! latest cycle that had begun by then, and before the next: whoever replays the cycles takes it there.
+//! was set, 7 the attitude took it, 8 the estimation began afresh at a launch site), `26-31` with cause 7 the rail ([`Rail::bytes`], big
+//! endian), `26-38` with cause 8 the site ([`site::Told::bytes`], big endian), the rest zero. A rail was taken after the latest cycle that had
+//! begun by then, and before the next; a site before the first cycle that began then or later: whoever replays the cycles takes them
+//! there.
 //!
 //! The key is never used twice, so a record that turns up again is the same record. Refuses what the checksum does not
 //! fit, a newer version by its number, and a type it does not know.
@@ -43,6 +45,7 @@ use crate::{
     packet::PACKET_BYTES,
     rail::Rail,
     sample::{NO_SLOT, SENSOR_COUNT},
+    site,
 };
 
 /// Bytes of a record: half a page.
@@ -96,6 +99,7 @@ mod at {
     pub const RECORDING: usize = 24;
     pub const CAUSE: usize = 25;
     pub const RAIL: usize = 26;
+    pub const SITE: usize = 26;
 }
 
 /// Which record: the order of keys is the order in which they were made.
@@ -307,6 +311,10 @@ pub fn encode_change(key: Key, change: &Change) -> RecordBytes {
             put(&mut bytes, at::RAIL, &rail.bytes());
             7
         }
+        Cause::SiteTaken(site) => {
+            put(&mut bytes, at::SITE, site.bytes());
+            8
+        }
     };
     put(&mut bytes, at::RECORDING, &[change.recording.into()]);
     put(&mut bytes, at::CAUSE, &[cause]);
@@ -358,6 +366,21 @@ pub fn mode(bytes: &RecordBytes) -> Option<(bool, bool)> {
     }
 }
 
+/// The estimator's state of a packet record; `None` where there was none, and of another record.
+pub fn estimate(bytes: &RecordBytes) -> Option<Estimate> {
+    let is_there = is_packet(bytes) && flags(bytes) & ESTIMATED != 0;
+    is_there.then(|| Estimate {
+        q_nb: core::array::from_fn(|axis| {
+            f32::from(i16::from_le_bytes(take(bytes, at::QUATERNION + 2 * axis))) / QUATERNION_ONE
+        }),
+        bias_b: core::array::from_fn(|axis| f32::from_le_bytes(take(bytes, at::BIAS + 4 * axis))),
+        sigma: core::array::from_fn(|axis| {
+            f32::from_bits(u32::from(u16::from_le_bytes(take(bytes, at::SIGMA + 2 * axis))) << 16)
+        }),
+        sensors: SensorHealth(u32::from_le_bytes(take(bytes, at::SENSORS))),
+    })
+}
+
 /// What the record holds.
 pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
     let key = key(bytes)?;
@@ -372,16 +395,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
             }),
             flight,
             health: Health(u32::from_le_bytes(take(bytes, at::HEALTH))),
-            estimate: (flags(bytes) & ESTIMATED != 0).then(|| Estimate {
-                q_nb: core::array::from_fn(|axis| {
-                    f32::from(i16::from_le_bytes(take(bytes, at::QUATERNION + 2 * axis))) / QUATERNION_ONE
-                }),
-                bias_b: core::array::from_fn(|axis| f32::from_le_bytes(take(bytes, at::BIAS + 4 * axis))),
-                sigma: core::array::from_fn(|axis| {
-                    f32::from_bits(u32::from(u16::from_le_bytes(take(bytes, at::SIGMA + 2 * axis))) << 16)
-                }),
-                sensors: SensorHealth(u32::from_le_bytes(take(bytes, at::SENSORS))),
-            }),
+            estimate: estimate(bytes),
         }),
         HEADER => Content::Header(BootHeader {
             opened_us: start_us,
@@ -402,6 +416,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<(Key, Content), RecordError> {
                 5 => Cause::Erased,
                 6 => Cause::Rail,
                 7 => Cause::RailTaken(Rail::of_bytes(take(bytes, at::RAIL))),
+                8 => Cause::SiteTaken(site::Told::of_bytes(take(bytes, at::SITE))),
                 _ => Cause::Command,
             },
         }),

@@ -2,8 +2,8 @@
 //!
 //! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
 //! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording, 4 derived frames), `6-7` epoch, `8-11` its own number,
-//! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-243` their numbers ascending,
-//! `244-245` the block with the newest records before that boot (0: none), `246-251` the launch rail ([`Rail::bytes`], big endian; zeros in saves of
+//! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-229` their numbers ascending,
+//! `230-242` the launch site ([`site::Told::bytes`], big endian; zeros in saves of older firmware: none), `244-245` the block with the newest records before that boot (0: none), `246-251` the launch rail ([`Rail::bytes`], big endian; zeros in saves of
 //! older firmware: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
 
 use heapless::Vec;
@@ -12,6 +12,7 @@ use super::record::{RECORD_BYTES, RecordBytes};
 use crate::{
     checksum::CRC,
     rail::{RAIL_BYTES, Rail},
+    site::{self, told::SITE_BYTES},
 };
 
 /// Blocks kept for the superblock: two in use, two for when those wear out.
@@ -22,15 +23,16 @@ pub const VERSION: u8 = 1;
 
 /// Bad blocks that fit: the data sheet allows 80 of 4096 over the chip's life. Of them places for the superblock's own
 /// blocks are kept free, which nothing but this list tells to be bad.
-pub const BAD_BLOCKS: usize = 112;
+pub const BAD_BLOCKS: usize = 105;
 
 const MAGIC: [u8; 4] = *b"eMSB";
 const CHECKED: usize = RECORD_BYTES - 4;
 const LIST: usize = 20;
 const BLOCK_BEFORE: usize = 244;
 const RAIL: usize = 246;
+const SITE: usize = LIST + 2 * BAD_BLOCKS;
 
-const _: () = assert!(RAIL + RAIL_BYTES == CHECKED);
+const _: () = assert!(RAIL + RAIL_BYTES == CHECKED && SITE + SITE_BYTES <= BLOCK_BEFORE);
 
 /// Blocks that are not used, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -93,6 +95,8 @@ pub struct Superblock {
     pub derived: bool,
     /// The launch rail.
     pub rail: Rail,
+    /// The launch site.
+    pub site: site::Told,
     /// Blocks that are not used.
     pub bad: BadBlocks,
 }
@@ -127,6 +131,7 @@ pub fn encode(superblock: &Superblock) -> RecordBytes {
     put(16, &superblock.first_block.to_le_bytes());
     put(BLOCK_BEFORE, &superblock.block_before.to_le_bytes());
     put(RAIL, &superblock.rail.bytes());
+    put(SITE, superblock.site.bytes());
     put(18, &(superblock.bad.0.len() as u16).to_le_bytes());
     let mut at = LIST;
     for block in &superblock.bad.0 {
@@ -169,6 +174,7 @@ pub fn decode(bytes: &RecordBytes) -> Result<Superblock, SuperblockError> {
         recording: bytes[5] & 2 != 0,
         derived: bytes[5] & 4 != 0,
         rail: Rail::of_bytes(bytes[RAIL..CHECKED].first_chunk().copied().unwrap_or_default()),
+        site: site::Told::of_bytes(bytes[SITE..BLOCK_BEFORE].first_chunk().copied().unwrap_or_default()),
         bad,
     })
 }
@@ -192,6 +198,7 @@ mod tests {
             recording: false,
             derived: true,
             rail: Rail::of_bytes([1, 2, 3, 4, 5, 6]),
+            site: site::Told::of_bytes(core::array::from_fn(|place| place as u8 + 1)),
             bad,
         }
     }

@@ -35,7 +35,7 @@ fn after(mut state: State, bytes: &[u8]) -> (State, bool, bool) {
             erased |= reply == Reply::Done(Action::Erase);
             let set = |command| reply == Reply::Done(Action::Calibration(command));
             calibrated |= set(Command::LoadSet) || set(Command::ForgetSet);
-            calibrated |= matches!(reply, Reply::Done(Action::Rail(_)));
+            calibrated |= matches!(reply, Reply::Done(Action::Rail(_) | Action::Site(_)));
         }
     }
     (state, erased, calibrated)
@@ -47,15 +47,17 @@ fn deeds() -> Vec<Vec<u8>> {
         Command::DumpRange { .. } => b"G_LR000000000010".to_vec(),
         Command::SetWord { .. } => b"G_CW00040000A040".to_vec(),
         Command::Rail(_) => b"G_RA1B5821340503".to_vec(),
+        Command::Site(_) => b"G_SI2634FF18F7DDFC84020A400F00".to_vec(),
         _ => entry.word.to_vec(),
     });
-    let confirmed: [&[u8]; 9] = [
+    let confirmed: [&[u8]; 10] = [
         b"G_MVG_MV",
         b"G_MEG_ME",
         b"G_MAG_CA",
         b"G_CLG_CK",
         b"G_CXG_CK",
         b"G_RA1B5821340503G_CK",
+        b"G_SI2634FF18F7DDFC84020A400F00G_CK",
         b"G_MGG_MG",
         b"G_MTG_MT",
         b"G_MtG_Mt",
@@ -64,7 +66,7 @@ fn deeds() -> Vec<Vec<u8>> {
 }
 
 /// Checks the `garbled` forms of every deed, and of every two deeds in a row: none erases unless G_CA was sent, none
-/// changes the calibration set or the rail unless G_CK was sent, none leads to a mode whose word was not sent.
+/// changes the calibration set, the rail or the site unless G_CK was sent, none leads to a mode whose word was not sent.
 fn check(garble: impl Fn(&[u8]) -> Vec<Vec<u8>>) {
     let says = |sent: &[u8], word: &[u8]| sent.windows(word.len()).any(|letters| letters == word);
     for state in [WAITING, FLYING] {
@@ -194,6 +196,7 @@ fn a_task_of_the_other_mode_is_refused() {
         Command::ConfirmSet,
         Command::ReadSet,
         Command::Rail(Rail::default()),
+        Command::Site(site::Told::default()),
     ] {
         assert_eq!(flying.command(command, 0), Reply::Refused(Refusal::Mode(Mode::Wait)));
     }

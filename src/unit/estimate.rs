@@ -22,6 +22,7 @@ use super::{
     clock::{never, now},
     rail,
     shared::{Cycle, Shared},
+    site,
     vote::{Voter, Votes},
 };
 use crate::{
@@ -41,7 +42,7 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estim
     };
     let mut kept = [0; KEPT_BYTES];
     if shared.set_loaded.take() {
-        estimator.renew(&shared.calibration.get(), &shared.settings.site);
+        estimator.renew(&shared.calibration.get(), &shared.site());
     }
     if shared.safe.get() {
         // It may be what ended the starts before; and once it is older than one start, nobody knows how old it is.
@@ -77,9 +78,11 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estim
             continue;
         }
         let is_as_left = estimator.ram_sum::<B>(&kept) == left;
-        let is_renewed = shared.set_loaded.take();
+        let may_begin = state.mode == Mode::Wait || !estimator.filter().aligned;
+        let is_elsewhere = site::take(shared, memory, may_begin, cycle.sample.start_us);
+        let is_renewed = shared.set_loaded.take() || is_elsewhere;
         if is_renewed {
-            estimator.renew(&shared.calibration.get(), &shared.settings.site);
+            estimator.renew(&shared.calibration.get(), &shared.site());
         }
         mend_set(shared, estimator);
         if !(is_as_left || is_renewed) {
@@ -113,11 +116,7 @@ pub async fn run<B: Board>(shared: &Shared, votes: &Votes, estimator: &mut Estim
 #[inline(never)]
 fn restore(shared: &Shared, estimator: &mut Estimator, memory: &impl Retained, kept: &mut [u8; KEPT_BYTES]) {
     let is_whole = ATTITUDE.recall(memory, kept).map(<[u8]>::len) == Some(KEPT_BYTES);
-    estimator.restore(
-        &shared.calibration.get(),
-        &shared.settings.site,
-        is_whole.then_some(&*kept),
-    );
+    estimator.restore(&shared.calibration.get(), &shared.site(), is_whole.then_some(&*kept));
     shared.say(format_args!(
         "a flipped bit of the attitude filter was found: it {}",
         if is_whole {

@@ -5,7 +5,7 @@
 //! of every derived frame, and it is tried again every [`RETRY`]. After a dip of the supply it is tried again at once, and
 //! again after twice as long each time; the newest record waits for it. So a dip costs the records of its own duration at most.
 //!
-//! What the log says of the time before power-on (mode, attitude, rail, the calibration set it keeps) is taken once, at the first mount,
+//! What the log says of the time before power-on (mode, attitude, rail, site, the calibration set it keeps) is taken once, at the first mount,
 //! and where neither retained memory nor a command knows better. A crash record is forgotten when a boot header with it is in the log.
 
 use embassy_time::{Duration, Instant};
@@ -15,6 +15,7 @@ use super::{
     clock::{after, never, now},
     rail,
     shared::{Cycle, Shared},
+    site,
     vote::{Voter, Votes},
 };
 use crate::{
@@ -23,7 +24,7 @@ use crate::{
     estimate::Estimate,
     flight_log::{
         FlightLog, LogError, Resumed,
-        record::{self, BootHeader, Content, Entry, Key, Name},
+        record::{self, BootHeader, Entry, Key, Name},
     },
     health::Health,
     mode::{Cause, Mode, State, Task},
@@ -125,6 +126,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
                     self.forgive();
                 }
                 rail::found(self.shared, self.memory, resumed.rail);
+                site::found(self.shared, resumed.site);
                 if self.shared.state.get().awaits_log {
                     self.find_attitude(resumed.flight);
                     let shared = self.shared;
@@ -152,10 +154,10 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
     /// The attitude of the newest record, for the estimation to go on from in flight.
     fn find_attitude(&self, flight: bool) {
         if let Some(newest) = self.log.newest().filter(|_| flight)
-            && let Ok((_, Content::Packet(entry))) = record::decode(newest)
-            && entry.flight
+            && record::key(newest).is_ok()
+            && let (true, _) = record::mode_and_time(newest)
         {
-            self.shared.attitude_found.set(entry.estimate);
+            self.shared.attitude_found.set(record::estimate(newest));
         }
     }
 
@@ -253,6 +255,7 @@ impl<N: Nand, R: Retained> Recorder<'_, N, R> {
             recording: state.recording,
             derived: state.derived,
             rail: self.shared.rail.get(),
+            site: self.shared.site_told.get().unwrap_or(self.shared.site_in_use.get()),
         };
         self.log.keep_mode(mode).await?;
         let calibration = self.shared.set_name();

@@ -31,6 +31,7 @@ use crate::{
     rail::Rail,
     resume::{Resume, Starts},
     sample::{Errors, Sample},
+    site::{self, Site},
 };
 
 /// Everything one read cycle gave.
@@ -188,6 +189,12 @@ pub struct Shared {
     pub rail_known: Cell<bool>,
     /// The attitude has not been held against it.
     pub rail_is_new: Cell<bool>,
+    /// The launch site of the estimation.
+    pub site_in_use: Cell<site::Told>,
+    /// Another, which the estimation does not use yet.
+    pub site_told: Cell<Option<site::Told>>,
+    /// It is known to be the one: it was ordered, or kept over a reset. Otherwise the recorder is asked.
+    pub site_known: Cell<bool>,
     /// A reading of the accelerometers between two cycles, and the counter of the one it comes before.
     pub force: Signal<NoopRawMutex, (u16, Force)>,
     cycles: Cycles,
@@ -239,6 +246,9 @@ impl Shared {
             rail: Cell::default(),
             rail_known: Cell::default(),
             rail_is_new: Cell::default(),
+            site_in_use: Cell::default(),
+            site_told: Cell::default(),
+            site_known: Cell::default(),
             force: Signal::new(),
             cycles: PubSubChannel::new(),
             derived: PubSubChannel::new(),
@@ -246,6 +256,11 @@ impl Shared {
             announced: [Channel::new(), Channel::new()],
             dumped: Channel::new(),
         }
+    }
+
+    /// Where the unit is, for the estimation.
+    pub fn site(&self) -> Site {
+        self.site_in_use.get().site(&self.settings.site)
     }
 
     /// A reader of every cycle from now on. There are as many places as parts that call this, so it is never `None`.
@@ -323,13 +338,18 @@ impl Shared {
 
     /// Leaves for the log what has happened to mode or log.
     pub fn note(&self, cause: Cause) {
+        self.note_at(now().as_micros(), cause);
+    }
+
+    /// The same, of what happened at another time \[us\].
+    pub fn note_at(&self, at_us: u64, cause: Cause) {
         let state = self.state.get();
         self.with_changes(|changes| {
             if changes.is_full() {
                 changes.pop_front();
             }
             let _ = changes.push_back(Change {
-                at_us: now().as_micros(),
+                at_us,
                 mode: state.mode,
                 recording: state.recording,
                 cause,

@@ -10,6 +10,7 @@ use super::{
     clock::{never, now},
     rail,
     shared::Shared,
+    site,
     telemetry::Out,
     vote::{Voter, Votes},
 };
@@ -155,11 +156,14 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         shared.note(Cause::EraseArmed);
     }
     match reply {
-        Reply::Confirm(with) => shared.say(format_args!(
-            "{word}{}: send {} within 10 s",
-            Armed(command),
-            Printable(word_of(with))
-        )),
+        Reply::Confirm(with) => {
+            match command {
+                Command::Rail(rail) => shared.say(format_args!("{word}: {rail}")),
+                Command::Site(site) => shared.say(format_args!("{word}: {site}")),
+                _ => {}
+            }
+            shared.say(format_args!("{word}: send {} within 10 s", Printable(word_of(with))));
+        }
         Reply::Refused(Refusal::Mode(mode)) => shared.say(format_args!("{word} no: only in {}", mode.name())),
         Reply::Refused(Refusal::NothingToConfirm) => shared.say(format_args!("{word} no: nothing to confirm")),
         Reply::Refused(Refusal::Number(why)) => shared.say(format_args!("{word} no: {why}")),
@@ -184,6 +188,7 @@ async fn answer(shared: &Shared, memory: &impl Retained, arriving: &mut Arriving
         }
         Reply::Done(Action::Calibration(command)) => calibration::answer(shared, memory, arriving, command).await,
         Reply::Done(Action::Rail(rail)) => rail::set(shared, memory, rail),
+        Reply::Done(Action::Site(site)) => site::set(shared, site),
         Reply::Done(Action::Report(Command::Help)) => help(shared).await,
         Reply::Done(Action::Report(Command::Version)) => {
             shared.say(format_args!("{word}: e-MEMS {}", env!("CARGO_PKG_VERSION")));
@@ -296,18 +301,6 @@ impl core::fmt::Display for At<'_> {
         match self.0.cause {
             CrashCause::Panic => write!(f, "{}", self.0.at),
             _ => write!(f, "{:08X}", self.0.at),
-        }
-    }
-}
-
-/// The rail that a word arms, nothing of any other one.
-struct Armed(Command);
-
-impl core::fmt::Display for Armed {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self.0 {
-            Command::Rail(rail) => write!(f, ": {rail}"),
-            _ => Ok(()),
         }
     }
 }

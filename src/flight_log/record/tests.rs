@@ -204,6 +204,11 @@ fn a_change_of_mode_says_what_it_was_given() {
             true,
             Cause::RailTaken(Rail::of_bytes([0x1B, 0x58, 0x21, 0x34, 0x05, 0x03])),
         ),
+        (
+            Mode::Wait,
+            false,
+            Cause::SiteTaken(site::Told::of_bytes(core::array::from_fn(|place| place as u8 + 1))),
+        ),
     ] {
         let change = Change {
             at_us: 5_000_000_000,
