@@ -159,7 +159,7 @@ pub const COMMANDS: [Entry; 24] = [
     entry(
         b"G_SI",
         SITE,
-        "WAIT: site, G_SIggggllllddddiiiissffffrrbb (hex mm/s2, 0.01 deg latitude, declination, dip ...; then G_CK)",
+        "WAIT: site, G_SIggggllllddddiiiissffffrrbb (hex gravity, latitude, declination, dip, sigma, field, iron, per g; then G_CK)",
     ),
     entry(b"G_Mt", Command::Stop, "WAIT: stop the running task (send twice)"),
     entry(b"G_MG", Command::Record, "FLIGHT: record packets (send twice)"),

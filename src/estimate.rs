@@ -181,6 +181,12 @@ impl Estimator {
         self.settlements = None;
     }
 
+    /// Begins afresh at another site, with the same set.
+    pub fn begin_at(&mut self, site: &Site) {
+        let set = self.set;
+        self.renew(&set, site);
+    }
+
     /// A checksum of all that it keeps from one step to the next, and of `kept`, by which a bit of the RAM that flipped is found. Its
     /// set is left out, which has a copy, and the readings of force between two cycles, which are still coming and are each held
     /// against the others.

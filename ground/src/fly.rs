@@ -31,8 +31,8 @@ pub fn fly(arguments: &FlyArguments) -> Result<(), Box<dyn Error>> {
 /// See [`FlyError`].
 pub fn flown(arguments: &FlyArguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
     let image = arguments.image.as_deref();
-    let board = |site| match arguments.host {
-        true => Ok(flight::board::host(site)),
+    let board = || match arguments.host {
+        true => Ok(flight::board::host()),
         false => board::image(image),
     };
     fly_until(arguments, interrupt, board, |folder, take_off| {

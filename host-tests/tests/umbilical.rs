@@ -50,6 +50,7 @@ fn deed(word: &[u8; WORD_BYTES]) -> Vec<u8> {
         b"G_LR" => b"G_LR000000000010".to_vec(),
         b"G_CW" => b"G_CW00040000A040".to_vec(),
         b"G_RA" => b"G_RA1B5821340503".to_vec(),
+        b"G_SI" => b"G_SI2634FF18F7DDFC84020A400F00".to_vec(),
         _ => word.to_vec(),
     }
 }

@@ -33,9 +33,8 @@ use crate::{
     chapter6::{self, calibrated::NotCalibrated},
     counts,
     methods::{self, NoSet},
-    orbit, peers,
-    rails::{self, NoRails},
-    reference,
+    orbit, peers, reference,
+    told::{self, NothingTold},
 };
 
 /// Estimates attitude from a log, compares it with a reference, checks the filter
@@ -61,7 +60,7 @@ pub struct AttitudeArguments {
     /// Seconds to add to the reference's times to have the log's [default: 0]
     #[arg(long, value_name = "SECONDS", requires = "reference", allow_hyphen_values = true)]
     pub offset_s: Option<f64>,
-    /// The unit's flight log, image or dump: launch rails that its attitude took at its latest start are taken from it
+    /// The unit's flight log, image or dump: launch rails and sites that its estimation took at its latest start are taken from it
     #[arg(long, value_name = "FILE", requires = "log")]
     pub flight_log: Option<PathBuf>,
     #[command(flatten)]
@@ -119,7 +118,7 @@ pub enum AttitudeError {
     NotCounts(String),
     /// A flight log cannot be used.
     #[error(transparent)]
-    Rails(#[from] NoRails),
+    Told(#[from] NothingTold),
     /// A calibration set cannot be used.
     #[error(transparent)]
     Set(#[from] NoSet),
@@ -269,13 +268,13 @@ fn of_unit(
     for file in &arguments.sets {
         sets.push(methods::read(file, &settings)?);
     }
-    let rails = match &arguments.flight_log {
-        Some(file) => rails::read(file)?,
+    let told = match &arguments.flight_log {
+        Some(file) => told::read(file)?,
         None => Vec::new(),
     };
     let count = sets.len() * cycles.len();
     let began = Instant::now();
-    let mut runs = methods::run(sets, &settings, cycles, &rails, reference);
+    let mut runs = methods::run(sets, &settings, cycles, &told, reference);
     let took_s = began.elapsed().as_secs_f64();
     if runs.iter().all(|run| run.flight.estimates.is_empty()) {
         return Ok(None);
@@ -301,6 +300,9 @@ fn of_unit(
     let [taken, left] = last.flight.rails;
     if taken + left > 0 {
         say(format!("launch rails                {taken} taken, {left} not\n"));
+    }
+    if last.flight.sites > 0 {
+        say(format!("launch sites                {} taken\n", last.flight.sites));
     }
     let [equal, other] = last.flight.replayed;
     if equal + other > 0 {

@@ -18,8 +18,8 @@ pub mod counts;
 pub mod methods;
 pub mod orbit;
 pub mod peers;
-pub mod rails;
 pub mod reference;
 pub mod replay;
+pub mod told;
 
 pub use command::{AttitudeArguments, AttitudeError, run};

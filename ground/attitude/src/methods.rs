@@ -68,16 +68,16 @@ pub fn read(file: &Path, settings: &Settings) -> Result<(String, Set), NoSet> {
     Ok((format!("{methods}, {name}"), image.set))
 }
 
-/// The log by each of the sets, with the launch rails that the unit took.
+/// The log by each of the sets, with the launch rails and sites that the unit took.
 pub fn run(
     sets: Vec<(String, Set)>,
     settings: &Settings,
     cycles: &[Cycle],
-    rails: &[Taken],
+    taken: &[Taken],
     reference: Option<&[Row]>,
 ) -> Vec<Run> {
     let of = |(name, set)| {
-        let flight = Flight::of_unit(Estimator::new(set, &settings.site), cycles, rails);
+        let flight = Flight::of_unit(Estimator::new(set, &settings.site), &settings.site, cycles, taken);
         let met = reference.and_then(|rows| flight.compare(rows));
         Run { name, flight, met }
     };

@@ -5,7 +5,7 @@
 
 use std::error::Error;
 
-use emems::{site::Site, unit::Settings};
+use emems::unit::Settings;
 use twin::{
     host,
     part::Nanos,
@@ -30,16 +30,12 @@ pub struct Board {
     pub fly: Fly,
 }
 
-/// The unit's code on this computer, in virtual time, told where it is.
-pub fn host(site: Site) -> Board {
+/// The unit's code on this computer, in virtual time.
+pub fn host() -> Board {
     Board {
         name: "host, virtual time".into(),
-        fly: Box::new(move |plant, faults, end, bench| {
-            let settings = Settings {
-                site,
-                ..Settings::NOMINAL
-            };
-            let report = host::fly(plant, settings, faults, end, bench);
+        fly: Box::new(|plant, faults, end, bench| {
+            let report = host::fly(plant, Settings::NOMINAL, faults, end, bench);
             let resets = report.resets.iter().map(|(at, cause)| reset(*at, cause));
             Ok(resets.collect())
         }),

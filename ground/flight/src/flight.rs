@@ -8,7 +8,6 @@ use std::{
     time::Duration,
 };
 
-use emems::site::Site;
 use logs::{
     digest::Digest,
     folder::{self, Folder, FolderError},
@@ -102,7 +101,7 @@ pub type TakeOff = Box<dyn FnOnce(Option<Box<dyn Umbilical>>) -> Result<(Seen, V
 
 /// Flies until the end or an interrupt.
 ///
-/// `board` makes what flies at a site. `beside` lets the flight take off, whose folder it is told: alone, or with somebody at
+/// `board` makes what flies. `beside` lets the flight take off, whose folder it is told: alone, or with somebody at
 /// the umbilical.
 ///
 /// # Errors
@@ -110,7 +109,7 @@ pub type TakeOff = Box<dyn FnOnce(Option<Box<dyn Umbilical>>) -> Result<(Seen, V
 pub fn fly_until(
     arguments: &FlyArguments,
     interrupt: &Interrupt,
-    board: impl FnOnce(Site) -> Result<Board, Trouble>,
+    board: impl FnOnce() -> Result<Board, Trouble>,
     beside: impl FnOnce(&Path, TakeOff) -> Result<(Seen, Vec<Remark>), FlyError>,
 ) -> Result<Landed, FlyError> {
     let source = source::open(arguments)?;
@@ -125,7 +124,7 @@ pub fn fly_until(
         return Err(PlanError::NoFirst(first.display().to_string()).into());
     }
     // An image that cannot be read or built must not leave an empty folder.
-    let Board { name: board, fly } = board(source.site).map_err(FlyError::Board)?;
+    let Board { name: board, fly } = board().map_err(FlyError::Board)?;
     // Without an end the scene is that of the motion, or of an hour.
     let scene_s = match duration {
         plan::UNTIL_TOLD => source.truth.duration_s().unwrap_or(3_600.0),
@@ -157,7 +156,11 @@ pub fn fly_until(
         .as_mut()
         .map(|prepared| std::mem::take(&mut prepared.scene.transit));
     let words = words::before(arguments, &source);
-    let (path, digest, interrupt) = (folder.path().to_owned(), Digest::at(&source.site), interrupt.clone());
+    let (path, digest, interrupt) = (
+        folder.path().to_owned(),
+        Digest::at(&words::site(&source.site)),
+        interrupt.clone(),
+    );
     let take_off: TakeOff = Box::new(move |console| {
         let mut watch = Watch::new(folder, digest, progress, console, words, interrupt);
         let mut through = Through::new(&mut watch, transit.unwrap_or_default());
@@ -298,12 +301,7 @@ mod tests {
     }
 
     fn on_host(arguments: &FlyArguments, interrupt: &Interrupt) -> Result<Landed, FlyError> {
-        fly_until(
-            arguments,
-            interrupt,
-            |site| Ok(host(site)),
-            |_, take_off| take_off(None),
-        )
+        fly_until(arguments, interrupt, || Ok(host()), |_, take_off| take_off(None))
     }
 
     fn words(words: &[&str]) -> Result<FlyArguments, clap::Error> {

@@ -59,8 +59,8 @@ fn fly(arguments: &FlyArguments) -> Result<ExitCode, Box<dyn Error>> {
 
 /// Flies on the host; `follows` is said of it in the summary.
 fn on_host(arguments: &FlyArguments, interrupt: &Interrupt, follows: &str) -> Result<Landed, FlyError> {
-    let board = |site| {
-        let mut board = board::host(site);
+    let board = || {
+        let mut board = board::host();
         board.name.push_str(follows);
         Ok(board)
     };

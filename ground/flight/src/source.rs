@@ -46,7 +46,7 @@ pub struct Source {
     pub about: String,
     /// The truth.
     pub truth: Arc<dyn TruthSource>,
-    /// What the unit is told of the place.
+    /// Where a launch crew tells the unit that it is; one without a known field is not told, but compiled in.
     pub site: Site,
     /// Motion and place apart; a recording of sensors has none.
     pub world: Option<AnyWorld>,

@@ -16,6 +16,7 @@ use emems::{
     kalman::{Filter, Innovation, Outcome, Params, Quantity, Step},
     rail::Rail,
     sample::NO_SLOT,
+    site::{self, Site},
     triad::{Sighting, triad},
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -27,13 +28,32 @@ use crate::{
     whiteness::Check,
 };
 
-/// A rail that the unit's attitude took.
+/// What the unit's estimation took of what a launch crew told it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Taken {
     /// \[us\] when, by the unit's clock.
     pub at_us: u64,
     /// What it took.
-    pub rail: Rail,
+    pub told: Told,
+}
+
+/// What a launch crew tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Told {
+    /// A launch rail, which the attitude took after a cycle.
+    Rail(Rail),
+    /// A launch site, with which the estimation began afresh before a cycle.
+    Site(site::Told),
+}
+
+impl Taken {
+    /// Whether it was taken before the cycle that began at `start_us`.
+    fn is_before(&self, start_us: u64) -> bool {
+        match self.told {
+            Told::Rail(_) => self.at_us < start_us,
+            Told::Site(_) => self.at_us <= start_us,
+        }
+    }
 }
 
 /// One step's estimate.
@@ -70,6 +90,8 @@ pub struct Flight {
     pub replayed: [usize; 2],
     /// Launch rails that the attitude took, and those that it did not: there was no attitude, or they contradict it.
     pub rails: [usize; 2],
+    /// Launch sites with which the estimation began afresh.
+    pub sites: usize,
 }
 
 /// Errors against a reference.
@@ -114,14 +136,28 @@ impl Flight {
         flight
     }
 
-    /// Estimates a unit's log as the unit does, with the launch rails that it took, each before the cycle that follows.
-    pub fn of_unit<'a>(mut estimator: Estimator, cycles: impl IntoIterator<Item = &'a Cycle>, rails: &[Taken]) -> Self {
+    /// Estimates a unit's log as the unit does, with the launch rails and sites that it took, each before the cycle that follows. The
+    /// estimator is one at the site that is compiled in.
+    pub fn of_unit<'a>(
+        mut estimator: Estimator,
+        compiled_in: &Site,
+        cycles: impl IntoIterator<Item = &'a Cycle>,
+        taken: &[Taken],
+    ) -> Self {
         let mut flight = Flight::default();
-        let mut rails = rails.iter().peekable();
+        let mut taken = taken.iter().peekable();
         for cycle in cycles {
-            while let Some(taken) = rails.next_if(|taken| taken.at_us < cycle.sample.start_us) {
-                let met = estimator.know_nose(&taken.rail.nose(), true);
-                flight.rails[usize::from(met != Some(Ok(())))] += 1;
+            while let Some(next) = taken.next_if(|next| next.is_before(cycle.sample.start_us)) {
+                match next.told {
+                    Told::Rail(rail) => {
+                        let met = estimator.know_nose(&rail.nose(), true);
+                        flight.rails[usize::from(met != Some(Ok(())))] += 1;
+                    }
+                    Told::Site(site) => {
+                        estimator.begin_at(&site.site(compiled_in));
+                        flight.sites += 1;
+                    }
+                }
             }
             let (estimate, outcome) = estimator.step_in_full(&cycle.sample, &cycle.increments);
             if let Some(sent) = &cycle.sent {

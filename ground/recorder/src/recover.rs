@@ -14,6 +14,7 @@ use emems::{
     flight_log::record::Start,
     mode::{Cause, Change},
     rail::Rail,
+    site,
 };
 use packets::{
     input, output,
@@ -142,6 +143,7 @@ fn json(log: &Log, all_epochs: bool) -> serde_json::Value {
             "mode": change.mode.name(),
             "by": change.cause.name(),
             "rail": rail(change).map(|rail| rail.to_string()),
+            "site": site(change).map(|site| site.to_string()),
         })
     });
     let gaps = log.gaps().into_iter().map(|gap| {
@@ -249,6 +251,7 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
             change.at_us as f64 * 1e-6,
             change.cause.name(),
             rail(change).map_or(String::new(), |rail| format!(": {rail}"))
+                + &site(change).map_or(String::new(), |site| format!(": {site}"))
         )?;
     }
     let gaps = log.gaps();
@@ -296,6 +299,14 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
 fn rail(change: &Change) -> Option<Rail> {
     match change.cause {
         Cause::RailTaken(rail) => Some(rail),
+        _ => None,
+    }
+}
+
+/// The site with which the estimation began afresh.
+fn site(change: &Change) -> Option<site::Told> {
+    match change.cause {
+        Cause::SiteTaken(site) => Some(site),
         _ => None,
     }
 }
@@ -384,6 +395,17 @@ mod tests {
             },
             taken,
         );
+        let bytes = [0x26, 0x34, 0xFF, 0x18, 0xF7, 0xDD, 0xFC, 0x84, 2, 0x0A, 0x40, 15, 0];
+        log.changes.insert(
+            Key {
+                seq: 3,
+                ..Key::default()
+            },
+            Change {
+                cause: Cause::SiteTaken(site::Told::of_bytes(bytes)),
+                ..taken
+            },
+        );
         let mut remarks = Vec::new();
         write_remarks(&log, false, &mut remarks).expect("written");
         let remarks = String::from_utf8(remarks).expect("text");
@@ -398,7 +420,11 @@ mod tests {
         let text = format!("mode WAIT at 1.500 s by the launch rail taken: {said}");
         assert!(remarks.contains(&text), "{remarks}");
         assert_eq!(json["changes"][1]["rail"], said);
-        assert!(json["changes"][0]["rail"].is_null());
+        assert!(json["changes"][0]["rail"].is_null() && json["changes"][1]["site"].is_null());
+        let said = "gravity 9.780 m/s2 latitude -2.32 declination -20.83 dip -8.92 sd 0.2 deg field 26.24 iron 0.15 uT per g 0.00 deg/s";
+        let text = format!("mode WAIT at 1.500 s by the launch site taken: {said}");
+        assert!(remarks.contains(&text), "{remarks}");
+        assert_eq!(json["changes"][2]["site"], said);
         assert_eq!(
             (&json["changes"][0]["at_us"], &json["records"]),
             (&2_000_000.into(), &0.into())

@@ -220,6 +220,7 @@ fn starts_or_stops(command: Command) -> bool {
         | ForgetSet
         | ConfirmSet
         | Rail(_)
+        | Site(_)
         | ReadSet => false,
     }
 }

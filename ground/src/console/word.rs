@@ -4,7 +4,7 @@
 //! over in silence (`help`, `g_st`, a slip) is answered here, because nothing else would. `!` before a line sends it whatever
 //! it is.
 
-use emems::command::{COMMANDS, Heard, Parser, WORD_BYTES, takes_digits};
+use emems::command::{COMMANDS, Heard, Parser, WORD_BYTES, digits_of};
 
 use super::input;
 
@@ -75,8 +75,8 @@ fn unknown(line: &str) -> String {
     if let Some(word) = words().find(|word| line.starts_with(word)) {
         let taking = COMMANDS.iter().find(|entry| input::word(entry) == word);
         return match taking.map(|entry| entry.command) {
-            Some(command) if takes_digits(command) => {
-                format!("{word} takes twelve hexadecimal digits")
+            Some(command) if digits_of(command) > 0 => {
+                format!("{word} takes {} hexadecimal digits", digits_of(command))
             }
             _ => format!("what follows {word} is no word"),
         };
@@ -117,6 +117,7 @@ mod tests {
                 "G_LR" => "G_LR00000A0000FF".to_string(),
                 "G_CW" => "G_CW0001DEADBEEF".to_string(),
                 "G_RA" => "G_RA1B5821340503".to_string(),
+                "G_SI" => "G_SI2634FF18F7DDFC84020A400F00".to_string(),
                 word => word.to_string(),
             };
             assert_eq!(typed(&line), Typed::Send(line.clone()), "{word}");
@@ -133,7 +134,8 @@ mod tests {
         assert!(answer("status").contains("no such word"));
         assert!(answer("G_XX").contains("no such word"));
         assert!(answer("G_LR00000a0000FF").contains("digit 6 after G_LR"));
-        assert!(answer("G_LR").contains("twelve"));
+        assert!(answer("G_LR").contains("G_LR takes 12 hexadecimal digits"));
+        assert!(answer("G_SI2634").contains("G_SI takes 26 hexadecimal digits"));
         assert!(answer("G_ST G_").contains("half a word"));
         assert!(answer("G_MTx").contains("what follows G_MT"));
         assert_eq!((typed("quit"), typed("EXIT")), (Typed::Quit, Typed::Quit));

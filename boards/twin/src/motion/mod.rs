@@ -57,7 +57,7 @@ pub struct Named {
     pub name: &'static str,
     /// What it is, in one line.
     pub about: &'static str,
-    /// What the unit is told of the place.
+    /// Where a launch crew tells the unit that it is; one without a known field is not told, but compiled in.
     pub site: Site,
     /// Whether the flight shakes the unit, beyond what the motion says.
     is_rough: bool,

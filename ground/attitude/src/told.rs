@@ -1,7 +1,7 @@
-//! The launch rails that a unit's attitude took, from its flight log.
+//! What a unit's estimation took of what a launch crew told it, from its flight log: launch rails and sites.
 //!
-//! In: a flight log, an image of the chip or a dump. Out: of the unit's latest start in the newest epoch each rail, in the order they
-//! were taken, and when by the unit's clock. The stream of packets has none of them, and without them the attitude from the first rail
+//! In: a flight log, an image of the chip or a dump. Out: of the unit's latest start in the newest epoch each rail and site, in the order
+//! they were taken, and when by the unit's clock. The stream of packets has none of them, and without them the attitude from the first one
 //! on is not the unit's.
 //!
 //! Refuses a file that holds no record of a log.
@@ -12,13 +12,13 @@ use std::{
 };
 
 use emems::mode::Cause;
-use logs::flight::Taken;
+use logs::flight::{Taken, Told};
 use packets::input;
 use recorder::log::{self, LIMIT, Log, LogError};
 
-/// Why no rails are read.
+/// Why nothing is read.
 #[derive(Debug, thiserror::Error)]
-pub enum NoRails {
+pub enum NothingTold {
     /// The file cannot be read.
     #[error("{file}: {error}")]
     Io {
@@ -44,19 +44,19 @@ pub enum NoRails {
 ///
 /// # Errors
 /// When it cannot be read, or is no flight log.
-pub fn read(path: &Path) -> Result<Vec<Taken>, NoRails> {
+pub fn read(path: &Path) -> Result<Vec<Taken>, NothingTold> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     let content = input::open(path).and_then(|content| content.take(LIMIT + 1).read_to_end(&mut bytes));
     if let Err(error) = content {
-        return Err(NoRails::Io { file, error });
+        return Err(NothingTold::Io { file, error });
     }
     let log = match log::read(&bytes) {
         Ok(log) => log,
-        Err(error) => return Err(NoRails::Log { file, error }),
+        Err(error) => return Err(NothingTold::Log { file, error }),
     };
     if log.headers.is_empty() && log.changes.is_empty() && log.packets.is_empty() {
-        return Err(NoRails::Nothing(file));
+        return Err(NothingTold::Nothing(file));
     }
     Ok(of(&log))
 }
@@ -70,12 +70,14 @@ pub fn of(log: &Log) -> Vec<Taken> {
         .iter()
         .filter(|(key, _)| Some((key.epoch, key.boot)) == latest);
     of_latest
-        .filter_map(|(_, change)| match change.cause {
-            Cause::RailTaken(rail) => Some(Taken {
-                at_us: change.at_us,
-                rail,
-            }),
-            _ => None,
+        .filter_map(|(_, change)| {
+            let told = match change.cause {
+                Cause::RailTaken(rail) => Told::Rail(rail),
+                Cause::SiteTaken(site) => Told::Site(site),
+                _ => return None,
+            };
+            let at_us = change.at_us;
+            Some(Taken { at_us, told })
         })
         .collect()
 }
