@@ -16,7 +16,7 @@ pub const WAKE: Nanos = 8_050;
 /// \[ns\] the firmware's work around one I2C transaction, besides the wake at its end.
 pub const I2C_OVERHEAD: Nanos = 1_650;
 /// \[ns\] what a transaction that reads takes more of it.
-pub const I2C_READ: Nanos = 6_750;
+pub const I2C_READ: Nanos = 7_600;
 /// \[ns\] its work at each change of direction inside one.
 pub const I2C_TURN: Nanos = 11_750;
 /// \[ns\] a 16-bit word on the gyro bus at 84 MHz / 64.
