@@ -147,6 +147,8 @@ fn a_wrong_number_is_refused_when_it_comes() {
 fn a_site_lasts_over_a_reset_and_a_unit_in_flight_is_not_changed() {
     let flown = on_pad().say(5 * S, SITE).fault(10 * S, Fault::Reset).fly(15 * S);
     assert_eq!(count(&flown, "site taken"), 2, "{:?}", flown.replies());
+    // The memory has it, and the recorder is not asked.
+    assert!(!flown.replied(KEPT), "{:?}", flown.replies());
     assert!(error(&flown) < 6.0, "{}", error(&flown));
     let zeros = on_pad().say(5 * S, SITE).say(8 * S, ZEROS);
     let zeros = zeros.fault(10 * S, Fault::Reset).fly(15 * S);
@@ -245,7 +247,9 @@ fn a_flight_replays_bit_for_bit_with_the_sites_of_its_log() {
 /// A unit that starts with a site is, bit for bit, one that has it compiled in.
 #[test]
 fn a_site_that_is_kept_is_as_good_as_one_compiled_in() {
-    let flown = on_pad().say(3 * S, SITE).fault(6 * S, Fault::Reset).fly(16 * S);
+    // Without a recorder, so that only the memory that survives a reset has it.
+    let flight = on_pad().fault(MS, Fault::NandDead(true)).say(3 * S, SITE);
+    let flown = flight.fault(6 * S, Fault::Reset).fly(16 * S);
     let frames: Vec<Derived> = flown.derived.clone();
     let restarted = frames
         .iter()
