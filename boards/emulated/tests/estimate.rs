@@ -11,6 +11,7 @@ use emems::{
     health::Health,
     mode::Mode,
     sample::Sample,
+    site::{Site, Told},
     unit::Settings,
 };
 use twin::{
@@ -69,6 +70,50 @@ fn a_host_reproduces_every_bit_of_the_image_s_estimate() {
         costs[costs.len() - 1]
     );
     assert!(costs[costs.len() / 2] < MEDIAN_CEILING);
+}
+
+/// A site told over the umbilical: from one cycle on the image's estimate is that of a unit that begins afresh there.
+#[test]
+fn a_host_reproduces_every_bit_of_the_image_s_estimate_at_a_site_that_is_told() {
+    let mut tape = Tape {
+        script: vec![
+            (MS, b"G_DL".to_vec()),
+            (2_000 * MS, b"G_SI2634FF18F7DDFC84020A400F00G_CK".to_vec()),
+        ],
+        ..Tape::default()
+    };
+    let plant = Plant::new(world("rocket"), 7);
+    emulated::fly(image(), plant, &[], 6_000 * MS, &mut tape).expect("the image flies");
+    assert!(tape.said().contains("site taken"), "{}", tape.said());
+    let (packets, frames) = (tape.packets(), tape.derived());
+    let told = Told::of(&Site::ALCANTARA).expect("a launch site");
+    let differing = |taken_at: usize| {
+        let mut estimator = Estimator::of(&Settings::NOMINAL);
+        let differ = |(number, frame): &(usize, &Derived)| {
+            if *number == taken_at {
+                estimator.begin_at(&told.site(&Settings::NOMINAL.site));
+            }
+            let packet = packets.iter().find(|(_, reading)| reading.counter == frame.counter);
+            let sample = Sample {
+                reading: packet.expect("its packet").1,
+                start_us: frame.start_us,
+                slots_us: frame.slots_us,
+            };
+            let again = Derived {
+                estimate: estimator.step(&sample, &frame.increments),
+                ..**frame
+            };
+            derived::encode(frame) != derived::encode(&again)
+        };
+        frames.iter().enumerate().filter(differ).count()
+    };
+    let at_once = frames
+        .iter()
+        .position(|frame| frame.start_us > 1_700_000)
+        .expect("frames");
+    let taken_at: Vec<usize> = (at_once..at_once + 4).filter(|place| differing(*place) == 0).collect();
+    assert_eq!(taken_at.len(), 1, "{taken_at:?}");
+    assert!(differing(frames.len()) > 10);
 }
 
 /// What takes more than six seconds of a core.

@@ -215,7 +215,7 @@ mod tests {
         input.complete();
         input.edit(Edit::Backspace);
         assert_eq!(input.text(), "G_S");
-        assert_eq!(words(&input), ["G_ST"]);
+        assert_eq!(words(&input), ["G_SI", "G_ST"]);
     }
 
     #[test]
