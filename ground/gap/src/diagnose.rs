@@ -39,7 +39,7 @@ use crate::{
         rows::{STALE, VIBRATION, causes_of_rows},
     },
     search::{explanation::Explanation, odds::alone, readings::attribute, scatter::Scatter},
-    thresholds::{CHANCE, MOST_EFFECTS, SAID},
+    thresholds::{CHANCE, MOST_EFFECTS, SAID, UNKNOWN_PRIOR},
     unknown::{
         adequacy::{self, Leftover},
         place::{self, Place, passage::Passage},
@@ -194,7 +194,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
     let is_doubtful = match explanation.is_followed() {
         // A walk that is followed says between the fitted windows where it is.
         true => shrink.beyond_recalibration[0] <= 0.0,
-        false => !shrink.supports_the_effect() || explanation.is_patchwork(),
+        false => !shrink.supports_the_effect() || explanation.is_patchwork(left.unknown(UNKNOWN_PRIOR) > SAID),
     };
     let mut withdrawn = Vec::new();
     if shrink.refutes_the_effect() || is_doubtful && !is_inexact {

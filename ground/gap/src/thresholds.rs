@@ -112,10 +112,10 @@ thresholds! {
         larger: "weak second effects are not named",
         smaller: "remainders of a strong effect get names",
         Assumed("what a law that is a little off leaves over");
-    /// Causes in the channels of one of them that are believed at once; more together are a patchwork for one effect the library does not have.
+    /// Causes in the channels of one of them that are believed at once where they leave something; more together are then a patchwork for one effect the library does not have.
     MOST_CAUSES: usize = 3, in "effects",
         larger: "patchworks are believed",
-        smaller: "true sets of four are withdrawn",
+        smaller: "true sets are withdrawn where something small is left",
         Assumed("more together are rather a patchwork for one effect that the library does not have");
     /// Part from which an effect counts among the causes, of all gains, and a channel among a cause's, of its energy.
     COUNTED_PART: f64 = 0.02, in "part",

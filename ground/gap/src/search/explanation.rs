@@ -173,9 +173,10 @@ impl Explanation {
     }
 
     /// Whether it is more likely a patchwork for an effect that the library does not have: whatever stands in for that
-    /// together is in the same channels. A bias of the gyros, iron at the magnetometers and a lever arm are not.
-    pub fn is_patchwork(&self) -> bool {
-        self.is_refused || self.company > MOST_CAUSES
+    /// together is in the same channels, and leaves something. A bias of the gyros, iron at the magnetometers and a lever arm are not, nor
+    /// are four effects that leave nothing.
+    pub fn is_patchwork(&self, leaves_something: bool) -> bool {
+        self.is_refused || self.company > MOST_CAUSES && leaves_something
     }
 
     /// Whether its effect on the scatter is a walk that the model follows.

@@ -22,6 +22,7 @@ mod reference;
 mod rocket;
 mod rooms;
 mod seen;
+mod several;
 mod together;
 mod twin_case;
 mod written;
