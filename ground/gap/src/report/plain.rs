@@ -8,6 +8,7 @@ use crate::{
     input::case::Subject,
     probability::{cause::Cause, outcome::Outcome},
     report::gained::gained,
+    thresholds::SAID,
 };
 
 /// Parameters of a cause that are said.
@@ -26,10 +27,17 @@ pub fn sentence(subject: &Subject, diagnosis: &Diagnosis) -> String {
         let each: Vec<String> = diagnosis
             .causes
             .iter()
-            .map(|cause| format!("{} at {}", cause.effect, cause.locality))
+            .map(|cause| match cause.probability < SAID {
+                true => format!("perhaps {} at {}", cause.effect, cause.locality),
+                false => format!("{} at {}", cause.effect, cause.locality),
+            })
             .collect();
-        each.join(", and ")
+        match each.split_last() {
+            Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+            _ => each.concat(),
+        }
     };
+    let them = if diagnosis.causes.len() > 1 { "them" } else { "it" };
     let shrink = &diagnosis.shrink;
     let differ = format!(
         "data that were not used differ by {:.2} instead of {:.2} sigma.",
@@ -38,7 +46,10 @@ pub fn sentence(subject: &Subject, diagnosis: &Diagnosis) -> String {
     // What rows alone show has no ceiling, for nothing of a model could come nearer to it.
     let is_by_rows = diagnosis.ceiling_percent.is_none();
     let because = |beside: &str| match is_by_rows {
-        false => format!("{gap}, because of {}{beside}. With it in the twin, {differ}", named()),
+        false => format!(
+            "{gap}, because of {}{beside}. With {them} in the twin, {differ}",
+            named()
+        ),
         true => format!(
             "The rows of the log show {}{beside}. {gap}. With the calibration made anew, {differ}",
             named()
