@@ -43,6 +43,7 @@ pub mod increments;
 pub mod kalman;
 pub mod mode;
 pub mod nand;
+mod numbers;
 pub mod packet;
 pub mod pad;
 pub mod quest;
@@ -55,7 +56,6 @@ pub mod sample;
 mod settings;
 pub mod site;
 pub mod spin;
-mod told;
 pub mod triad;
 pub mod unit;
 

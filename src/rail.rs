@@ -16,7 +16,7 @@ use core::fmt;
 
 use crate::{
     kalman::Nose,
-    told::{self, Number},
+    numbers::{self, Number},
 };
 
 /// Bytes of a rail that is kept.
@@ -93,7 +93,7 @@ impl Rail {
 
     /// What is wrong with it.
     pub fn fault(&self) -> Option<&'static str> {
-        told::fault(&NUMBERS, &self.bytes())
+        numbers::fault(&NUMBERS, &self.bytes())
     }
 
     /// What the filter takes.
@@ -113,7 +113,7 @@ impl fmt::Display for Rail {
         if self.is_none() {
             return f.write_str("no rail");
         }
-        told::say(&NUMBERS, &self.bytes(), f)?;
+        numbers::say(&NUMBERS, &self.bytes(), f)?;
         f.write_str(" deg")
     }
 }

@@ -3,8 +3,9 @@
 //! In: the [`Superblock`]. Out: 256 bytes, half a page, and back; both halves of a page and two pages in a row hold the
 //! same. Little endian: `0-3` magic, `4` version, `5` flags (1 FLIGHT, 2 recording, 4 derived frames), `6-7` epoch, `8-11` its own number,
 //! `12-15` boot, `16-17` first block of that boot, `18-19` how many bad blocks, `20-229` their numbers ascending,
-//! `230-242` the launch site ([`site::Told::bytes`], big endian; zeros in saves of older firmware: none), `244-245` the block with the newest records before that boot (0: none), `246-251` the launch rail ([`Rail::bytes`], big endian; zeros in saves of
-//! older firmware: none), `252-255` CRC-32. Refuses a checksum that does not fit and a newer version by its number.
+//! `230-242` the launch site ([`site::Told::bytes`]), `244-245` the block with the newest records before that boot (0: none),
+//! `246-251` the launch rail ([`Rail::bytes`]), `252-255` CRC-32. Site and rail are big endian, and zeros in saves of older firmware: none.
+//! Refuses a checksum that does not fit and a newer version by its number.
 
 use heapless::Vec;
 

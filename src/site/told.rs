@@ -21,7 +21,7 @@
 use core::fmt;
 
 use super::{Launch, Site};
-use crate::told::{self, Number};
+use crate::numbers::{self, Number};
 
 /// Bytes of a site that is kept.
 pub const SITE_BYTES: usize = 13;
@@ -102,12 +102,12 @@ impl Told {
 
     /// Whether it is the site that is compiled in.
     pub fn is_none(&self) -> bool {
-        told::is_nothing(&self.0)
+        numbers::is_nothing(&self.0)
     }
 
     /// What is wrong with it.
     pub fn fault(&self) -> Option<&'static str> {
-        told::fault(&NUMBERS, &self.0)
+        numbers::fault(&NUMBERS, &self.0)
     }
 
     /// What the estimation takes.
@@ -151,7 +151,7 @@ impl fmt::Display for Told {
         if self.is_none() {
             return f.write_str("as compiled in");
         }
-        told::say(&NUMBERS, &self.0, f)?;
+        numbers::say(&NUMBERS, &self.0, f)?;
         f.write_str(" deg/s")
     }
 }

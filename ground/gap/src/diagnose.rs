@@ -90,7 +90,7 @@ pub struct Diagnosis {
     pub promises: Vec<Promised>,
     /// Per channel, by how much more it scatters than described, for an effect on the scatter.
     pub louder: Vec<f64>,
-    /// Effects that were withdrawn because they do not shrink it.
+    /// Effects that were withdrawn because they do not shrink it, or are many in the same channels and leave something.
     pub withdrawn: Vec<&'static str>,
     /// [nats per effect] what each hypothesis gained alone; for the page.
     pub alone: Vec<(String, f64)>,

@@ -4,7 +4,7 @@
 //! motion that this part is not in.
 //!
 //! A motion is made of all readings alike. Accelerometers that lose gravity are a quarter of every force, and the motion turns with them: nothing is
-//! linear about it, it does not settle, and what the part does is spread over all others. Made of the others, the motion is the true one. The part
+//! linear about it, it does not settle, and what the part does is spread over all others. Made of the others, the motion is near the true one. The part
 //! stays in the log, and its readings are judged about that motion as all are.
 //!
 //! Parity says which part: with it the packets keep more than [`PARITY_GAP`], and without it no more, in the fit windows and in the held-out ones. The

@@ -6,7 +6,7 @@
 //! energy is noise that is louder than described and no unknown effect; it is left out.
 //!
 //! What is fast moves no attitude by itself. It matters by what it adds to the gap of the whole: one channel of 28 that scatters by a tenth more
-//! adds two thousandths of a sigma. What several channels have adds up ([`Bar`]).
+//! adds four thousandths of a sigma. What several channels have adds up ([`Bar`]).
 
 use super::{
     alike,
@@ -94,7 +94,7 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Of all channels, of which these are likelier to have something above their floor than not.
+    /// Of these channels; of which something is there above the floor, `is_there` says.
     pub fn of(all: &[Fast], bars: &Bars, is_there: impl Fn(&Fast) -> bool) -> Self {
         let sum = |of: &dyn Fn(&Fast) -> f64| all.iter().map(|fast| fast.count * of(fast)).sum::<f64>();
         let floor = sum(&|fast| fast.floor) / sum(&|_| 1.0).max(1.0);

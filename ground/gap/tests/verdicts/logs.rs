@@ -9,12 +9,12 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use serde_json::Value;
 use tempfile::TempDir;
 use twin::{
-    effect::{Active, Cause, Locality, by_name},
+    effect::{Active, Locality},
     motion::{self, Motion},
     predict::{UnitDescription, emems, thesis_slot_s},
 };
 
-use crate::twin_case::Log;
+use crate::twin_case::{Log, active};
 
 /// \[s\] of a log, and of its fit window.
 const SECONDS: f64 = 90.0;
@@ -76,17 +76,6 @@ impl Unit {
         }
         fs::write(folder.path().join("motion.csv"), told).expect("a motion");
         folder
-    }
-}
-
-fn active(effect: &str, locality: Locality, theta: &[f64]) -> Active {
-    Active {
-        cause: Cause {
-            effect: by_name(effect).expect("an effect"),
-            locality,
-            variant: 0.0,
-        },
-        theta: theta.to_vec(),
     }
 }
 

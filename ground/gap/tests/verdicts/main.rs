@@ -23,6 +23,7 @@ mod rocket;
 mod rooms;
 mod seen;
 mod several;
+mod smoothed;
 mod together;
 mod twin_case;
 mod written;

@@ -2,29 +2,21 @@
 
 use std::fmt::Write;
 
-use crate::{gyros::diagnosed_in, twin_case::Log};
+use crate::{
+    gyros::diagnosed_in,
+    twin_case::{Log, active},
+};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
 use twin::{
-    effect::{Active, Cause, Locality, by_name},
+    effect::{Active, Locality},
     kinematics::Motion,
     motion,
 };
 
 /// \[s\] of the log.
 const SECONDS: f64 = 240.0;
-
-fn active(effect: &str, locality: Locality, theta: &[f64]) -> Active {
-    Active {
-        cause: Cause {
-            effect: by_name(effect).expect("an effect"),
-            locality,
-            variant: 0.0,
-        },
-        theta: theta.to_vec(),
-    }
-}
 
 /// A unit that tumbles with these effects.
 fn tumbled(active: &[Active]) -> TempDir {

@@ -4,7 +4,7 @@ use std::{fmt::Write, fs};
 
 use tempfile::TempDir;
 use twin::{
-    effect::Active,
+    effect::{Active, Cause, Locality, by_name},
     environment::Environment,
     kinematics::Motion,
     predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
@@ -12,6 +12,18 @@ use twin::{
 
 /// \[s\] from row to row.
 const ROW_S: f64 = 0.2;
+
+/// An effect with these parameters.
+pub fn active(effect: &str, locality: Locality, theta: &[f64]) -> Active {
+    Active {
+        cause: Cause {
+            effect: by_name(effect).expect("an effect"),
+            locality,
+            variant: 0.0,
+        },
+        theta: theta.to_vec(),
+    }
+}
 
 /// A log of a unit along a motion.
 pub struct Log<'a> {

@@ -88,7 +88,7 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
     if !diagnosis.withdrawn.is_empty() {
         writeln!(
             text,
-            "        withdrawn (no shrink on held-out data, or too many at once): {}",
+            "        withdrawn (no shrink on held-out data, or many at once that leave something): {}",
             diagnosis.withdrawn.join(", ")
         )?;
     }
