@@ -9,8 +9,10 @@
 //! ratio^2 = d' (S + N N')^-1 d = w'w - b' (I + N~'N~)^-1 b,     w = S^(-1/2) d,  N~ = S^(-1/2) N,  b = N~'w
 //! ```
 //!
-//! over the fit windows. `S^(-1/2)` is an autoregression ([`ORDER`]; Yule and Walker, by Levinson's recursion) of what is left once
-//! calibration is taken out, over its level within some two seconds. What is random from row to row has a variance and no shape: of it
+//! over the fit windows. `S` has two parts. What is fast is an autoregression ([`ORDER`]; Yule and Walker, by Levinson's recursion) of what
+//! is left once calibration is taken out, over its level within some two seconds. It remembers 0.8 s, and what a reference and a room err by
+//! stays alike for some ten. So what is slow stands in `N` beside the calibration: cosines with periods from twice the recording down to
+//! [`SLOW_S`] along the axes of n, in which both stand still, each as large as those of about its frequency were found ([`wander`]). What is random from row to row has a variance and no shape: of it
 //! the ratio is that of the best test of a variance over stretches, `sqrt(sum E^2 / 2n)`, in rows whitened alike.
 //!
 //! How much it matters is told twice: as attitude \[deg\] (a slow force over gravity, a slow field over its horizontal part, a slow rate
@@ -27,6 +29,9 @@ use super::{
 /// Of the autoregressions: 0.8 s of blocks, and 56 ms of BROAD's rows.
 const ORDER: usize = 8;
 const ROW_ORDER: usize = 16;
+
+/// \[s\] the shortest period of what is slow: five times the memory of the autoregression.
+const SLOW_S: f64 = 4.0;
 
 /// Blocks to either side over which a level is taken, and blocks' worth of the mean level that are added.
 const BLOCKS_BESIDE: usize = 10;
@@ -142,6 +147,8 @@ struct Healthy {
     whitening: [Whitening; 3],
     /// What calibration leaves open, a block's axis a row, times its sigmas; not whitened.
     open: DMatrix<f64>,
+    /// The same beside what is slow, whitened.
+    white_open: DMatrix<f64>,
     /// Of the rows as written.
     rows: [Whitening; 3],
     written: Vec<Vector3<f64>>,
@@ -170,6 +177,11 @@ impl Yardstick {
                 let blocks = told::blocks(scene, sensor);
                 let open = open(&blocks, sensor.kind, sensor.sigmas, field_sigma_ut, gradient_sigma);
                 let left = calibrated(&blocks.misfit, &open);
+                let cosines = cosines(&blocks);
+                let fast = calibrated(&left, &cosines);
+                let whitening = [0, 1, 2].map(|own| Whitening::of(&axis(&fast, own), ORDER, BLOCKS_BESIDE));
+                let slow = wander(&left, &fast, &cosines, &whitening);
+                let both = DMatrix::from_columns(&open.column_iter().chain(slow.column_iter()).collect::<Vec<_>>());
                 let energy: Vec<f64> = left
                     .iter()
                     .map(|left| left.norm_squared())
@@ -177,7 +189,8 @@ impl Yardstick {
                     .collect();
                 Healthy {
                     left: (energy.iter().sum::<f64>() / (3 * energy.len().max(1)) as f64).sqrt(),
-                    whitening: [0, 1, 2].map(|own| Whitening::of(&axis(&left, own), ORDER, BLOCKS_BESIDE)),
+                    white_open: whitened_open(&both, &whitening),
+                    whitening,
                     rows: [0, 1, 2].map(|own| {
                         let near = BLOCKS_BESIDE * (told::BLOCK_S / scene.step_s).round().max(1.0) as usize;
                         Whitening::of(&axis(&sensor.values, own), ROW_ORDER, near)
@@ -275,24 +288,86 @@ fn slow(series: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 /// `w'w - b' (I + N~'N~)^-1 b` of a sensor.
 fn in_shape(healthy: &Healthy, changed: &[Vector3<f64>]) -> f64 {
     let whitened = [0, 1, 2].map(|own| healthy.whitening[own].applied(&axis(changed, own)));
-    let count = changed.len();
-    let columns: Vec<Vec<f64>> = (healthy.open.column_iter())
-        .map(|column| {
-            let own = |axis: usize| -> Vec<f64> { (0..count).map(|block| column[3 * block + axis]).collect() };
-            [0, 1, 2]
-                .map(|axis| healthy.whitening[axis].applied(&own(axis)))
-                .concat()
-        })
-        .collect();
     let whitened = whitened.concat();
+    let open = &healthy.white_open;
     let known: Vec<usize> = (0..whitened.len())
-        .filter(|row| whitened[*row].is_finite() && columns.iter().all(|column| column[*row].is_finite()))
+        .filter(|row| whitened[*row].is_finite() && open.row(*row).iter().all(|value| value.is_finite()))
         .collect();
     let w = DVector::from_iterator(known.len(), known.iter().map(|row| whitened[*row]));
-    let open = DMatrix::from_fn(known.len(), columns.len(), |row, column| columns[column][known[row]]);
+    let open = open.select_rows(&known);
     let b = open.tr_mul(&w);
-    let inner = (open.tr_mul(&open) + DMatrix::identity(columns.len(), columns.len())).cholesky();
+    let inner = (open.tr_mul(&open) + DMatrix::identity(open.ncols(), open.ncols())).cholesky();
     w.norm_squared() - inner.map_or(0.0, |inner| b.dot(&inner.solve(&b)))
+}
+
+/// Columns whose rows are a block's axes, whitened: all blocks of one axis after the other.
+fn whitened_open(open: &DMatrix<f64>, whitening: &[Whitening; 3]) -> DMatrix<f64> {
+    let count = open.nrows() / 3;
+    let columns: Vec<DVector<f64>> = (open.column_iter())
+        .map(|column| {
+            let own = |axis: usize| -> Vec<f64> { (0..count).map(|block| column[3 * block + axis]).collect() };
+            DVector::from_vec([0, 1, 2].map(|axis| whitening[axis].applied(&own(axis))).concat())
+        })
+        .collect();
+    DMatrix::from_columns(&columns)
+}
+
+/// `sqrt 2 cos(pi k (i + 1/2) / n)` of block `i` along each axis of n, three columns a `k` from 1 on: their mean square is one.
+fn cosines(blocks: &Blocks) -> DMatrix<f64> {
+    let count = blocks.poses.len();
+    let most = (2.0 * told::BLOCK_S * count as f64 / SLOW_S) as usize;
+    let mut cosines = DMatrix::zeros(3 * count, 3 * most);
+    for (block, (q_nb, _)) in blocks.poses.iter().enumerate() {
+        let to_b = q_nb.inverse().to_rotation_matrix();
+        for k in 0..most {
+            let phase = std::f64::consts::PI * (k + 1) as f64 * (block as f64 + 0.5) / count as f64;
+            let own = to_b.matrix() * (2f64.sqrt() * phase.cos());
+            cosines.fixed_view_mut::<3, 3>(3 * block, 3 * k).copy_from(&own);
+        }
+    }
+    cosines
+}
+
+/// What reference and room err by slowly: each cosine times its sigma. That is the root mean square of what was found from half its
+/// frequency to twice that, less what noise alone makes of it: of `n` values of density `s` a column of mean square one gets `s / n`.
+fn wander(
+    left: &[Vector3<f64>],
+    fast: &[Vector3<f64>],
+    cosines: &DMatrix<f64>,
+    whitening: &[Whitening; 3],
+) -> DMatrix<f64> {
+    let most = cosines.ncols() / 3;
+    let known: Vec<usize> = (0..left.len()).filter(|block| left[*block].x.is_finite()).collect();
+    // By what least squares took out, cosine by cosine: nearly orthogonal where the recording has no large holes.
+    let taken = |column: usize| -> f64 {
+        let products = known.iter().map(|block| {
+            let slow = left[*block] - fast[*block];
+            (0..3)
+                .map(|axis| cosines[(3 * block + axis, column)] * slow[axis])
+                .sum::<f64>()
+        });
+        products.sum::<f64>() / known.len().max(1) as f64
+    };
+    let squares: Vec<f64> = (0..most)
+        .map(|k| (0..3).map(|axis| taken(3 * k + axis).powi(2)).sum::<f64>() / 3.0)
+        .collect();
+    let density = |one: &Whitening| {
+        let level = one.level.iter().map(|level| level * level).sum::<f64>() / one.level.len().max(1) as f64;
+        level / one.coefficients.iter().sum::<f64>().powi(2)
+    };
+    let of_noise = whitening.iter().map(density).sum::<f64>() / 3.0 / known.len().max(1) as f64;
+    let sigma = |k: usize| {
+        let near = &squares[k / 2..(2 * k + 2).min(most)];
+        (near.iter().sum::<f64>() / near.len().max(1) as f64 - of_noise)
+            .max(0.0)
+            .sqrt()
+    };
+    let sigmas: Vec<f64> = (0..most).map(sigma).collect();
+    let mut slow = cosines.clone();
+    for (mut column, index) in slow.column_iter_mut().zip(0..) {
+        column *= sigmas[index / 3];
+    }
+    slow
 }
 
 /// A misfit without what the open columns take up, by least squares; three rows a block.
@@ -361,4 +436,43 @@ fn open(
         .collect();
     let columns = rows.first().map_or(0, |row| row[0].len());
     DMatrix::from_fn(3 * rows.len(), columns, |row, column| rows[row / 3][row % 3][column])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{
+        super::recording::{self, Purpose},
+        *,
+    };
+
+    /// A room whose field wanders hides a disturbance that is as slow, and none that is fast.
+    #[test]
+    fn what_a_recording_errs_by_slowly_hides_what_is_as_slow_and_nothing_else() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data");
+        let recordings = recording::all(&folder, Purpose::Judge).expect("a minute");
+        let recording = &recordings[0];
+        let calm = Scene::new(recording);
+        let sensor = (calm.sensors.iter())
+            .position(|sensor| sensor.kind == Kind::Magnetometer)
+            .expect("magnetometers");
+        let with = |scene: &Scene, size: f64, period_s: f64, phase: f64| {
+            let mut scene = scene.clone();
+            for ((row, value), (q_nb, _)) in (0..).zip(&mut scene.sensors[sensor].values).zip(calm.followed()) {
+                let turns = f64::from(row) * calm.step_s / period_s;
+                let along_n = Vector3::x() * (size * (std::f64::consts::TAU * turns + phase).sin());
+                *value += q_nb.inverse() * along_n;
+            }
+            scene
+        };
+        let restless = with(&calm, 1.0, 17.0, 1.0);
+        let ratio = |healthy: &Scene, period_s: f64| {
+            let yardstick = Yardstick::new(healthy, &recording.case.windows.fit, 0.8, 1.5);
+            yardstick.measured(&with(healthy, 0.3, period_s, 0.0), false).ratio
+        };
+        let [slow, fast] = [20.0, 0.7].map(|period_s| [&calm, &restless].map(|healthy| ratio(healthy, period_s)));
+        assert!(slow[1] < 0.5 * slow[0], "{slow:?}");
+        assert!((fast[1] / fast[0] - 1.0).abs() < 0.2, "{fast:?}");
+    }
 }
