@@ -36,6 +36,7 @@ use crate::{
     scene::{DURATION_S, Scene},
     sensitivity::{
         self, Told,
+        consequence::{Consequence, consequence},
         withheld::{self, Ratios},
     },
     strength,
@@ -136,20 +137,22 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         }
     };
     let quiet = [0, 1].map(|flight| fly(&[], flight));
-    let withheld = |struck: &[(usize, f64)]| {
-        let flown = [0, 1].map(|flight| fly(struck, flight));
-        let told = flown.each_ref().map(Flown::told);
-        let quiet = quiet.each_ref().map(Flown::told);
-        let flights = [[&told[0], &quiet[0]], [&told[1], &quiet[1]]];
-        let Ratios { parity, course } = withheld::ratios(flights, &instants, FIT_S, !is_rocket);
+    let struck = |struck: &[(usize, f64)]| [0, 1].map(|flight| fly(struck, flight));
+    let withheld = |strengths: &[(usize, f64)]| {
+        let Ratios { parity, course } = beside(&struck(strengths), &quiet, |flights| {
+            withheld::ratios(flights, &instants, FIT_S, !is_rocket)
+        });
         (parity, course)
     };
-    let snr = |struck: &[(usize, f64)], random: bool| {
-        let flown = [0, 1].map(|flight| fly(struck, flight));
-        let told = flown.each_ref().map(Flown::told);
-        let quiet = quiet.each_ref().map(Flown::told);
-        let flights = [[&told[0], &quiet[0]], [&told[1], &quiet[1]]];
-        sensitivity::marginal_snr(flights, &instants, FIT_S, random)
+    let snr = |strengths: &[(usize, f64)], random: bool| {
+        beside(&struck(strengths), &quiet, |flights| {
+            sensitivity::marginal_snr(flights, &instants, FIT_S, random)
+        })
+    };
+    let matters = |strength: (usize, f64), random: bool| {
+        beside(&struck(&[strength]), &quiet, |flights| {
+            consequence(flights, &instants, FIT_S, random)
+        })
     };
     let mut sizes = draw.stream(9);
     let mut strengths = Vec::new();
@@ -180,16 +183,19 @@ pub fn deal(folder: &Path, name: &str, card: Card, seed: u64) -> Result<Answer, 
         false => Vec::new(),
     };
     let effects = (chosen.iter().zip(&flown.touched).zip(strengths.iter().zip(&ratios)))
-        .map(|((disturbance, (touched, sizes)), ((_, strength), ratio))| Cause {
-            effect: disturbance.name.into(),
-            in_library: ring != Ring::R3,
-            channels: touched.iter().map(|index| CHANNELS[*index].name.into()).collect(),
-            strength: *strength,
-            snr_marginal: Some(*ratio),
-            sizes: sizes.clone(),
-            snr_withheld: is_withheld.then(|| withheld(&strengths)),
-            attitude_deg: None,
-            gap_growth: None,
+        .map(|((disturbance, (touched, sizes)), (strength, ratio))| {
+            let Consequence { attitude_deg, growth } = matters(*strength, disturbance.random);
+            Cause {
+                effect: disturbance.name.into(),
+                in_library: ring != Ring::R3,
+                channels: touched.iter().map(|index| CHANNELS[*index].name.into()).collect(),
+                strength: strength.1,
+                snr_marginal: Some(*ratio),
+                sizes: sizes.clone(),
+                snr_withheld: is_withheld.then(|| withheld(&strengths)),
+                attitude_deg: Some(attitude_deg),
+                gap_growth: Some(growth),
+            }
         })
         .collect();
     Ok(Answer {
@@ -218,6 +224,12 @@ impl Flown {
             claimed: &self.scene.claimed,
         }
     }
+}
+
+/// Measures what was struck beside what was not, each flown twice.
+fn beside<T>(struck: &[Flown; 2], quiet: &[Flown; 2], measure: impl FnOnce([[&Told; 2]; 2]) -> T) -> T {
+    let [struck, quiet] = [struck, quiet].map(|flights| flights.each_ref().map(Flown::told));
+    measure([[&struck[0], &quiet[0]], [&struck[1], &quiet[1]]])
 }
 
 fn choose(ring: Ring, draw: &mut Draw) -> Vec<Disturbance> {

@@ -12,6 +12,7 @@
 //! What is random from sample to sample has no shape that could be matched, only a variance: of it the ratio is that of the
 //! best test of a variance, sqrt(sum of E^2 / 2n) over stretches of n samples whose energy is E.
 
+pub mod consequence;
 pub mod withheld;
 
 use std::collections::BTreeMap;

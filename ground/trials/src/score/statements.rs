@@ -5,13 +5,15 @@
 //! `(1 - matters) prod (1 - p)`) and for "what is left matters".
 //!
 //! What is left matters where something is there that no name said covers, and that is larger than what a case cares about: half a
-//! degree of attitude or a twentieth of the gap, as the trials measured it. Where they did not, something novel matters from
-//! [`MARGINAL_SNR`] on, and a cause that was not said is left out.
+//! degree of attitude or a twentieth of the gap, as the trials measured it. Where they did not (deals of before 29 November 2026), something
+//! novel matters from [`MARGINAL_SNR`] on, and a cause that was not said is left out. A ratio of 8 alone is no matter: on 1,500 samples it
+//! is a gap that grows by a fiftieth.
 //!
 //! The interval of what is left can be held against the held-out windows without an answer: their gap after the correction is
 //! `sqrt(floor^2 + m/n s^2)` if `m` of `n` channels scatter by `s` sigma more than they should.
 
 use super::{Answer, Judged, Line, MARGINAL_SNR, Verdict, WITHHELD, expected_calibration_error, share};
+use crate::answer::Cause;
 
 /// What a case cares about: \[deg\] of attitude, and growth of the gap.
 const ATTITUDE_DEG: f64 = 0.5;
@@ -46,19 +48,32 @@ pub(crate) fn has_false_name(answer: &Answer, verdict: &Verdict) -> bool {
 pub(crate) fn matters(answer: &Answer, verdict: &Verdict) -> Option<bool> {
     let is_said = |name: &str| verdict.said().any(|cause| cause.effect == name);
     let left = answer.effects.iter().filter(|truth| !is_said(&truth.effect));
-    let each = left.map(|truth| match (truth.attitude_deg, truth.gap_growth) {
-        (Some(attitude_deg), Some(growth)) => Some(attitude_deg > ATTITUDE_DEG || growth > GAP_GROWTH),
-        _ => {
-            let is_plain = truth.snr_marginal.unwrap_or(answer.snr_marginal) >= MARGINAL_SNR;
-            (!truth.in_library && is_plain).then_some(true)
-        }
-    });
-    let each: Vec<Option<bool>> = each.collect();
+    let each: Vec<Option<bool>> = left.map(|truth| is_more_than_the_bar(answer, truth)).collect();
     // One that matters decides; one that is not known leaves it open.
     match each.contains(&Some(true)) {
         true => Some(true),
         false => (!each.contains(&None)).then_some(false),
     }
+}
+
+/// Whether one thing that is wrong is more than a case cares about; `None` where the trials do not know.
+fn is_more_than_the_bar(answer: &Answer, truth: &Cause) -> Option<bool> {
+    match (truth.attitude_deg, truth.gap_growth) {
+        (Some(attitude_deg), Some(growth)) => Some(attitude_deg > ATTITUDE_DEG || growth > GAP_GROWTH),
+        _ => {
+            let is_plain = truth.snr_marginal.unwrap_or(answer.snr_marginal) >= MARGINAL_SNR;
+            (!truth.in_library && is_plain).then_some(true)
+        }
+    }
+}
+
+/// Whether anything that is wrong is.
+fn is_any_more_than_the_bar(judged: &&Judged) -> bool {
+    let answer = &judged.answer;
+    let causes = answer.effects.iter();
+    causes
+        .filter_map(|truth| is_more_than_the_bar(answer, truth))
+        .any(|is_so| is_so)
 }
 
 /// All statements of a case.
@@ -179,16 +194,16 @@ pub(super) fn lines(judged: &[Judged]) -> Vec<Line> {
     let known = plain("R7").filter(|judged| {
         judged.answer.effects.iter().all(|cause| cause.in_library) && !judged.answer.effects.is_empty()
     });
+    let is_first = |answer: &Answer, verdict: &Verdict| {
+        let first = verdict.causes.first();
+        first.is_some_and(|first| first.effect == answer.effects[0].effect)
+    };
+    lines.push(share("R7: top-1", ">= 0.85", known.clone(), is_first, false));
     lines.push(share(
-        "R7: top-1",
+        "R7: top-1, of what matters",
         ">= 0.85",
-        known,
-        |answer, verdict| {
-            verdict
-                .causes
-                .first()
-                .is_some_and(|first| first.effect == answer.effects[0].effect)
-        },
+        known.filter(is_any_more_than_the_bar),
+        is_first,
         false,
     ));
     let novel = plain("R7")
@@ -196,8 +211,15 @@ pub(super) fn lines(judged: &[Judged]) -> Vec<Line> {
         .filter(|judged| judged.answer.effects.iter().any(|cause| !cause.in_library));
     lines.push(share(
         "R3, R7: novel, said to matter",
+        "",
+        novel.clone(),
+        is_flagged,
+        false,
+    ));
+    lines.push(share(
+        "R3, R7: novel that matters, said to matter",
         ">= 0.92",
-        novel,
+        novel.filter(is_any_more_than_the_bar),
         is_flagged,
         false,
     ));

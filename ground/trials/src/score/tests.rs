@@ -209,6 +209,30 @@ fn what_is_left_matters_by_what_no_name_covers() {
     assert!((value(&table(&[case("hard-iron", 0.6, 0.01)]), "Brier of matters") - 0.64).abs() < 1e-12);
 }
 
+/// What is plain and too small to care about may be called clean: it is counted beside what matters, not among it.
+#[test]
+fn what_does_not_matter_is_counted_for_itself() {
+    let named =
+        r#"{"causes":[{"effect":"hard-iron","probability":0.9}],"outcome":"named","remainder":{"matters":0.0}}"#;
+    let flagged = r#"{"causes":[],"outcome":"unknown","remainder":{"matters":0.9}}"#;
+    let case = |in_library: bool, attitude_deg: f64, verdict: &str| {
+        let mut case = judged("R7", &["hard-iron"], Some(verdict));
+        let effect = &mut case.answer.effects[0];
+        (effect.in_library, effect.attitude_deg, effect.gap_growth) = (in_library, Some(attitude_deg), Some(0.0));
+        case
+    };
+    let lines = table(&[
+        case(true, 0.6, named),
+        case(true, 0.1, NOTHING),
+        case(false, 0.6, flagged),
+        case(false, 0.1, NOTHING),
+    ]);
+    assert_eq!(value(&lines, "R7: top-1"), 0.5);
+    assert_eq!(value(&lines, "R7: top-1, of what matters"), 1.0);
+    assert_eq!(value(&lines, "R3, R7: novel, said to matter"), 0.5);
+    assert_eq!(value(&lines, "R3, R7: novel that matters, said to matter"), 1.0);
+}
+
 #[test]
 fn an_interval_is_held_against_the_windows_kept_back() {
     let verdict = |after: f64| {
