@@ -16,14 +16,18 @@ use twin::effect::Texture;
 
 use crate::{
     input::case::Subject,
-    null::{model::Model, problem::Problem},
-    search::explanation::Explanation,
+    null::{
+        interval::Interval,
+        model::Model,
+        problem::{Component, Problem},
+    },
+    search::{explanation::Explanation, once, periodic},
     thresholds::{CERTAIN, DOUBT_STEP, UNLIKE},
     unknown::{
         binned::Binned,
         fast::within_stretches,
         remainder::{Setting, attitude_deg, courses, judged},
-        slow::{Beside, Slow},
+        slow::{Beside, Slow, Where},
     },
 };
 
@@ -49,7 +53,8 @@ pub struct Weight {
     pub beside: f64,
     /// Part of its energy that the other effects do not take back.
     pub kept: f64,
-    /// \[nats\] by which it is likelier than a free course in its channels would be in its place, its parameters paid for.
+    /// \[nats\] by which it is likelier than the free course in its channels that does best in its place, its parameters and the search for
+    /// when it is on paid for.
     pub over_course: f64,
 }
 
@@ -100,12 +105,9 @@ impl Importance {
             let is_there = |places: &[usize]| places.iter().any(|channel| channels[effect].contains(channel));
             let is_its = |slow: &&Slow| is_there(&slow.channels);
             let without = courses(problem, &beside, &setting, Some(effect));
-            // The best of several, which share even odds with nothing.
-            let best = |slow: &[Slow]| {
-                let several = (slow.len().max(1) as f64).ln();
-                let nats = slow.iter().filter(is_its).map(|slow| slow.posterior.log_bayes_factor);
-                nats.fold(several, f64::max) - several
-            };
+            let nats = |slow: &Slow| (slow.place, slow.posterior.log_bayes_factor);
+            let beside_it: Vec<(Where, f64)> = left.iter().map(nats).collect();
+            let in_its_place: Vec<(Where, f64)> = without.iter().filter(is_its).map(nats).collect();
             let parts = problem.parts(&model.components, effect);
             let others = (0..worths.len()).filter(|other| !parts.contains(other) && is_there(&channels[*other]));
             let worth = worths[effect];
@@ -114,7 +116,10 @@ impl Importance {
                 kept: kept(problem, model, effect),
                 worth,
                 beside: others.map(|other| worths[other]).fold(0.0, f64::max),
-                over_course: worth - beside.price(effect) + best(&left) - best(&without),
+                over_course: worth
+                    - beside.price(effect)
+                    - looked_for(problem, &model.components[effect])
+                    - of_course(&in_its_place, &beside_it, without.len()),
             }
         };
         let course = |slow: &Slow| Course {
@@ -128,6 +133,33 @@ impl Importance {
             effects: (0..model.components.len()).map(weight).collect(),
             is_walk_seen: is_seen(problem, &setting, explanation.walk(problem)),
         })
+    }
+}
+
+/// \[nats\] by which the best of several free courses does better in the place of an effect than beside it: one that is there either way says
+/// nothing of the effect. All `several` share even odds with nothing.
+fn of_course(in_its_place: &[(Where, f64)], beside_it: &[(Where, f64)], several: usize) -> f64 {
+    let above_nothing = |nats: f64| (nats - (several.max(1) as f64).ln()).max(0.0);
+    let better = in_its_place.iter().map(|(place, nats)| {
+        let same = beside_it.iter().find(|(other, _)| other == place);
+        above_nothing(*nats) - same.map_or(0.0, |(_, beside)| above_nothing(*beside))
+    });
+    better.fold(0.0, f64::max)
+}
+
+/// \[nats\] the price of having looked for the time in which an effect is on.
+fn looked_for(problem: &Problem, component: &Component) -> f64 {
+    let span_s = || {
+        let rows = problem.fitted_rows();
+        let ends = rows.first().zip(rows.last());
+        ends.map_or(0.0, |(first, last)| {
+            problem.twin.starts_s()[*last] - problem.twin.starts_s()[*first]
+        })
+    };
+    match component.span {
+        None => 0.0,
+        Some(Interval { every_s: None, .. }) => once::price(),
+        Some(Interval { every_s: Some(_), .. }) => periodic::price(span_s()),
     }
 }
 
@@ -208,6 +240,8 @@ fn is_seen(problem: &Problem, setting: &Setting, added: impl IntoIterator<Item =
 
 #[cfg(test)]
 mod tests {
+    use twin::predict::Kind;
+
     use super::*;
 
     fn weight(grows: bool, worth: f64, over_course: f64) -> Weight {
@@ -218,6 +252,18 @@ mod tests {
             beside: 0.0,
             over_course,
         }
+    }
+
+    /// A supply that sinks beside a room in which something turns slowly: the factor is there in the place of a soft iron alone, the rotation
+    /// beside it too.
+    #[test]
+    fn a_course_that_is_there_either_way_says_nothing_of_an_effect() {
+        let (factor, turned) = (Where::Factor(Kind::Magnetometer), Where::Rotation);
+        let without = [(factor, 28.7), (turned, 11.1)];
+        assert!((of_course(&without, &[(turned, 11.2)], 1) - 28.7).abs() < 1e-12);
+        assert!((of_course(&without, &[(turned, 11.2), (factor, 20.0)], 1) - 8.7).abs() < 1e-12);
+        assert!((of_course(&without, &[], 20) - (28.7 - 20f64.ln())).abs() < 1e-12);
+        assert_eq!(of_course(&[(turned, 2.0)], &[], 20), 0.0);
     }
 
     /// A zero of 0.57 deg/s beside a sensitivity to gravity that took it back, on a healthy recording.

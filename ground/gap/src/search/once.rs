@@ -20,6 +20,11 @@ const EDGES: usize = 41;
 /// Steps into which the distance to the next of them is parted, again and again, when the best two are known.
 const FINE: i32 = 8;
 
+/// \[nats\] the price of having looked at all stretches.
+pub fn price() -> f64 {
+    ((EDGES * (EDGES - 1) / 2) as f64).ln()
+}
+
 /// The channels that an effect touches, and its columns at the first instants tried: the same whatever the residual is.
 pub struct Tried<'a> {
     touched: Vec<Touched<'a>>,
@@ -80,7 +85,7 @@ impl<'a> Tried<'a> {
         };
         let (from_s, last_s) = (self.edges[0], self.edges[EDGES - 1]);
         let step_s = (last_s - from_s) / (EDGES - 1) as f64;
-        let price = ((EDGES * (EDGES - 1) / 2) as f64).ln();
+        let price = price();
         let (gain, (on_s, off_s)) = best(&self.steps, &self.edges, &|_, _| true)?;
         if gain <= STRETCH_MARGIN + price || (on_s == from_s && off_s == last_s) {
             return None;

@@ -5,7 +5,7 @@
 //! `(1 - matters) prod (1 - p)`) and for "what is left matters".
 //!
 //! What is left matters where something is there that no name said covers, and that is larger than what a case cares about: half a
-//! degree of attitude or a twentieth of the gap, as the trials measured it. Where they did not (deals of before 29 November 2026), something
+//! degree of attitude or a twentieth of the gap, as the trials measured it. Where they did not (deals up to seed 29113002), something
 //! novel matters from [`MARGINAL_SNR`] on, and a cause that was not said is left out. A ratio of 8 alone is no matter: on 1,500 samples it
 //! is a gap that grows by a fiftieth.
 //!
