@@ -5,8 +5,10 @@
 //! reference errs more than the sensor scatters, in a colour that nobody knows, only all together are looked at. White, nearly Gaussian
 //! energy is noise that is louder than described and no unknown effect; it is left out.
 //!
-//! What is fast moves no attitude by itself. It matters by what it adds to the gap of the whole: one channel of 28 that scatters by a tenth more
-//! adds four thousandths of a sigma. What several channels have adds up ([`Bar`]).
+//! What is fast moves no attitude by itself. It matters by what it adds to the gap of its sensor, which is one part: an axis of three that
+//! scatters by a tenth more adds a thirtieth. What several of its axes have adds up ([`Bar`]).
+
+use twin::predict::Channel;
 
 use super::{
     alike,
@@ -85,35 +87,43 @@ impl Fast {
     }
 }
 
-/// How much energy of all channels matters to the whole.
+/// How much energy of a channel matters to its sensor.
 pub struct Bar {
-    /// [sigma^2] sum over samples by which the gap of the whole grows by the user's bar.
-    energy: f64,
-    /// [sigma^2] per channel, the same sum of what others are likelier to have above their floor than not.
-    others: Vec<f64>,
+    /// [sigma^2] per channel, the sum over samples by which the gap of its sensor grows by the user's bar, less what the sensor's other axes
+    /// are likelier to have above their floor than not.
+    energy: Vec<f64>,
 }
 
 impl Bar {
-    /// Of these channels; of which something is there above the floor, `is_there` says.
-    pub fn of(all: &[Fast], bars: &Bars, is_there: impl Fn(&Fast) -> bool) -> Self {
-        let sum = |of: &dyn Fn(&Fast) -> f64| all.iter().map(|fast| fast.count * of(fast)).sum::<f64>();
-        let floor = sum(&|fast| fast.floor) / sum(&|_| 1.0).max(1.0);
-        let there: Vec<&Fast> = all.iter().filter(|fast| is_there(fast)).collect();
+    /// Of these channels, each of a sensor; of which something is there above the floor, `is_there` says.
+    pub fn of(all: &[Fast], bars: &Bars, sensor: impl Fn(usize) -> usize, is_there: impl Fn(&Fast) -> bool) -> Self {
         let channels = all.iter().map(|fast| fast.channel + 1).max().unwrap_or(0);
-        let beside = |channel: usize| {
-            let others = there.iter().filter(|fast| fast.channel != channel);
-            others.map(|fast| fast.count * fast.excess.max(0.0)).sum()
+        let of_channel = |channel: usize| {
+            let own = || all.iter().filter(|fast| sensor(fast.channel) == sensor(channel));
+            let sum = |of: &dyn Fn(&Fast) -> f64| own().map(|fast| fast.count * of(fast)).sum::<f64>();
+            let samples = sum(&|_| 1.0);
+            let floor = sum(&|fast| fast.floor) / samples.max(1.0);
+            let others = own().filter(|fast| fast.channel != channel && is_there(fast));
+            samples * ((floor.sqrt() + bars.gap_sigma).powi(2) - floor)
+                - others.map(|fast| fast.count * fast.excess.max(0.0)).sum::<f64>()
         };
         Self {
-            energy: sum(&|_| 1.0) * ((floor.sqrt() + bars.gap_sigma).powi(2) - floor),
-            others: (0..channels).map(beside).collect(),
+            energy: (0..channels).map(of_channel).collect(),
         }
     }
 
-    /// [sigma^2] mean square of a channel from which its excess matters: what others leave of the user's bar, and what the reference may be off by.
+    /// [sigma^2] mean square of a channel from which its excess matters: what others leave of the user's bar, and what the reference may be off by
+    /// fast.
     pub fn over(&self, fast: &Fast) -> f64 {
-        (self.energy - self.others[fast.channel]).max(0.0) / fast.count + REFERENCE_KNOWN * fast.reference
+        self.energy[fast.channel].max(0.0) / fast.count + REFERENCE_KNOWN * fast.reference
     }
+}
+
+/// The first channel of the sensor that a channel is of: those of its kind in its group are one part.
+pub fn sensor(channels: &[Channel], channel: usize) -> usize {
+    let own = &channels[channel];
+    let is_of_it = |other: &Channel| other.sensor == own.sensor && other.group == own.group;
+    channels.iter().position(is_of_it).unwrap_or(channel)
 }
 
 fn excess(problem: &Problem, model: &Model, channel: usize, floor: &[f64], louder: f64) -> Option<Fast> {
@@ -220,20 +230,22 @@ mod tests {
             attitude_deg: 0.5,
             gap_sigma: 0.05,
         };
-        let bar = Bar::of(&all, &bars, |fast| fast.log_bayes_factor > 0.0);
+        let bar = Bar::of(&all, &bars, |channel| channel / 3, |fast| fast.log_bayes_factor > 0.0);
         all.iter()
             .filter(|fast| fast.excess > bar.over(fast))
             .map(|fast| fast.channel)
             .collect()
     }
 
-    /// The bar is (1.05^2 - 1) of the mean square of all 28: 2.87 of one of them.
+    /// The bar is (1.05^2 - 1) of the mean square of three axes: 0.3075 of one of them. The last of 28 is alone.
     #[test]
-    fn energy_matters_by_what_it_adds_to_the_whole_and_that_of_several_adds_up() {
-        assert!(mattering(&[0.25]).is_empty());
-        assert!(mattering(&[2.8]).is_empty());
-        assert_eq!(mattering(&[2.9]), vec![0]);
-        assert!(mattering(&[0.25; 11]).is_empty());
-        assert_eq!(mattering(&[0.25; 12]), (0..12).collect::<Vec<_>>());
+    fn energy_matters_by_what_it_adds_to_its_sensor_and_that_of_its_axes_adds_up() {
+        assert!(mattering(&[0.30]).is_empty());
+        assert_eq!(mattering(&[0.31]), vec![0]);
+        assert_eq!(mattering(&[0.16, 0.16]), vec![0, 1]);
+        assert!(mattering(&[0.16, 0.0, 0.0, 0.16]).is_empty());
+        let mut last = [0.0; 28];
+        last[27] = 0.11;
+        assert_eq!(mattering(&last), vec![27]);
     }
 }

@@ -6,7 +6,7 @@
 //! With thousands of samples everything is significant, so significance decides nothing by itself. A discrepancy matters with the
 //! probability that it is there (its Bayes factor, all of them sharing even odds) times that of its size being above a bar. The bar is
 //! the user's, in degrees of attitude or in growth of the gap, whichever is smaller, but never below what the reference itself may be off
-//! by. A slow course goes on, and its growth is that of the gap in its own channels; what is fast is averaged, and its growth is that of the gap of the whole.
+//! by. A slow course goes on, and its growth is that of the gap in its own channels; what is fast is averaged, and its growth is that of the gap of its sensor.
 //! Degrees: a specific force over gravity, a field over its horizontal part, a rate over the time constant of a filter, each as far
 //! as the sensor weighs among those of its kind.
 
@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use twin::predict::Kind;
 
 use super::{
-    fast::{Bar, Fast, excesses},
+    fast::{Bar, Fast, excesses, sensor},
     slow::{Beside, Slow, Where},
 };
 use crate::{
@@ -135,9 +135,12 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
         }
     });
     let is_there = |fast: &Fast| present(fast.log_bayes_factor, several) > SAID;
-    let whole = Bar::of(&fast, setting.bars, is_there);
+    let sensor_of = |channel: usize| sensor(&problem.twin.unit().channels, channel);
+    let of_sensor = Bar::of(&fast, setting.bars, sensor_of, is_there);
     let of_fast = fast.iter().map(|fast| {
-        let bar = whole.over(fast);
+        // All frequencies are in it: what the reference errs by slowly too, which an axis across gravity sees more of than others.
+        let off = REFERENCE_SIGMAS * off(problem, Where::Sensor(fast.channel), setting.slow) / fast.sigma;
+        let bar = of_sensor.over(fast).max(off * off);
         let sigma = GAUSSIAN.map(|many| (fast.excess + many * fast.error).max(0.0).sqrt());
         let present = present(fast.log_bayes_factor, several);
         Remainder {

@@ -42,7 +42,7 @@ pub struct SlowErrors {
 pub struct Bars {
     /// \[deg\] of attitude.
     pub attitude_deg: f64,
-    /// \[sigma\] by which the gap grows: by a slow course in the channels that it is in, by what is fast in all of them together.
+    /// \[sigma\] by which the gap grows: by a slow course in the channels that it is in, by what is fast in its sensor.
     pub gap_sigma: f64,
 }
 
