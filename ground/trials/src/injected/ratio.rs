@@ -25,6 +25,7 @@ use super::{
     scene::Scene,
     told::{self, Blocks},
 };
+use crate::sensitivity::consequence::FILTER_S;
 
 /// Of the autoregressions: 0.8 s of blocks, and 56 ms of BROAD's rows.
 const ORDER: usize = 8;
@@ -39,9 +40,6 @@ const PSEUDO: f64 = 4.0;
 
 /// Blocks that are one slow value: two seconds.
 const SLOW: usize = 20;
-
-/// \[s\] over which a filter believes a gyro.
-const FILTER_S: f64 = 10.0;
 
 /// How plain an injection is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -26,7 +26,7 @@ use crate::{
 const SLOW: usize = 10;
 
 /// \[s\] over which a filter believes a gyro.
-const FILTER_S: f64 = 10.0;
+pub const FILTER_S: f64 = 10.0;
 
 /// How much a disturbance matters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
