@@ -144,10 +144,14 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
         .iter()
         .fold((0, 0), |sum, one| (sum.0 + one.missing, sum.1 + one.clipped));
     let stream = subject.stream;
+    let rows = match subject.thinned {
+        1 => "every row".to_owned(),
+        thinned => format!("one row in {thinned}"),
+    };
     writeln!(
         text,
-        "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; one row in {} used",
-        stream.lost, stream.repeated, stream.rejected, subject.unseen, subject.thinned
+        "DATA    lost packets {}, repeated {}, not packets {}; samples missing {missing}, clipped {clipped}, unseen by the reference {}; {rows} used",
+        stream.lost, stream.repeated, stream.rejected, subject.unseen
     )?;
     noise::lines(text, &diagnosis.noise)?;
     place::line(text, diagnosis)?;
