@@ -200,7 +200,7 @@ thresholds! {
         Convention("four fifths");
     /// Sigmas of the reference or the field below which a slow remainder may be theirs.
     REFERENCE_SIGMAS: f64 = 2.0, in "sigmas",
-        larger: "slow unknown effects are taken for the reference's",
+        larger: "unknown effects as small are taken for the reference's",
         smaller: "errors of a reference are called unknown effects",
         Convention("two sigma");
     /// Part of a reference's fast variance that it may have more than its record says.

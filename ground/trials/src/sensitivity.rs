@@ -110,6 +110,12 @@ fn both(first: &Differences, second: &Differences) -> Vec<(usize, usize)> {
         .collect()
 }
 
+/// Noise of a sample, that of its counts included.
+fn sigma(quantity: Quantity) -> f64 {
+    let (lsb, _) = quantity.scale();
+    (kind(quantity).noise.powi(2) + lsb * lsb / 12.0).sqrt()
+}
+
 /// What a disturbance changes in a channel, in units of noise.
 struct Differences {
     /// Packets it is of, ascending.
@@ -127,7 +133,7 @@ impl Differences {
         let channel = CHANNELS[index];
         let facts = kind(channel.quantity);
         let (lsb, _) = channel.quantity.scale();
-        let sigma = (facts.noise * facts.noise + lsb * lsb / 12.0).sqrt();
+        let sigma = sigma(channel.quantity);
         let axis_b = axis_b(channel)?;
         let aside = if axis_b.x.abs() < 0.9 {
             Vector3::x()

@@ -149,17 +149,14 @@ fn of_course(in_its_place: &[(Where, f64)], beside_it: &[(Where, f64)], several:
 
 /// \[nats\] the price of having looked for the time in which an effect is on.
 fn looked_for(problem: &Problem, component: &Component) -> f64 {
-    let span_s = || {
-        let rows = problem.fitted_rows();
-        let ends = rows.first().zip(rows.last());
-        ends.map_or(0.0, |(first, last)| {
-            problem.twin.starts_s()[*last] - problem.twin.starts_s()[*first]
-        })
-    };
     match component.span {
         None => 0.0,
         Some(Interval { every_s: None, .. }) => once::price(),
-        Some(Interval { every_s: Some(_), .. }) => periodic::price(span_s()),
+        Some(Interval { every_s: Some(_), .. }) => {
+            let (rows, starts_s) = (problem.fitted_rows(), problem.twin.starts_s());
+            let ends = rows.first().zip(rows.last());
+            periodic::price(ends.map_or(0.0, |(first, last)| starts_s[*last] - starts_s[*first]))
+        }
     }
 }
 

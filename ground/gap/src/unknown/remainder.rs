@@ -6,7 +6,8 @@
 //! With thousands of samples everything is significant, so significance decides nothing by itself. A discrepancy matters with the
 //! probability that it is there (its Bayes factor, all of them sharing even odds) times that of its size being above a bar. The bar is
 //! the user's, in degrees of attitude or in growth of the gap, whichever is smaller, but never below what the reference itself may be off
-//! by. A slow course goes on, and its growth is that of the gap in its own channels; what is fast is averaged, and its growth is that of the gap of its sensor.
+//! by. A slow course goes on, and its growth is that of the gap in its own channels; what is fast is averaged, and its growth is that of
+//! the gap of its sensor.
 //! Degrees: a specific force over gravity, a field over its horizontal part, a rate over the time constant of a filter, each as far
 //! as the sensor weighs among those of its kind.
 

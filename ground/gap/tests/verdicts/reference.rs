@@ -4,14 +4,18 @@ use std::{f64::consts::TAU, fs};
 
 use crate::gyros::{RATE_HZ, SECONDS, diagnosed_in, erring, rate, rewritten};
 use gap::{
-    input::case::Subject,
+    input::case::{SlowErrors, Subject},
     library::hypotheses::Library,
     null::{model::Model, problem::Problem},
     search::{
         in_colour::attribute_in_colour,
         readings::{Chosen, attribute},
     },
-    unknown::{fast::within_stretches, recognised::recognised, remainder::Setting},
+    unknown::{
+        fast::within_stretches,
+        recognised::recognised,
+        remainder::{Setting, remainder},
+    },
 };
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -100,6 +104,34 @@ fn what_is_fast_has_energy_within_stretches_and_what_is_slow_has_not() {
     assert!((20_000.0..30_000.0).contains(&fast[2]), "{fast:?}");
     assert_eq!([fast[0], fast[1]], [0.0; 2]);
     assert!(slow[2] < 0.02 * fast[2], "{slow:?}");
+}
+
+/// A tone of one and a half sigmas in one of three gyros makes their gap grow by a sixth. A reference that is told to ten times as little may have put
+/// it there: two sigmas of its rate are 1.7 of the gyro's.
+#[test]
+fn energy_matters_if_it_is_more_than_the_reference_errs_by_slowly() {
+    let folder = beside_reference(|t_s| 0.0045 * (TAU * 1.9 * t_s).sin());
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let floor: Vec<Vec<f64>> = problem.sigmas.iter().map(|own| vec![1.0; own.len()]).collect();
+    let quiet = Model::around(&problem, Vec::new());
+    let beside = |attitude_sigma_rad: f64| {
+        let slow = SlowErrors {
+            attitude_sigma_rad,
+            ..subject.slow
+        };
+        let setting = Setting {
+            slow: &slow,
+            ..setting(&subject)
+        };
+        remainder(&problem, &quiet, &floor, &setting)
+    };
+    let [known, unknown] = [0.003, 0.03].map(beside);
+    assert!(
+        known.matters > 0.9 && known.what == "energy above the floor in gz",
+        "{known:?}"
+    );
+    assert!(unknown.matters < 0.1, "{unknown:?}");
 }
 
 /// A gyro that bends by a hundredth at a radian per second is a quarter of its noise and certain; by three quarters of that it is still

@@ -12,8 +12,10 @@
 //! over the fit windows. `S` has two parts. What is fast is an autoregression ([`ORDER`]; Yule and Walker, by Levinson's recursion) of what
 //! is left once calibration is taken out, over its level within some two seconds. It remembers 0.8 s, and what a reference and a room err by
 //! stays alike for some ten. So what is slow stands in `N` beside the calibration: cosines with periods from twice the recording down to
-//! [`SLOW_S`] along the axes of n, in which both stand still, each as large as those of about its frequency were found ([`wander`]). What is random from row to row has a variance and no shape: of it
-//! the ratio is that of the best test of a variance over stretches, `sqrt(sum E^2 / 2n)`, in rows whitened alike.
+//! [`SLOW_S`] along the axes of n, in which both stand still, each as large as those of about its frequency were found ([`wander`]).
+//!
+//! What is random from row to row has a variance and no shape: of it the ratio is that of the best test of a variance over stretches,
+//! `sqrt(sum E^2 / 2n)`, in rows whitened alike.
 //!
 //! How much it matters is told twice: as attitude \[deg\] (a slow force over gravity, a slow field over its horizontal part, a slow rate
 //! over ten seconds of a filter), and as growth of the root mean square of what is left.

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 use packets::channel::{CHANNELS, Quantity};
 
-use super::{Differences, Told, both, in_shape};
+use super::{Differences, Told, both, in_shape, sigma};
 use crate::{
     flight::Instants,
     unit::{axis_b, kind},
@@ -97,12 +97,10 @@ fn slow(channels: &[&(usize, [Differences; 2])]) -> f64 {
     let Some(inverse) = square.try_inverse() else {
         return 0.0;
     };
-    // Sums of S'd of both flights and how many packets, by stretch; a packet that lacks a channel is in none.
+    // By packet: S'd of both flights, and how many channels are in it. One that lacks a channel is left out.
     let mut packets: BTreeMap<u16, ([Vector3<f64>; 2], usize)> = BTreeMap::new();
     for (index, [first, second]) in channels {
-        let quantity = CHANNELS[*index].quantity;
-        let (noise, lsb) = (kind(quantity).noise, quantity.scale().0);
-        let sigma = (noise * noise + lsb * lsb / 12.0).sqrt();
+        let sigma = sigma(CHANNELS[*index].quantity);
         for (one, other) in both(first, second) {
             let (sums, count) = packets.entry(first.rows[one]).or_default();
             sums[0] += axis(*index) * (sigma * first.difference[one]);
@@ -134,43 +132,62 @@ mod tests {
     use super::*;
     use crate::{flight::instants, scene::Record};
 
-    /// All accelerometers of a unit that stands still read `counts` more along x of b every other ten seconds, for 80 s.
-    fn leaning(counts: f64) -> Consequence {
+    /// Of a unit that stands still for 80 s and reads this every other ten seconds, and zeros between.
+    fn of(read: impl Fn(&mut Reading), random: bool) -> Consequence {
         let instants = instants(1).expect("derived frames");
         let still: Record = Arc::new(|_| (UnitQuaternion::identity(), Vector3::zeros()));
         let site = Environment::laboratory();
-        let reading = |counter: u16, size: f64| {
-            let mut reading = Reading::unread(counter);
-            for (plate, axes) in reading.acc_p.iter_mut().enumerate() {
-                let of_axis = twin::geometry::dcm_bp(plate).transpose() * Vector3::new(size, 0.0, 0.0);
-                (axes.iter_mut().zip(of_axis.iter())).for_each(|(code, part)| *code = 16 * (part.round() as i16));
-            }
-            reading
+        let flown = |is_struck: bool| -> Vec<Reading> {
+            let reading = |counter: u16| {
+                let mut reading = Reading::unread(counter);
+                (reading.acc_p, reading.gyro) = ([[0; 3]; 4], [0; 4]);
+                if is_struck && (counter / 50) % 2 == 1 {
+                    read(&mut reading);
+                }
+                reading
+            };
+            (0..400).map(reading).collect()
         };
-        let flown = |size: f64| -> Vec<Reading> {
-            let is_on = |counter: u16| (counter / 50) % 2 == 1;
-            (0..400)
-                .map(|counter| reading(counter, if is_on(counter) { size } else { 0.0 }))
-                .collect()
-        };
-        let (struck, quiet) = (flown(counts), flown(0.0));
+        let (struck, quiet) = (flown(true), flown(false));
         let told = |readings| Told {
             readings,
             record: &still,
             claimed: &site,
         };
         let (struck, quiet) = (told(&struck), told(&quiet));
-        consequence([[&struck, &quiet]; 2], &instants, 80.0, false)
+        consequence([[&struck, &quiet]; 2], &instants, 80.0, random)
     }
 
     #[test]
     fn what_all_accelerometers_have_in_common_for_seconds_turns_the_attitude_and_opens_the_gap() {
-        let lsb = Quantity::SpecificForce.scale().0;
-        let own = leaning(20.0);
+        let counts = 320.0;
+        let leaning = |reading: &mut Reading| {
+            for (plate, axes) in reading.acc_p.iter_mut().enumerate() {
+                let of_axis = twin::geometry::dcm_bp(plate).transpose() * Vector3::new(counts, 0.0, 0.0);
+                (axes.iter_mut().zip(of_axis.iter())).for_each(|(code, part)| *code = part.round() as i16);
+            }
+        };
+        let own = of(leaning, false);
         // Half of the time, one axis of three.
-        let turned = (20.0 * 16.0 * lsb / 9.8 / 6f64.sqrt()).to_degrees();
+        let turned = (counts * Quantity::SpecificForce.scale().0 / 9.8 / 6f64.sqrt()).to_degrees();
         assert!((own.attitude_deg / turned - 1.0).abs() < 0.1, "{own:?} {turned}");
         assert!(own.growth > 1.0, "{own:?}");
-        assert_eq!(leaning(0.0), Consequence::default());
+        assert_eq!(of(|_| (), false), Consequence::default());
+    }
+
+    /// One of four gyros is a part, and its rate counts for ten seconds. As a shape its zero takes up what it may of it; as scatter nothing does.
+    #[test]
+    fn a_gyro_turns_the_attitude_by_what_it_weighs_among_the_others() {
+        let counts = 10.0;
+        let [shape, scatter] = [false, true].map(|random| of(|reading| reading.gyro[0] = counts as i16, random));
+        let rate = counts * Quantity::Rate.scale().0;
+        let axes: [Vector3<f64>; 4] = std::array::from_fn(twin::geometry::gyro_axis_b);
+        let square: Matrix3<f64> = axes.iter().map(|axis| axis * axis.transpose()).sum();
+        let weight = (square.try_inverse().expect("four axes") * axes[0]).norm();
+        let turned = (rate * weight * FILTER_S / 6f64.sqrt()).to_degrees();
+        assert!((shape.attitude_deg / turned - 1.0).abs() < 1e-6, "{shape:?} {turned}");
+        let louder = (1.0 + 0.5 * (rate / sigma(Quantity::Rate)).powi(2)).sqrt() - 1.0;
+        assert!((scatter.growth / louder - 1.0).abs() < 1e-6, "{scatter:?} {louder}");
+        assert!(shape.growth < 0.9 * scatter.growth, "{shape:?} {scatter:?}");
     }
 }
