@@ -13,10 +13,13 @@ use std::{
     time::Duration,
 };
 
-use emems::flight_log::{dump, record};
+use emems::{
+    flight_log::{dump, record},
+    mode::Cause,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::log::frames;
+use crate::log::{self, Log, frames};
 
 /// Seconds of silence after which the line is given up.
 const SILENT_S: u32 = 10;
@@ -27,7 +30,8 @@ const WINDOW: usize = 4096;
 
 /// Pulls the recorder's content over the umbilical into a file
 ///
-/// Interrupted, it goes on where it was when called again with the same file. Damaged pages are asked for again.
+/// Interrupted, it goes on where it was when called again with the same file. Damaged pages are asked for again. At the end
+/// it says which launch rail and site the latest boot took.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ground dump /dev/ttyUSB0 flight.dump\n  ground recover flight.dump > flight.csv")]
 pub struct DumpArguments {
@@ -99,7 +103,37 @@ pub fn run(arguments: &DumpArguments) -> Result<(), DumpError> {
         "{} pages, {} with records, {} of them from before; {} empty or unreadable on the chip",
         pulled.pages, pulled.with_records, pulled.from_before, pulled.without
     );
+    // What was just written; one that cannot be read again is whole all the same.
+    if let Ok(log) = std::fs::read(&arguments.file)
+        .map_err(drop)
+        .and_then(|bytes| log::read(&bytes).map_err(drop))
+    {
+        print!("{}", taken(&log));
+    }
     Ok(())
+}
+
+/// Which launch rail and site the latest boot took at last, a line each, as far as the records that were pulled say.
+fn taken(log: &Log) -> String {
+    let Some(boot) = log.latest_boot() else {
+        return String::new();
+    };
+    let (mut rail, mut site) = (None, None);
+    for change in log.changes_of(boot) {
+        match change.cause {
+            Cause::RailTaken(taken) => rail = Some(taken.to_string()),
+            Cause::SiteTaken(taken) => site = Some(taken.to_string()),
+            _ => {}
+        }
+    }
+    let none = || {
+        format!(
+            "none taken by boot {}, the latest, as far as these pages say",
+            boot.number
+        )
+    };
+    let [rail, site] = [rail, site].map(|taken| taken.unwrap_or_else(none));
+    format!("launch rail: {rail}\nlaunch site: {site}\n")
 }
 
 /// What a dump came to.

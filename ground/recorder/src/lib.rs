@@ -15,6 +15,7 @@
 //! ```
 
 pub mod dump;
+pub mod kept;
 pub mod log;
 pub mod parquet;
 pub mod recover;

@@ -19,6 +19,8 @@ use emems::{
     packet::PACKET_BYTES,
 };
 
+use crate::kept::{InSuperblock, Saves};
+
 /// \[bytes\] the largest file that is read: a K9F1208's image has 69 million, a dump of it 49 million.
 pub const LIMIT: u64 = 128 << 20;
 
@@ -31,10 +33,29 @@ pub struct Log {
     pub headers: BTreeMap<Key, BootHeader>,
     /// Changes of mode.
     pub changes: BTreeMap<Key, Change>,
-    /// The epoch of the newest superblock: older ones were erased by command.
-    pub epoch: Option<u16>,
+    /// What the superblock keeps.
+    pub superblock: InSuperblock,
     /// How good the medium was.
     pub damage: Damage,
+}
+
+/// A start of the unit that wrote to the log; a later one is greater.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Boot {
+    /// How often the log had been erased.
+    pub epoch: u16,
+    /// Its number.
+    pub number: u32,
+}
+
+impl Boot {
+    /// The one that wrote the record of this key.
+    pub fn of(key: &Key) -> Self {
+        Boot {
+            epoch: key.epoch,
+            number: key.boot,
+        }
+    }
 }
 
 /// How good the medium was.
@@ -102,7 +123,7 @@ fn stamp_of(number: usize, bytes: &PageBytes) -> Stamp {
 
 fn read_image(image: &[u8]) -> Result<Log, LogError> {
     let mut log = Log::default();
-    let mut newest = None;
+    let mut saves = Saves::default();
     for (number, bytes) in image.as_chunks::<PAGE_BYTES>().0.iter().enumerate() {
         if page::is_blank(bytes) {
             continue;
@@ -112,6 +133,7 @@ fn read_image(image: &[u8]) -> Result<Log, LogError> {
         log.damage.astray += u64::from(matches!(stamp, Stamp::Astray(..)));
         let mut bytes = *bytes;
         let whole = page::correct(&mut bytes);
+        let mut save = None;
         for (half, wrong) in whole.into_iter().enumerate() {
             let Ok(wrong) = wrong else {
                 log.damage.lost += 1;
@@ -120,12 +142,7 @@ fn read_image(image: &[u8]) -> Result<Log, LogError> {
             log.damage.corrected += u64::from(wrong);
             let bytes = page::record(&bytes, half);
             match superblock::decode(bytes) {
-                Ok(superblock) => {
-                    if newest.is_none_or(|number| number < superblock.number) {
-                        newest = Some(superblock.number);
-                        log.epoch = Some(superblock.epoch);
-                    }
-                }
+                Ok(superblock) => save = save.or(Some(superblock)),
                 Err(superblock::SuperblockError::Newer(version)) => return Err(LogError::Newer(version)),
                 Err(superblock::SuperblockError::Damaged) => {
                     let of_records = !matches!(stamp, Stamp::Ours(tag) if tag.kind != PageKind::Log);
@@ -133,7 +150,10 @@ fn read_image(image: &[u8]) -> Result<Log, LogError> {
                 }
             }
         }
+        let is_tagged = matches!(stamp, Stamp::Ours(tag) if tag.kind == PageKind::Superblock);
+        saves.take(address(number), save, is_tagged);
     }
+    log.superblock = saves.newest().map_or(InSuperblock::Lost, InSuperblock::Save);
     Ok(log)
 }
 
@@ -188,8 +208,10 @@ impl Log {
 
     /// The epoch that counts: the newest superblock's, or the newest record's.
     pub fn newest_epoch(&self) -> Option<u16> {
-        self.epoch
-            .or_else(|| self.packets.last_key_value().map(|(key, _)| key.epoch))
+        match self.superblock {
+            InSuperblock::Save(kept) => Some(kept.epoch),
+            InSuperblock::Dump | InSuperblock::Lost => self.packets.last_key_value().map(|(key, _)| key.epoch),
+        }
     }
 
     /// Its packet records in order: of the epoch that counts, or of all.
@@ -197,6 +219,50 @@ impl Log {
         let newest = self.newest_epoch();
         let counts = move |key: &Key| all_epochs || Some(key.epoch) == newest;
         self.packets.iter().filter(move |(key, _)| counts(key))
+    }
+
+    /// The latest boot that left a record.
+    pub fn latest_boot(&self) -> Option<Boot> {
+        let keys = self
+            .headers
+            .keys()
+            .chain(self.changes.keys())
+            .chain(self.packets.keys());
+        keys.map(Boot::of).max()
+    }
+
+    /// Whether no record of a boot is lost: their numbers follow each other from its header on.
+    pub fn is_whole(&self, boot: Boot) -> bool {
+        let keys = self
+            .headers
+            .keys()
+            .chain(self.changes.keys())
+            .chain(self.packets.keys());
+        let of_boot: BTreeSet<u32> = keys.filter(|key| Boot::of(key) == boot).map(|key| key.seq).collect();
+        let (Some(first), Some(last)) = (of_boot.first(), of_boot.last()) else {
+            return false;
+        };
+        let header = Key {
+            epoch: boot.epoch,
+            boot: boot.number,
+            seq: *first,
+        };
+        self.headers.contains_key(&header) && of_boot.len() as u64 == u64::from(last - first) + 1
+    }
+
+    /// The boot that recorded most of these packets; `None` where none did.
+    pub fn boot_of_packets(&self, packets: &BTreeSet<[u8; PACKET_BYTES]>) -> Option<Boot> {
+        let mut counts: BTreeMap<Boot, usize> = BTreeMap::new();
+        for (key, _) in self.packets.iter().filter(|(_, entry)| packets.contains(&entry.packet)) {
+            *counts.entry(Boot::of(key)).or_default() += 1;
+        }
+        counts.into_iter().max_by_key(|(_, count)| *count).map(|(boot, _)| boot)
+    }
+
+    /// Changes of a boot, in order.
+    pub fn changes_of(&self, boot: Boot) -> impl DoubleEndedIterator<Item = &Change> {
+        let of_boot = self.changes.iter().filter(move |(key, _)| Boot::of(key) == boot);
+        of_boot.map(|(_, change)| change)
     }
 
     /// Stretches of records that are missing within a boot: first and last that is, and when the record before began

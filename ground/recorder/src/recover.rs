@@ -1,6 +1,7 @@
 //! `ground recover`: a raw image or a dump, as tables, with all that is missing.
 //!
-//! In: the file. Out: CSV on standard output or in a file, or Parquet in a file; boots, gaps and damage on standard error.
+//! In: the file. Out: CSV on standard output or in a file, or Parquet in a file; boots, gaps, damage and what is kept for the next start on
+//! standard error.
 //! Refuses a file larger than a chip and a newer format; otherwise whatever is readable is recovered.
 
 use std::{
@@ -32,7 +33,8 @@ const GAPS_LISTED: usize = 100;
 /// Recovers records from a raw NAND image or a dump of the recorder
 ///
 /// Reads every page (528 bytes each) of an image, or every frame of what `ground dump` or an umbilical's recording kept,
-/// corrects what can be corrected, and writes a row for each record. Boots, gaps and damage go to standard error.
+/// corrects what can be corrected, and writes a row for each record. Boots, changes of mode, gaps, damage, and the launch rail and site
+/// that the chip keeps for the next start, go to standard error.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ground recover nand.bin > flight.csv\n  ground recover flight.dump --counts --all-epochs --table all.csv\n  ground recover nand.bin --table flight.parquet"
@@ -49,7 +51,7 @@ pub struct RecoverArguments {
     /// Write the table to FILE instead of standard output; Parquet if it ends in .parquet
     #[arg(long, alias = "out", value_name = "FILE")]
     pub table: Option<PathBuf>,
-    /// Print boots, changes of mode, gaps and damage on standard output as JSON instead; needs --table
+    /// Print boots, changes of mode, gaps, damage, and the launch rail and site kept on standard output as JSON instead; needs --table
     #[arg(long, requires = "table")]
     pub json: bool,
 }
@@ -163,6 +165,7 @@ fn json(log: &Log, all_epochs: bool) -> serde_json::Value {
         "left_out": log.packets.len() - written,
         "boots": boots.collect::<Vec<_>>(),
         "changes": changes.collect::<Vec<_>>(),
+        "kept": log.superblock.json(),
         "gaps": gaps.collect::<Vec<_>>(),
         "damage": {
             "pages_used": damage.used,
@@ -220,7 +223,7 @@ fn write_rows(log: &Log, arguments: &RecoverArguments, rows: &mut dyn Write) -> 
     rows.flush()
 }
 
-/// Boots, gaps and damage, a line each.
+/// Boots, changes, gaps, damage, and what the next start begins with, a line each.
 ///
 /// # Errors
 /// When they cannot be written.
@@ -292,6 +295,9 @@ pub fn write_remarks(log: &Log, all_epochs: bool, remarks: &mut dyn Write) -> io
         "medium     {} pages used, {} bits corrected, {} halves lost, {} pages astray",
         damage.used, damage.corrected, damage.lost, damage.astray
     )?;
+    for line in log.superblock.lines() {
+        writeln!(remarks, "{line}")?;
+    }
     remarks.flush()
 }
 

@@ -171,3 +171,47 @@ fn a_silent_unit_is_given_up() {
     let outcome = pull(&mut Silent, &[], &mut Vec::new(), 0..u32::MAX, |_, _| {});
     assert!(matches!(outcome, Err(DumpError::Silent)));
 }
+
+/// Of the latest boot, and of each the last.
+#[test]
+fn the_rail_and_the_site_that_the_latest_boot_took_are_said() {
+    use emems::{
+        mode::{Change, Mode},
+        rail::Rail,
+        site::Told,
+    };
+    let mut log = Log::default();
+    assert_eq!(taken(&log), "");
+    let rail = |azimuth| {
+        Cause::RailTaken(Rail {
+            azimuth,
+            elevation: 8_500,
+            azimuth_sd: 5,
+            elevation_sd: 3,
+        })
+    };
+    let site = Cause::SiteTaken(Told::of_bytes([
+        0x26, 0x34, 0xFF, 0x18, 0xF7, 0xDD, 0xFC, 0x84, 2, 0x0A, 0x40, 15, 0,
+    ]));
+    let mut note = |boot, seq, cause| {
+        let change = Change {
+            at_us: 0,
+            mode: Mode::Wait,
+            recording: false,
+            cause,
+        };
+        log.changes.insert(Key { epoch: 0, boot, seq }, change);
+    };
+    note(1, 1, site);
+    note(2, 1, rail(100));
+    note(2, 2, rail(200));
+    let said = taken(&log);
+    assert!(
+        said.starts_with("launch rail: azimuth 2.00 elevation 85.00 sigma 0.5 0.3 deg\n"),
+        "{said}"
+    );
+    assert!(
+        said.ends_with("launch site: none taken by boot 2, the latest, as far as these pages say\n"),
+        "{said}"
+    );
+}

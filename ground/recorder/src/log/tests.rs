@@ -51,7 +51,11 @@ fn an_image_gives_every_record_once_and_no_gap() {
     assert!(is_image(&image));
     let log = read(&image).expect("an image");
     assert_eq!(counters(&log), (0..50).collect::<Vec<_>>());
-    assert_eq!((log.headers.len(), log.epoch, log.gaps()), (3, Some(0), vec![]));
+    assert_eq!(
+        (log.headers.len(), log.newest_epoch(), log.gaps()),
+        (3, Some(0), vec![])
+    );
+    assert!(matches!(log.superblock, InSuperblock::Save(_)), "{:?}", log.superblock);
     assert_eq!(log.damage.lost, 0);
 }
 
