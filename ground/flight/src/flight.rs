@@ -155,7 +155,7 @@ pub fn fly_until(
     let transit = prepared
         .as_mut()
         .map(|prepared| std::mem::take(&mut prepared.scene.transit));
-    let words = words::before(arguments, &source);
+    let words::Briefing { words, rows: told } = words::before(arguments, &source);
     let (path, digest, interrupt) = (
         folder.path().to_owned(),
         Digest::at(&words::site(&source.site)),
@@ -182,7 +182,7 @@ pub fn fly_until(
         &source,
         duration,
         seen,
-        [remarks, vec![case]].concat(),
+        [told, remarks, vec![case]].concat(),
         truth,
     )?;
     trouble.map_or(Ok(landed), |trouble| Err(trouble.into()))

@@ -1,11 +1,15 @@
-//! Where a recorded motion took place, as asked for on the command line.
+//! Where a recorded motion took place, and what a launch crew there tells the unit of it.
 //!
-//! In: gravity, latitude, field and temperature, each or none. Out: an [`Environment`]; what is not named is the
-//! laboratory's. Refuses what no place on Earth has: a typing error would otherwise fly as a strange unit.
+//! In: gravity, latitude, field and temperature, each or none, of the command line and of the case beside the motion. Out: an
+//! [`Environment`]; what neither names is the laboratory's. And the [`Site`] that a crew with a model of that field tells ([`told`]).
+//! Refuses what no place on Earth has: a typing error would otherwise fly as a strange unit.
 
 use std::ops::RangeInclusive;
 
+use emems::site::{self, Launch, Site};
 use twin::environment::Environment;
+
+use crate::case::text::PlaceBeside;
 
 /// [m/s2] none in free fall, and no more than anywhere on Earth by far.
 const GRAVITY: RangeInclusive<f64> = 0.0..=10.0;
@@ -18,7 +22,9 @@ const TEMPERATURE: RangeInclusive<f64> = -40.0..=85.0;
 
 /// The place of a recorded motion.
 #[derive(Clone, Debug, Default, clap::Args)]
-#[command(next_help_heading = "Where a --motion-file took place [default: the laboratory]")]
+#[command(
+    next_help_heading = "Where a --motion-file took place [default: as the case.toml beside it says, else the laboratory]"
+)]
 pub struct SiteArguments {
     /// Latitude, north positive [default: -23.2111]
     #[arg(long, value_name = "DEG", requires = "motion_file", conflicts_with_all = ["motion", "recording"], allow_negative_numbers = true,
@@ -37,32 +43,65 @@ pub struct SiteArguments {
 }
 
 impl SiteArguments {
-    /// The place.
-    pub fn environment(&self) -> Environment {
+    /// The place of a motion with this said beside it.
+    pub fn environment(&self, beside: &PlaceBeside) -> Environment {
         let laboratory = Environment::laboratory();
+        let latitude_deg = self.latitude_deg.or(beside.latitude_deg);
+        let field_n_ut = self.field_n_ut.or(beside.field_n_ut);
+        let temperature_c = self.temperature_c.or(beside.temperature_c);
         Environment {
-            gravity: self.gravity_m_s2.unwrap_or(laboratory.gravity),
-            latitude: self.latitude_deg.map_or(laboratory.latitude, f64::to_radians),
-            field_n_ut: self.field_n_ut.map_or(laboratory.field_n_ut, Into::into),
-            temperature_c: self.temperature_c.unwrap_or(laboratory.temperature_c),
+            gravity: self.gravity_m_s2.or(beside.gravity_m_s2).unwrap_or(laboratory.gravity),
+            latitude: latitude_deg.map_or(laboratory.latitude, f64::to_radians),
+            field_n_ut: field_n_ut.map_or(laboratory.field_n_ut, Into::into),
+            temperature_c: temperature_c.unwrap_or(laboratory.temperature_c),
         }
     }
+}
 
-    /// The place in words.
-    pub fn about(&self) -> String {
-        let Environment {
-            gravity,
-            latitude,
-            field_n_ut: field,
-            temperature_c,
-        } = self.environment();
-        format!(
-            "{:.4}° N, {gravity} m/s², field {}, {}, {} µT north, east, down, {temperature_c} °C",
-            latitude.to_degrees(),
-            field.x,
-            field.y,
-            field.z
-        )
+/// A place in words.
+pub fn about(environment: &Environment) -> String {
+    let Environment {
+        gravity,
+        latitude,
+        field_n_ut: field,
+        temperature_c,
+    } = environment;
+    format!(
+        "{:.4}° N, {gravity} m/s², field {}, {}, {} µT north, east, down, {temperature_c} °C",
+        latitude.to_degrees(),
+        field.x,
+        field.y,
+        field.z
+    )
+}
+
+/// What a crew with a model of the field tells the unit of a place, with the sigmas of Alcantara's crew. The laboratory is compiled in,
+/// and not told.
+///
+/// # Errors
+/// Why such a place cannot be told: the unit would refuse the word.
+pub fn told(environment: &Environment) -> Result<Site, &'static str> {
+    let (here, laboratory) = (of(environment), of(&Environment::laboratory()));
+    let here_told = site::Told::of(&here).unwrap_or_default();
+    if Some(here_told) == site::Told::of(&laboratory) {
+        return Ok(Site::LABORATORY);
+    }
+    here_told.fault().map_or(Ok(here), Err)
+}
+
+fn of(environment: &Environment) -> Site {
+    let field = &environment.field_n_ut;
+    let across = field.x.hypot(field.y);
+    let crew = Site::ALCANTARA.launch;
+    Site {
+        gravity: environment.gravity as f32,
+        latitude_deg: environment.latitude.to_degrees() as f32,
+        declination_deg: field.y.atan2(field.x).to_degrees() as f32,
+        launch: crew.map(|crew| Launch {
+            norm_ut: field.norm() as f32,
+            dip_deg: field.z.atan2(across).to_degrees() as f32,
+            ..crew
+        }),
     }
 }
 
@@ -80,7 +119,11 @@ fn number(text: &str, allowed: RangeInclusive<f64>) -> Result<f64, String> {
     }
 }
 
-fn field(text: &str) -> Result<[f64; 3], String> {
+/// A magnetic field \[uT\] of a command line: north, east, down, with commas between.
+///
+/// # Errors
+/// When it is not three numbers, or none of a field on Earth.
+pub fn field(text: &str) -> Result<[f64; 3], String> {
     let axes = text
         .split(',')
         .map(|axis| number(axis, FIELD))
@@ -94,17 +137,56 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_named_is_the_laboratorys() {
-        assert_eq!(SiteArguments::default().environment(), Environment::laboratory());
-        let place = SiteArguments {
+    fn what_is_not_named_is_the_cases_and_else_the_laboratorys() {
+        let nowhere = PlaceBeside::default();
+        assert_eq!(
+            SiteArguments::default().environment(&nowhere),
+            Environment::laboratory()
+        );
+        let asked = SiteArguments {
             latitude_deg: Some(-2.3733),
             field_n_ut: Some([26.0, -9.0, -5.5]),
             ..SiteArguments::default()
         };
-        let environment = place.environment();
+        let environment = asked.environment(&nowhere);
         assert_eq!(environment.gravity, Environment::laboratory().gravity);
         assert_eq!(environment.latitude, (-2.3733_f64).to_radians());
         assert_eq!(environment.field_n_ut.as_slice(), [26.0, -9.0, -5.5]);
+        let beside = PlaceBeside {
+            gravity_m_s2: Some(9.81),
+            latitude_deg: Some(50.0),
+            field_n_ut: Some([20.0, 1.0, 44.0]),
+            temperature_c: Some(5.0),
+        };
+        let both = asked.environment(&beside);
+        assert_eq!(
+            (both.gravity, both.latitude, both.temperature_c),
+            (9.81, environment.latitude, 5.0)
+        );
+        assert_eq!(both.field_n_ut, environment.field_n_ut);
+    }
+
+    /// What is told of Alcantara's environment is the site that the rocket's crew tells.
+    #[test]
+    fn a_place_is_told_as_its_crew_would_and_the_laboratory_is_not() {
+        assert_eq!(told(&Environment::laboratory()), Ok(Site::LABORATORY));
+        let alcantara = told(&Environment::alcantara()).expect("can be told");
+        assert_eq!(site::Told::of(&alcantara), site::Told::of(&Site::ALCANTARA));
+        let environment = |change: fn(&mut Environment)| {
+            let mut environment = Environment::alcantara();
+            change(&mut environment);
+            environment
+        };
+        for (elsewhere, why) in [
+            (environment(|place| place.gravity = 0.0), "gravity"),
+            (environment(|place| place.field_n_ut *= 0.1), "field is not"),
+            (environment(|place| place.field_n_ut = [0.0, 1.0, 60.0].into()), "dip"),
+        ] {
+            assert!(
+                told(&elsewhere).is_err_and(|fault| fault.contains(why)),
+                "{elsewhere:?}"
+            );
+        }
     }
 
     #[test]

@@ -23,7 +23,11 @@ use twin::{
     truth::{Truth, TruthSource},
 };
 
-use crate::{case::text, plan::FlyArguments};
+use crate::{
+    case::text,
+    plan::FlyArguments,
+    site::{self, SiteArguments},
+};
 
 /// Flown when nothing is named.
 const DEFAULT_MOTION: &str = "rocket";
@@ -48,6 +52,8 @@ pub struct Source {
     pub truth: Arc<dyn TruthSource>,
     /// Where a launch crew tells the unit that it is; one without a known field is not told, but compiled in.
     pub site: Site,
+    /// Why the unit is not told where a recorded motion was, and what to do about it.
+    pub untold: Option<String>,
     /// Motion and place apart; a recording of sensors has none.
     pub world: Option<AnyWorld>,
 }
@@ -60,9 +66,14 @@ impl Source {
             truth: Arc::new(world.clone()),
             world: Some(world),
             site,
+            untold: None,
         }
     }
 }
+
+/// Of a recorded motion that was in the laboratory, or where nobody says.
+const IN_LABORATORY: &str =
+    "the laboratory's, which is compiled in; --latitude-deg, --gravity-m-s2 and --field-n-ut tell the unit of another";
 
 /// Why there is nothing to fly.
 #[derive(Debug, thiserror::Error)]
@@ -94,27 +105,43 @@ pub fn open(arguments: &FlyArguments) -> Result<Source, SourceError> {
             about: format!("recording of a real unit, {}", file_name(path)),
             truth: Arc::new(recording(path, &arguments.units)?),
             site: Site::LABORATORY,
+            untold: None,
             world: None,
         }),
-        (_, Some(path)) => Ok(Source::of(
-            stem(path),
-            format!("recorded motion, {}, at {}", file_name(path), arguments.site.about()),
-            World {
-                motion: Arc::new(recorded(path)?),
-                environment: arguments.site.environment(),
-            },
-            Site::LABORATORY,
-        )),
+        (_, Some(path)) => Ok(of_file(path, &arguments.site)?),
         _ => by_name(arguments.motion.as_deref().unwrap_or(DEFAULT_MOTION)),
     }
 }
 
-/// The motion of a file. One whose case says that it is the record of an instrument that errs is smoothed as the diagnosis smooths
-/// it: differentiated as it is, a camera's noise would shake the unit.
-fn recorded(path: &Path) -> Result<Recorded, FileError> {
+/// The motion of a file, at the place that was named, or that the case beside it says. One whose case says that it is the record of an
+/// instrument that errs is smoothed as the diagnosis smooths it: differentiated as it is, a camera's noise would shake the unit.
+fn of_file(path: &Path, asked: &SiteArguments) -> Result<Source, FileError> {
     let record = Recorded::open(path)?;
-    let sigma_rad = text::reference_of(path);
-    Ok(if sigma_rad > 0.0 { record.used() } else { record })
+    let beside = text::beside(path);
+    let motion = match beside.reference.attitude_sigma_rad > 0.0 {
+        true => record.used(),
+        false => record,
+    };
+    let environment = asked.environment(&beside.environment);
+    let (site, untold) = match site::told(&environment) {
+        Ok(Site::LABORATORY) => (Site::LABORATORY, Some(IN_LABORATORY.into())),
+        Ok(site) => (site, None),
+        Err(fault) => (
+            Site::LABORATORY,
+            Some(format!(
+                "not told, since {fault}; the unit estimates at the laboratory's, which is compiled in"
+            )),
+        ),
+    };
+    let about = format!("recorded motion, {}, at {}", file_name(path), site::about(&environment));
+    let world = World {
+        motion: Arc::new(motion) as Arc<dyn motion::Motion>,
+        environment,
+    };
+    Ok(Source {
+        untold,
+        ..Source::of(stem(path), about, world, site)
+    })
 }
 
 /// A recording whose numbers can be in their units, or are in those that were said.

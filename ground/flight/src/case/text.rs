@@ -1,7 +1,7 @@
 //! The text of `case.toml`, after the case format.
 //!
 //! In: what was flown or logged, the place, how well the reference knows, the windows. Out: the file's text. Of a case that is there
-//! already only one thing is read: how well its reference knows ([`reference_of`]).
+//! already two things are read: where its motion was, and how well its reference knows it ([`beside`]).
 
 use std::{
     fmt::Write,
@@ -97,23 +97,50 @@ fn spans(spans: &[[f64; 2]]) -> String {
     format!("[{}]", pairs.join(", "))
 }
 
-/// \[rad\] what the case beside a motion states of its attitude; 0 where that is exact, or no case beside it has this motion.
-pub fn reference_of(motion: &Path) -> f64 {
-    #[derive(Default, Deserialize)]
-    struct Reference {
-        #[serde(default)]
-        attitude_sigma_rad: f64,
-    }
+/// What the case beside a motion says of it.
+#[derive(Debug, Default, Deserialize)]
+pub struct CaseBeside {
+    /// How well its attitude is known.
+    #[serde(default)]
+    pub reference: ReferenceBeside,
+    /// Where it was.
+    #[serde(default)]
+    pub environment: PlaceBeside,
+}
+
+/// How well a motion is known.
+#[derive(Debug, Default, Deserialize)]
+pub struct ReferenceBeside {
+    /// \[rad\] of its attitude; 0 where that is exact.
+    #[serde(default)]
+    pub attitude_sigma_rad: f64,
+}
+
+/// Where a motion was, as far as that is said.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+pub struct PlaceBeside {
+    /// [m/s2]
+    pub gravity_m_s2: Option<f64>,
+    /// \[deg\] north positive.
+    pub latitude_deg: Option<f64>,
+    /// \[uT\] north, east, down.
+    pub field_n_ut: Option<[f64; 3]>,
+    /// \[degC\]
+    pub temperature_c: Option<f64>,
+}
+
+/// What the case beside a motion says; nothing where no case beside it has this motion.
+pub fn beside(motion: &Path) -> CaseBeside {
     #[derive(Deserialize)]
     struct Case {
         motion: PathBuf,
-        #[serde(default)]
-        reference: Reference,
+        #[serde(flatten)]
+        beside: CaseBeside,
     }
     let text = fs::read_to_string(motion.with_file_name(CASE)).unwrap_or_default();
     match toml::from_str::<Case>(&text) {
-        Ok(case) if case.motion.file_name() == motion.file_name() => case.reference.attitude_sigma_rad,
-        _ => 0.0,
+        Ok(case) if case.motion.file_name() == motion.file_name() => case.beside,
+        _ => CaseBeside::default(),
     }
 }
 
@@ -122,11 +149,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_motion_is_as_good_as_the_case_beside_it_says() {
+    fn a_motion_is_where_and_as_good_as_the_case_beside_it_says() {
         let place = tempfile::tempdir().expect("temporary folder");
         let motion = place.path().join(MOTION);
-        assert_eq!(reference_of(&motion), 0.0, "no case");
-        let environment = Environment::laboratory();
+        let sigma_rad = |motion: &Path| beside(motion).reference.attitude_sigma_rad;
+        assert_eq!(sigma_rad(&motion), 0.0, "no case");
+        let environment = Environment::alcantara();
         let windows = Parted {
             fit: vec![[0.0, 1.0]],
             hold: vec![[1.0, 2.0]],
@@ -142,7 +170,19 @@ mod tests {
             windows: &windows,
         };
         fs::write(place.path().join(CASE), text.toml()).expect("case");
-        assert_eq!(reference_of(&motion), 2e-4);
-        assert_eq!(reference_of(&place.path().join("other.csv")), 0.0, "another motion");
+        assert_eq!(sigma_rad(&motion), 2e-4);
+        let PlaceBeside {
+            gravity_m_s2,
+            latitude_deg,
+            field_n_ut,
+            temperature_c,
+        } = beside(&motion).environment;
+        assert_eq!(
+            (gravity_m_s2, latitude_deg, field_n_ut, temperature_c),
+            (Some(9.7804), Some(-2.32), Some([24.23, -9.22, -4.07]), Some(30.0))
+        );
+        let other = place.path().join("other.csv");
+        assert_eq!(sigma_rad(&other), 0.0, "another motion");
+        assert!(beside(&other).environment.gravity_m_s2.is_none());
     }
 }
