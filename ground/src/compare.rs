@@ -17,7 +17,7 @@ use logs::{
     record::Record,
     recording::{RecordingError, Row},
 };
-use packets::{input, output, stream::Bytes5To8};
+use packets::{input, output};
 
 use crate::decode::cycle::{Contradicted, Cycle};
 
@@ -125,7 +125,7 @@ fn read(path: &Path) -> Result<Flown, CompareError> {
         source,
     };
     let mut bytes = input::open(&file).map_err(failed)?;
-    let mut digest = Digest::new(Bytes5To8::Errors, packets::stream::sequence::CYCLE_S);
+    let mut digest = Digest::default();
     let mut cycle = Cycle::new(None);
     let mut piece = [0; 65_536];
     loop {

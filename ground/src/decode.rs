@@ -2,8 +2,8 @@
 //!
 //! In: a file of packets, however damaged, or a raw image of the NAND, gzip or not, or standard input. Out: CSV on standard
 //! output, gaps and rejected bytes on standard error; or with `--out` a folder with everything. An image is told by its
-//! first [`HEAD`] bytes, where superblock and log begin. Memory does not grow with a stream; an image is bounded by the
-//! largest chip.
+//! first [`HEAD`] bytes, where superblock and log begin. The attitude of a page is estimated at the launch site that the flight log says.
+//! Memory does not grow with a stream; an image is bounded by the largest chip.
 
 pub(crate) mod cycle;
 mod image;
@@ -15,7 +15,12 @@ use std::{
     time::Duration,
 };
 
-use emems::nand::PAGE_BYTES;
+use attitude::told::{self, NothingTold};
+use emems::{
+    nand::PAGE_BYTES,
+    site::{self, Site},
+    unit::Settings,
+};
 use logs::{
     digest::{Digest, Entry},
     folder::{self, Folder, FolderError},
@@ -41,10 +46,11 @@ const HEAD: u64 = 1 << 20;
 /// one is decoded, the rest is reported by offset, length and reason on standard error. Values are SI with nominal scale
 /// (m/s2, uT, rad/s, degC); a value that was not read is an empty cell, and so is one in SI that no part can give; time is
 /// counter times cycle, which derived frames say themselves. A raw image of the
-/// recorder's NAND (528 bytes a page) is recognised and gives its newest epoch's records; `recover` gives the others.
+/// recorder's NAND (528 bytes a page) is recognised and gives its newest epoch's records; `recover` gives the others. The
+/// attitude on the page is at the launch site that an image says, or else the --flight-log.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded\n  ground decode nand.bin --out decoded"
+    after_help = "Examples:\n  ground decode umbilical.log > flight.csv\n  ground decode flight.txt.gz --out decoded\n  ground decode nand.bin --out decoded\n  ground decode flight.dump --out decoded --flight-log flight.dump"
 )]
 pub struct DecodeArguments {
     /// File of packets, gzip or not; - for standard input
@@ -59,6 +65,10 @@ pub struct DecodeArguments {
     /// Print the summary as JSON
     #[arg(long, requires = "out")]
     pub json: bool,
+    /// The unit's flight log, image or dump, which says at which launch site the page's attitude is; of an image it is its own [default: the
+    /// site that is compiled in]
+    #[arg(long, value_name = "FILE", requires = "out")]
+    pub flight_log: Option<PathBuf>,
     /// Bytes 5 to 8 are a CRC-16 (streams after Table A.2), not the error identifier
     #[arg(long)]
     pub crc: bool,
@@ -88,6 +98,9 @@ pub enum DecodeError {
         /// Why.
         source: LogError,
     },
+    /// The flight log cannot be used.
+    #[error(transparent)]
+    FlightLog(#[from] NothingTold),
     /// There is no packet in it.
     #[error("{path}: not one packet in it: {looks}")]
     NoPackets {
@@ -145,9 +158,11 @@ pub fn decode(arguments: &DecodeArguments) -> Result<(), DecodeError> {
             Some(parent) => image::to_folder(&log, &name(arguments), parent, arguments.json),
         };
     }
+    let told = arguments.flight_log.as_deref().map(told::open).transpose()?;
+    let site = told.as_ref().and_then(told::site);
     let any = match &arguments.out {
         None => to_text(arguments, input.after(head), stdout, stderr)?,
-        Some(parent) => to_folder(arguments, input.after(head), parent)?,
+        Some(parent) => to_folder(arguments, site, input.after(head), parent)?,
     };
     if any { Ok(()) } else { Err(no_packets()) }
 }
@@ -164,10 +179,23 @@ fn stem(name: &str) -> &str {
     name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("log")
 }
 
-fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str, json: bool) -> Result<(), DecodeError> {
+/// Where the unit was: as it was told, or else at the site that is compiled in.
+fn place(told: Option<site::Told>) -> Site {
+    let compiled_in = Settings::NOMINAL.site;
+    told.map_or(compiled_in, |told| told.site(&compiled_in))
+}
+
+fn finish(
+    mut folder: Folder,
+    digest: Digest,
+    told: Option<site::Told>,
+    [stem, name]: [&str; 2],
+    json: bool,
+) -> Result<(), DecodeError> {
     let (rest, record) = digest.finish();
     folder.entries(&rest)?;
-    let rows = record.summary.rows();
+    let mut rows = record.summary.rows();
+    rows.extend(told.map(|told| ("launch site", told.to_string())));
     let path = folder.finish(stem, &format!("decoded from {name}"), &rows, &record, None)?;
     let page = path.join("index.html");
     if json {
@@ -187,12 +215,13 @@ fn finish(mut folder: Folder, digest: Digest, stem: &str, name: &str, json: bool
 #[allow(clippy::type_complexity)] // A pair of what was found and what went wrong at last.
 fn stream(
     arguments: &DecodeArguments,
+    site: Option<site::Told>,
     input: Input,
     mut put: impl FnMut(f64, &[Entry]) -> Result<(), DecodeError>,
 ) -> Result<(Cycle, Digest, Option<DecodeError>), DecodeError> {
     let told_s = arguments.cycle.map(|cycle| cycle.as_secs_f64());
     let mut digest = match arguments.out {
-        Some(_) => Digest::new(bytes_5_to_8(arguments), told_s.unwrap_or(CYCLE_S)),
+        Some(_) => Digest::new(bytes_5_to_8(arguments), told_s.unwrap_or(CYCLE_S), &place(site)),
         None => Digest::summing(bytes_5_to_8(arguments)),
     };
     let mut cycle = Cycle::new(told_s);
@@ -259,7 +288,7 @@ fn to_text(
         }
         Ok(())
     };
-    let (cycle, digest, broken) = stream(arguments, input, &mut put)?;
+    let (cycle, digest, broken) = stream(arguments, None, input, &mut put)?;
     if !cycle.any() {
         return Ok(false);
     }
@@ -272,10 +301,15 @@ fn to_text(
 }
 
 /// A folder; none without a packet, and whether there was one.
-fn to_folder(arguments: &DecodeArguments, input: Input, parent: &Path) -> Result<bool, DecodeError> {
+fn to_folder(
+    arguments: &DecodeArguments,
+    site: Option<site::Told>,
+    input: Input,
+    parent: &Path,
+) -> Result<bool, DecodeError> {
     let name = name(arguments);
     let mut made: Option<Folder> = None;
-    let (_, digest, broken) = stream(arguments, input, |cycle_s, entries| {
+    let (_, digest, broken) = stream(arguments, site, input, |cycle_s, entries| {
         let folder = match &mut made {
             Some(folder) => folder,
             none => none.insert(Folder::create(parent, stem(&name), cycle_s)?),
@@ -283,7 +317,7 @@ fn to_folder(arguments: &DecodeArguments, input: Input, parent: &Path) -> Result
         Ok(folder.entries(entries)?)
     })?;
     let Some(folder) = made else { return Ok(false) };
-    finish(folder, digest, stem(&name), &name, arguments.json)?;
+    finish(folder, digest, site, [stem(&name), &name], arguments.json)?;
     broken.map_or(Ok(true), Err)
 }
 
@@ -318,6 +352,7 @@ mod tests {
             counts: true,
             out: None,
             json: false,
+            flight_log: None,
             crc: false,
             cycle: None,
         }

@@ -15,7 +15,7 @@ use emems::{kalman::Params, sample::Reading, unit::Settings};
 use indicatif::ProgressBar;
 use logs::{
     cycles::{Cycle, Cycles},
-    flight::{Comparison, Flight},
+    flight::{Comparison, Flight, Taken, Told},
     plausible::{self, Implausible},
     plot,
     recording::{self, RecordingError},
@@ -60,7 +60,7 @@ pub struct AttitudeArguments {
     /// Seconds to add to the reference's times to have the log's [default: 0]
     #[arg(long, value_name = "SECONDS", requires = "reference", allow_hyphen_values = true)]
     pub offset_s: Option<f64>,
-    /// The unit's flight log, image or dump: launch rails and sites that its estimation took at its latest start are taken from it
+    /// The unit's flight log, image or dump: launch rails and sites that its estimation took in this flight are taken from it
     #[arg(long, value_name = "FILE", requires = "log")]
     pub flight_log: Option<PathBuf>,
     #[command(flatten)]
@@ -268,10 +268,10 @@ fn of_unit(
     for file in &arguments.sets {
         sets.push(methods::read(file, &settings)?);
     }
-    let told = match &arguments.flight_log {
-        Some(file) => told::read(file)?,
-        None => Vec::new(),
-    };
+    let flight_log = arguments.flight_log.as_deref().map(told::open).transpose()?;
+    let readings = || cycles.iter().map(|cycle| cycle.sample.reading);
+    let of_these = |log| told::of(log, told::boot(log, readings()));
+    let told = flight_log.as_ref().map(of_these).unwrap_or_default();
     let count = sets.len() * cycles.len();
     let began = Instant::now();
     let mut runs = methods::run(sets, &settings, cycles, &told, reference);
@@ -297,6 +297,16 @@ fn of_unit(
     }
     let Some(last) = runs.pop() else { return Ok(None) };
     say(format!("looked at closer            {}\n", last.name));
+    for Taken { at_us, told } in &told {
+        let (name, text) = match told {
+            Told::Rail(rail) => ("launch rail", rail.to_string()),
+            Told::Site(site) => ("launch site", site.to_string()),
+        };
+        say(format!("{name:<28}{text}, taken at {:.3} s\n", 1e-6 * *at_us as f64));
+    }
+    if let Some(site) = flight_log.as_ref().and_then(told::untaken) {
+        say(format!("launch site, not taken      {site}: kept for the next start\n"));
+    }
     let [taken, left] = last.flight.rails;
     if taken + left > 0 {
         say(format!("launch rails                {taken} taken, {left} not\n"));

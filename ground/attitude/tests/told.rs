@@ -25,7 +25,8 @@ fn the_attitude_is_the_units_with_the_site_and_the_rails_of_its_flight_log() {
         .say(15 * S, b"G_MGG_MG");
     let flown = flight.fly(20 * S);
     let image = flown.nand.as_ref().expect("a chip").image();
-    let taken = told::of(&recorder::log::read(&image).expect("a log"));
+    let log = recorder::log::read(&image).expect("a log");
+    let taken = told::of(&log, told::boot(&log, flown.packets.iter().map(|(_, packet)| *packet)));
     let kinds: Vec<bool> = (taken.iter().map(|taken| matches!(taken.told, Told::Site(_)))).collect();
     assert_eq!(kinds, [true, false, false], "{taken:?}");
     let cycles: Vec<Cycle> = (flown.derived.iter())
@@ -64,7 +65,7 @@ fn the_attitude_is_the_units_with_the_site_and_the_rails_of_its_flight_log() {
 fn a_file_without_a_record_is_no_flight_log() {
     let path = std::env::temp_dir().join("emems-attitude-no-flight-log");
     std::fs::write(&path, "t_s,gyr_x\n").expect("a file");
-    let refused = told::read(&path);
+    let refused = told::open(&path);
     std::fs::remove_file(&path).expect("the file");
     assert!(matches!(refused, Err(NothingTold::Nothing(_))), "{refused:?}");
 }

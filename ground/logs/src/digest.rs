@@ -49,18 +49,18 @@ pub struct Digest {
 }
 
 impl Digest {
-    /// At the start of a stream of a unit with this cycle \[s\].
-    pub fn new(bytes_5_to_8: Bytes5To8, cycle_s: f64) -> Self {
+    /// At the start of a stream of a unit with this cycle \[s\], at a site.
+    pub fn new(bytes_5_to_8: Bytes5To8, cycle_s: f64, site: &Site) -> Self {
         Digest {
             decoder: Decoder::new(bytes_5_to_8),
-            record: Record::new(cycle_s, &Settings::NOMINAL.site),
+            record: Record::new(cycle_s, site),
             ..Digest::default()
         }
     }
 
     /// At the start of a stream of which no page is wanted: nobody's attitude is estimated.
     pub fn summing(bytes_5_to_8: Bytes5To8) -> Self {
-        let mut digest = Digest::new(bytes_5_to_8, CYCLE_S);
+        let mut digest = Digest::new(bytes_5_to_8, CYCLE_S, &Settings::NOMINAL.site);
         digest.record.attitude = None;
         digest
     }

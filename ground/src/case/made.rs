@@ -1,6 +1,7 @@
 //! `ground case new`: a real unit's log and its reference, made a gap case.
 //!
-//! In: a log (packets, or CSV in SI with a column a channel), a reference's record, perhaps a unit's description and a calibration set.
+//! In: a log (packets, or CSV in SI with a column a channel), a reference's record, perhaps a unit's description, a calibration set, and a
+//! flight log that says which launch site the unit was told.
 //! Out: a folder as [`super`] has it, and in words what was found out: formats, units, which way the reference counts, the
 //! offset of the clocks with its sigma, place and windows. In order:
 //!
@@ -19,9 +20,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use flight::case::{
-    text::{CASE, MOTION, Text, UNIT},
-    windows::{self, TooShort},
+use attitude::told::NothingTold;
+use flight::{
+    case::{
+        text::{CASE, MOTION, Text, UNIT},
+        windows::{self, TooShort},
+    },
+    site::field,
 };
 use gap::{
     input::case::{Kind as LogKind, Subject, read_bytes, read_measured},
@@ -32,7 +37,7 @@ use twin::{motion::Recorded, predict::Kind};
 use super::{
     clock::{self, ClockError},
     described::{columns, format_of, unit},
-    place::{check_units, environment, settled},
+    place::{MODEL_SIGMA_UT, check_units, environment, settled, site_told},
     reference::{Axes, Refused, Told},
 };
 
@@ -45,7 +50,7 @@ const REFERENCE: [f64; 2] = [1e-3, 1e-3];
 /// Makes a gap case of a real unit's log and its reference
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ground case new --log umbilical.txt --reference mocap.csv --set set.toml --latitude-deg -23.2 --out flight-7\n  ground case check flight-7"
+    after_help = "Examples:\n  ground case new --log umbilical.txt --reference mocap.csv --set set.toml --latitude-deg -23.2 --out flight-7\n  ground case new --log umbilical.txt --reference radar.csv --flight-log nand.bin --out flight-8\n  ground case check flight-7"
 )]
 pub struct NewCaseArguments {
     /// What the unit sent: packets as the console kept them or `recover` gave them, or CSV with t_s and a column a channel in SI
@@ -66,6 +71,9 @@ pub struct NewCaseArguments {
     /// How well the reference knows attitudes (rad); 0 for exact
     #[arg(long, value_name = "RAD", default_value_t = REFERENCE[0])]
     pub attitude_sigma_rad: f64,
+    /// The unit's flight log, image or dump: gravity, latitude and field of the launch site that the unit was told, where they are not given
+    #[arg(long, value_name = "FILE")]
+    pub flight_log: Option<PathBuf>,
     /// Latitude, north positive
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     pub latitude_deg: Option<f64>,
@@ -73,14 +81,8 @@ pub struct NewCaseArguments {
     #[arg(long, value_name = "M/S2")]
     pub gravity_m_s2: Option<f64>,
     /// Magnetic field north, east, down in microtesla [default: from the magnetometers]
-    #[arg(
-        long,
-        value_name = "N,E,D",
-        allow_hyphen_values = true,
-        value_delimiter = ',',
-        num_args = 3
-    )]
-    pub field_n_ut: Option<Vec<f64>>,
+    #[arg(long, value_name = "N,E,D", allow_hyphen_values = true, value_parser = field)]
+    pub field_n_ut: Option<[f64; 3]>,
     /// Folder of the case; must not exist
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -109,6 +111,9 @@ pub enum MadeError {
         /// Why.
         why: bench::set::SetError,
     },
+    /// The flight log.
+    #[error(transparent)]
+    FlightLog(#[from] NothingTold),
     /// The clocks.
     #[error(transparent)]
     Clock(#[from] ClockError),
@@ -144,6 +149,7 @@ pub fn made(arguments: &NewCaseArguments) -> Result<String, MadeError> {
 
 fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
     let mut said = Vec::new();
+    let site = site_told(arguments)?;
     let bytes = read_bytes(&arguments.log)?;
     let log_name = arguments.log.display().to_string();
     let (kind, slots) = format_of(&bytes, &log_name)?;
@@ -187,7 +193,7 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
             "body to navigation"
         }
     ));
-    let environment = environment(arguments, &place, &mut said)?;
+    let environment = environment(arguments, site.as_ref(), &place, &mut said)?;
     put(&arguments.out.join(UNIT), unit.text().as_bytes())?;
     let case = |told: &Told, offset_s: f64| -> Result<Subject, MadeError> {
         put(
@@ -208,10 +214,10 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
             about: "",
             measured,
             environment: &environment,
-            field_sigma_ut: if arguments.field_n_ut.is_some() {
-                0.3
-            } else {
-                place.field_sigma_ut
+            field_sigma_ut: match (&arguments.field_n_ut, &site) {
+                (Some(_), _) => MODEL_SIGMA_UT,
+                (None, Some(site)) => site.field_sigma_ut,
+                (None, None) => place.field_sigma_ut,
             },
             reference: [arguments.attitude_sigma_rad, REFERENCE[1]],
             windows: &windows,

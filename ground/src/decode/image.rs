@@ -1,10 +1,11 @@
 //! A raw image of the recorder's NAND, as tables or as a folder.
 //!
 //! In: an image that [`recorder::log::is_image`] knows. Out: the newest epoch's records and a line for each boot, gap and
-//! damage. Refuses what is larger than a chip, and a log of a newer format.
+//! damage; a page whose attitude is at the launch site that the unit's latest start took. Refuses what is larger than a chip, and a log of a newer format.
 
 use std::{io::Write, path::Path};
 
+use attitude::told;
 use logs::{digest::Digest, folder::Folder};
 use packets::stream::Bytes5To8;
 use recorder::{
@@ -12,7 +13,7 @@ use recorder::{
     parquet, recover, table,
 };
 
-use super::{DecodeError, finish, input::Input, stem};
+use super::{DecodeError, finish, input::Input, place, stem};
 
 /// \[us\] from packet to packet where no header of a boot is left to say it.
 const PERIOD_US: u32 = 200_000;
@@ -47,7 +48,8 @@ pub fn to_folder(log: &Log, name: &str, parent: &Path, json: bool) -> Result<(),
     let stem = stem(name);
     let cycle_s = f64::from(period_us) * 1e-6;
     let mut folder = Folder::create(parent, stem, cycle_s)?;
-    let mut digest = Digest::new(Bytes5To8::Errors, cycle_s);
+    let site = told::site(log);
+    let mut digest = Digest::new(Bytes5To8::Errors, cycle_s, &place(site));
     for (_, entry) in log.packets_of(false) {
         folder.entries(&digest.push(None, &entry.packet))?;
     }
@@ -57,7 +59,7 @@ pub fn to_folder(log: &Log, name: &str, parent: &Path, json: bool) -> Result<(),
         folder.remark(line)?;
     }
     parquet::create(&folder.path().join("records.parquet"), log.packets_of(false), true)?;
-    finish(folder, digest, stem, name, json)
+    finish(folder, digest, site, [stem, name], json)
 }
 
 #[cfg(test)]
