@@ -260,6 +260,12 @@ mod tests {
             for expression in [&guard.expression, &guard.without] {
                 assert!(is_whole(expression), "{}: {expression} is no expression", guard.guard);
             }
+            assert!(
+                stands_alone(&text, &guard.expression),
+                "{}: {} is part of an expression",
+                guard.guard,
+                guard.expression
+            );
             let (file, name) = guard.test.split_once(": ").expect("file: function");
             let tests = fs::read_to_string(root().join(file)).expect("a file of tests");
             assert!(tests.contains(&format!("fn {name}(")), "{}", guard.test);
@@ -276,10 +282,23 @@ mod tests {
         is_closed && !expression.ends_with(['|', '&', '=', '+', '-', '{'])
     }
 
+    /// Whether nothing beside it in the text makes another expression of it: the name of a method is none without what it is called on.
+    fn stands_alone(text: &str, expression: &str) -> bool {
+        let is_of_a_name = |beside: char| beside.is_alphanumeric() || beside == '_';
+        let Some((before, after)) = text.split_once(expression) else {
+            return false;
+        };
+        !before.ends_with(|beside| is_of_a_name(beside) || matches!(beside, '.' | ':'))
+            && !after.starts_with(|beside| is_of_a_name(beside) || beside == '(')
+    }
+
     #[test]
     fn half_an_expression_is_none() {
         assert!(is_whole("a || b(c)"));
         assert!(!is_whole("is_repeated ||") && !is_whole("if !answers {") && !is_whole("f(a"));
+        assert!(stands_alone("let a = b.filter(c);", "b.filter(c)"));
+        assert!(!stands_alone("let a = b.filter(c);", "filter(c)") && !stands_alone("let a = b.f(c);", "b.f"));
+        assert!(!stands_alone("let a = ab;", "b") && !stands_alone("let a = bc;", "b"));
     }
 
     #[test]
