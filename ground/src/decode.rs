@@ -22,7 +22,7 @@ use emems::{
     unit::Settings,
 };
 use logs::{
-    digest::{Digest, Entry},
+    digest::{Digest, StreamEntry},
     folder::{self, Folder, FolderError},
     table,
 };
@@ -217,7 +217,7 @@ fn stream(
     arguments: &DecodeArguments,
     site: Option<site::Told>,
     input: Input,
-    mut put: impl FnMut(f64, &[Entry]) -> Result<(), DecodeError>,
+    mut put: impl FnMut(f64, &[StreamEntry]) -> Result<(), DecodeError>,
 ) -> Result<(Cycle, Digest, Option<DecodeError>), DecodeError> {
     let told_s = arguments.cycle.map(|cycle| cycle.as_secs_f64());
     let mut digest = match arguments.out {
@@ -268,12 +268,12 @@ fn to_text(
         table::si_header()
     };
     let mut header = Some(header);
-    let mut put = |cycle_s: f64, entries: &[Entry]| -> Result<(), DecodeError> {
+    let mut put = |cycle_s: f64, entries: &[StreamEntry]| -> Result<(), DecodeError> {
         if let Some(header) = header.take() {
             writeln!(rows, "{header}")?;
         }
         for entry in entries {
-            if let Entry::Packet { number, reading, .. } = entry {
+            if let StreamEntry::Packet { number, reading, .. } = entry {
                 let t_s = *number as f64 * cycle_s;
                 let row = if arguments.counts {
                     table::counts_row(t_s, reading)

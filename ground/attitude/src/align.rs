@@ -7,7 +7,7 @@
 //! by `sqrt(J0 / (c n))`, `n` independent errors.
 
 use logs::{
-    flight::{Estimate, Flight},
+    flight::{EstimatedStep, Flight},
     recording::{Row, attitude_at},
 };
 use nalgebra::Vector3;
@@ -39,7 +39,7 @@ pub struct Offset {
 
 /// The offset, if there is one worth a word.
 pub fn offset(flight: &Flight, reference: &[Row]) -> Option<Offset> {
-    let sampled: Vec<&Estimate> = (flight.estimates.iter())
+    let sampled: Vec<&EstimatedStep> = (flight.estimates.iter())
         .step_by(flight.estimates.len() / LOOKED_AT + 1)
         .collect();
     let most_s = magnitude::median(flight.estimates.windows(2).map(|pair| pair[1].t_s - pair[0].t_s))?;
@@ -77,8 +77,8 @@ pub fn offset(flight: &Flight, reference: &[Row]) -> Option<Offset> {
 
 /// \[rad2\] mean square of the error about its mean, and how many errors; the reference later by `later_s`. The error is taken in
 /// b, where a mounting is constant, or in n, where a declination is, whichever has less of it.
-fn scatter(sampled: &[&Estimate], reference: &[Row], later_s: f64, most_s: f64) -> Option<(f64, usize)> {
-    let error = |estimate: &&Estimate| {
+fn scatter(sampled: &[&EstimatedStep], reference: &[Row], later_s: f64, most_s: f64) -> Option<(f64, usize)> {
+    let error = |estimate: &&EstimatedStep| {
         let reference_nb = attitude_at(reference, estimate.t_s - later_s, most_s)?;
         let in_b = (reference_nb.inverse() * estimate.q_nb).scaled_axis();
         Some((in_b, (estimate.q_nb * reference_nb.inverse()).scaled_axis()))
@@ -107,7 +107,7 @@ mod tests {
         let estimate = |k: u32| {
             let t_s = 0.2 * f64::from(k);
             let error = Vector3::new((1.7 * t_s).sin(), (2.3 * t_s).cos(), 0.0) * 0.5_f64.to_radians();
-            Estimate {
+            EstimatedStep {
                 t_s,
                 q_nb: UnitQuaternion::from_euler_angles(0.0, 0.0, 0.1) * attitude(t_s) * UnitQuaternion::new(error),
                 triad_nb: None,

@@ -15,7 +15,7 @@ use emems::{kalman::Params, sample::Reading, unit::Settings};
 use indicatif::ProgressBar;
 use logs::{
     cycles::{Cycle, Cycles},
-    flight::{Comparison, Flight, Taken, Told},
+    flight::{Comparison, CrewWord, Flight, Taken},
     plausible::{self, Implausible},
     plot,
     recording::{self, RecordingError},
@@ -118,7 +118,7 @@ pub enum AttitudeError {
     NotCounts(String),
     /// A flight log cannot be used.
     #[error(transparent)]
-    Told(#[from] NothingTold),
+    FlightLog(#[from] NothingTold),
     /// A calibration set cannot be used.
     #[error(transparent)]
     Set(#[from] NoSet),
@@ -299,8 +299,8 @@ fn of_unit(
     say(format!("looked at closer            {}\n", last.name));
     for Taken { at_us, told } in &told {
         let (name, text) = match told {
-            Told::Rail(rail) => ("launch rail", rail.to_string()),
-            Told::Site(site) => ("launch site", site.to_string()),
+            CrewWord::Rail(rail) => ("launch rail", rail.to_string()),
+            CrewWord::Site(site) => ("launch site", site.to_string()),
         };
         say(format!("{name:<28}{text}, taken at {:.3} s\n", 1e-6 * *at_us as f64));
     }

@@ -15,7 +15,7 @@ use emems::{
 };
 use logs::{
     cycles::Cycle,
-    flight::{Comparison, Estimate, Flight, Taken},
+    flight::{Comparison, EstimatedStep, Flight, Taken},
     recording::Row,
     score::Rmse,
 };
@@ -91,7 +91,7 @@ pub fn format(runs: &[Run]) -> String {
         "method", "force [m/s2]", "field [uT]", "TRIAD RMSE [deg]", "filter RMSE [deg]"
     );
     for run in runs {
-        let norms = |vector: fn(&Estimate) -> Option<Vector3<f64>>| {
+        let norms = |vector: fn(&EstimatedStep) -> Option<Vector3<f64>>| {
             let all: Vec<f64> = run
                 .flight
                 .estimates

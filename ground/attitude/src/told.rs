@@ -12,7 +12,7 @@ use std::{
 };
 
 use emems::{mode::Cause, packet, sample::Reading, site};
-use logs::flight::{Taken, Told};
+use logs::flight::{CrewWord, Taken};
 use packets::input;
 use recorder::{
     kept::InSuperblock,
@@ -69,8 +69,8 @@ pub fn open(path: &Path) -> Result<Log, NothingTold> {
 pub fn site(log: &Log) -> Option<site::Told> {
     let boot = log.latest_boot();
     let taken = of(log, boot).into_iter().rev().find_map(|taken| match taken.told {
-        Told::Site(site) => Some(site),
-        Told::Rail(_) => None,
+        CrewWord::Site(site) => Some(site),
+        CrewWord::Rail(_) => None,
     });
     let is_lost = boot.is_some_and(|boot| !log.is_whole(boot));
     let kept = || match log.superblock {
@@ -95,8 +95,8 @@ pub fn of(log: &Log, boot: Option<Boot>) -> Vec<Taken> {
     let changes = boot.into_iter().flat_map(|boot| log.changes_of(boot));
     let taken = changes.filter_map(|change| {
         let told = match change.cause {
-            Cause::RailTaken(rail) => Told::Rail(rail),
-            Cause::SiteTaken(site) => Told::Site(site),
+            Cause::RailTaken(rail) => CrewWord::Rail(rail),
+            Cause::SiteTaken(site) => CrewWord::Site(site),
             _ => return None,
         };
         let at_us = change.at_us;

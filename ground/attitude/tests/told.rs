@@ -5,7 +5,7 @@ use emems::{estimate::Estimator, sample::Sample, unit::Settings};
 use host_tests::{Flight as Flown, MS, S, world};
 use logs::{
     cycles::Cycle,
-    flight::{Flight, Taken, Told},
+    flight::{CrewWord, Flight, Taken},
 };
 use twin::plant::Plant;
 
@@ -27,7 +27,7 @@ fn the_attitude_is_the_units_with_the_site_and_the_rails_of_its_flight_log() {
     let image = flown.nand.as_ref().expect("a chip").image();
     let log = recorder::log::read(&image).expect("a log");
     let taken = told::of(&log, told::boot(&log, flown.packets.iter().map(|(_, packet)| *packet)));
-    let kinds: Vec<bool> = (taken.iter().map(|taken| matches!(taken.told, Told::Site(_)))).collect();
+    let kinds: Vec<bool> = (taken.iter().map(|taken| matches!(taken.told, CrewWord::Site(_)))).collect();
     assert_eq!(kinds, [true, false, false], "{taken:?}");
     let cycles: Vec<Cycle> = (flown.derived.iter())
         .map(|frame| Cycle {

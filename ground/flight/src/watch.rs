@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use logs::{
-    digest::{Digest, Entry},
+    digest::{Digest, StreamEntry},
     folder::{Folder, FolderError},
     record::Record,
 };
@@ -115,7 +115,9 @@ impl Watch {
 impl Bench for Watch {
     fn telemetry(&mut self, at: Nanos, bytes: &[u8]) {
         let entries = self.digest.push(Some(1e-9 * at as f64), bytes);
-        let packets = entries.iter().filter(|entry| matches!(entry, Entry::Packet { .. }));
+        let packets = entries
+            .iter()
+            .filter(|entry| matches!(entry, StreamEntry::Packet { .. }));
         self.packets += packets.count() as u64;
         let kept = self
             .folder

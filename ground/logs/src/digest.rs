@@ -1,6 +1,6 @@
 //! A telemetry stream to all that is wanted of it at once: entries in order, and what a page says of it.
 //!
-//! In: bytes, and the instant they were complete where it is known. Out: [`Entry`]s as they are found, and at the end the
+//! In: bytes, and the instant they were complete where it is known. Out: [`StreamEntry`]s as they are found, and at the end the
 //! [`Record`]. Memory does not grow with the stream, so a log of any size can be read.
 
 use emems::{derived::Derived, sample::Reading, site::Site, unit::Settings};
@@ -14,7 +14,7 @@ use crate::record::Record;
 
 /// Something found in the stream.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Entry {
+pub enum StreamEntry {
     /// A packet.
     Packet {
         /// Its number: the counter without its wraps.
@@ -74,13 +74,13 @@ impl Digest {
     }
 
     /// Takes the next bytes, the last of them complete at `at_s`.
-    pub fn push(&mut self, at_s: Option<f64>, bytes: &[u8]) -> Vec<Entry> {
+    pub fn push(&mut self, at_s: Option<f64>, bytes: &[u8]) -> Vec<StreamEntry> {
         let items = self.decoder.push(bytes);
         items.into_iter().map(|item| self.enter(at_s, item)).collect()
     }
 
     /// Ends the stream.
-    pub fn finish(mut self) -> (Vec<Entry>, Record) {
+    pub fn finish(mut self) -> (Vec<StreamEntry>, Record) {
         let last = std::mem::take(&mut self.decoder).finish();
         if let Some(reject) = &last {
             self.record.summary.end(reject);
@@ -88,10 +88,10 @@ impl Digest {
         if let Some(attitude) = &mut self.record.attitude {
             attitude.finish();
         }
-        (last.map(Entry::Reject).into_iter().collect(), self.record)
+        (last.map(StreamEntry::Reject).into_iter().collect(), self.record)
     }
 
-    fn enter(&mut self, at_s: Option<f64>, item: Item) -> Entry {
+    fn enter(&mut self, at_s: Option<f64>, item: Item) -> StreamEntry {
         match &item {
             Item::Packet { offset, reading } => {
                 let (number, step) = self.sequence.number(reading.counter);
@@ -101,7 +101,7 @@ impl Digest {
                 };
                 self.last_s = at_s;
                 self.record.packet(number, step, &item, period_s);
-                Entry::Packet {
+                StreamEntry::Packet {
                     number,
                     step,
                     offset: *offset,
@@ -110,18 +110,18 @@ impl Digest {
             }
             Item::Derived { derived, .. } => {
                 self.record.derived(&item);
-                Entry::Derived(derived.clone())
+                StreamEntry::Derived(derived.clone())
             }
             Item::Line { offset, text } => {
                 self.record.line(text);
-                Entry::Line {
+                StreamEntry::Line {
                     offset: *offset,
                     text: text.clone(),
                 }
             }
             Item::Reject(reject) => {
                 self.record.summary.reject(reject);
-                Entry::Reject(*reject)
+                StreamEntry::Reject(*reject)
             }
         }
     }
@@ -164,10 +164,10 @@ mod tests {
         entries.extend(rest);
         let found: Vec<String> = (entries.iter())
             .map(|entry| match entry {
-                Entry::Packet { number, step, .. } => format!("{number} {step:?}"),
-                Entry::Derived(_) => "derived".into(),
-                Entry::Line { offset, text } => format!("offset {offset}: {text}"),
-                Entry::Reject(reject) => reject.to_string(),
+                StreamEntry::Packet { number, step, .. } => format!("{number} {step:?}"),
+                StreamEntry::Derived(_) => "derived".into(),
+                StreamEntry::Line { offset, text } => format!("offset {offset}: {text}"),
+                StreamEntry::Reject(reject) => reject.to_string(),
             })
             .collect();
         assert_eq!(

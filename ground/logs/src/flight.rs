@@ -34,12 +34,12 @@ pub struct Taken {
     /// \[us\] when, by the unit's clock.
     pub at_us: u64,
     /// What it took.
-    pub told: Told,
+    pub told: CrewWord,
 }
 
 /// What a launch crew tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum CrewWord {
     /// A launch rail, which the attitude took after a cycle.
     Rail(Rail),
     /// A launch site, with which the estimation began afresh before a cycle.
@@ -50,15 +50,15 @@ impl Taken {
     /// Whether it was taken before the cycle that began at `start_us`.
     fn is_before(&self, start_us: u64) -> bool {
         match self.told {
-            Told::Rail(_) => self.at_us < start_us,
-            Told::Site(_) => self.at_us <= start_us,
+            CrewWord::Rail(_) => self.at_us < start_us,
+            CrewWord::Site(_) => self.at_us <= start_us,
         }
     }
 }
 
 /// One step's estimate.
 #[derive(Clone, Debug)]
-pub struct Estimate {
+pub struct EstimatedStep {
     /// \[s\] time of the step.
     pub t_s: f64,
     /// The filter's attitude.
@@ -81,7 +81,7 @@ pub struct Estimate {
 #[derive(Clone, Debug, Default)]
 pub struct Flight {
     /// Every step with an attitude.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<EstimatedStep>,
     /// Steps refused, by reason.
     pub refused: BTreeMap<String, usize>,
     /// \[s\] when the attitude was found afresh.
@@ -121,7 +121,7 @@ impl Flight {
             if filter.aligned {
                 let [force_b, field_b_ut] =
                     [step.acc, step.mag].map(|sampled| sampled.map(|sampled| sampled.value_b.cast()));
-                flight.estimates.push(Estimate {
+                flight.estimates.push(EstimatedStep {
                     t_s,
                     q_nb: filter.attitude().cast(),
                     triad_nb: alone(&step).map(|q_nb| (t_s, q_nb)),
@@ -149,11 +149,11 @@ impl Flight {
         for cycle in cycles {
             while let Some(next) = taken.next_if(|next| next.is_before(cycle.sample.start_us)) {
                 match next.told {
-                    Told::Rail(rail) => {
+                    CrewWord::Rail(rail) => {
                         let met = estimator.know_nose(&rail.nose(), true);
                         flight.rails[usize::from(met != Some(Ok(())))] += 1;
                     }
-                    Told::Site(site) => {
+                    CrewWord::Site(site) => {
                         estimator.begin_at(&site.site(compiled_in));
                         flight.sites += 1;
                     }
@@ -166,7 +166,9 @@ impl Flight {
             }
             flight.note(cycle.increments.end_us as f64 * 1e-6, &outcome);
             let innovations = outcome.innovations.to_vec();
-            flight.estimates.extend(Estimate::of(cycle, &estimate, innovations));
+            flight
+                .estimates
+                .extend(EstimatedStep::of(cycle, &estimate, innovations));
         }
         flight
     }
@@ -249,14 +251,14 @@ impl Flight {
     }
 }
 
-impl Estimate {
+impl EstimatedStep {
     /// What the unit made of a cycle; `None` without an attitude.
     pub fn of(cycle: &Cycle, estimate: &emems::estimate::Estimate, innovations: Vec<Innovation>) -> Option<Self> {
         let q_nb = estimate.q_nb.and_then(from_parts)?;
         let triad_nb = estimate.triad_nb.and_then(from_parts);
         let [nn, ne, nd, ee, ed, dd] = estimate.covariance_n.map(f64::from);
         let vector = |parts: [f32; 3]| Some(Vector3::from(parts.map(f64::from)));
-        Some(Estimate {
+        Some(EstimatedStep {
             t_s: cycle.increments.end_us as f64 * 1e-6,
             q_nb: q_nb.cast(),
             triad_nb: triad_nb.map(|q_nb| (vectors_s(cycle), q_nb.cast())),

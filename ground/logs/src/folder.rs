@@ -1,6 +1,6 @@
 //! The folder a flight or a decoded log ends up in.
 //!
-//! In: bytes as they were, [`Entry`]s, remarks, and at the end the figures. Out: packets.txt and umbilical.txt verbatim,
+//! In: bytes as they were, [`StreamEntry`]s, remarks, and at the end the figures. Out: packets.txt and umbilical.txt verbatim,
 //! counts.csv, si.csv, derived.csv if there are derived frames, flight.mcap, log.txt, summary.txt, index.html. An existing folder is
 //! never touched: a number is added to the name.
 
@@ -14,7 +14,7 @@ use chart::{Block, ChartError};
 use packets::stream::sequence::Step;
 
 use crate::{
-    digest::Entry,
+    digest::StreamEntry,
     messages::Messages,
     plot::{self, Truth},
     record::Record,
@@ -185,16 +185,16 @@ impl Folder {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn entries(&mut self, entries: &[Entry]) -> Result<(), FolderError> {
+    pub fn entries(&mut self, entries: &[StreamEntry]) -> Result<(), FolderError> {
         for entry in entries {
             match entry {
-                Entry::Packet { number, reading, .. } => {
+                StreamEntry::Packet { number, reading, .. } => {
                     let t_s = *number as f64 * self.cycle_s;
                     self.counts.line(&table::counts_row(t_s, reading))?;
                     self.si.line(&table::si_row(t_s, reading))?;
                 }
-                Entry::Derived(derived) => self.derived.line(&table::derived_row(derived))?,
-                Entry::Line { .. } | Entry::Reject(_) => {}
+                StreamEntry::Derived(derived) => self.derived.line(&table::derived_row(derived))?,
+                StreamEntry::Line { .. } | StreamEntry::Reject(_) => {}
             }
             let remark = remark(entry, self.cycle_s);
             if let Some(remark) = &remark {
@@ -273,9 +273,9 @@ pub fn text_of(rows: &[(&'static str, String)]) -> String {
 }
 
 /// What is to be said about an entry besides its row.
-pub fn remark(entry: &Entry, cycle_s: f64) -> Option<String> {
+pub fn remark(entry: &StreamEntry, cycle_s: f64) -> Option<String> {
     match entry {
-        Entry::Packet {
+        StreamEntry::Packet {
             number,
             step,
             offset,
@@ -293,9 +293,9 @@ pub fn remark(entry: &Entry, cycle_s: f64) -> Option<String> {
             let (counter, t_s) = (reading.counter, *number as f64 * cycle_s);
             Some(format!("offset {offset}, packet {counter}, {t_s:.3} s: {what}"))
         }
-        Entry::Derived(_) => None,
-        Entry::Line { offset, text } => Some(format!("offset {offset}: the unit says: {text}")),
-        Entry::Reject(reject) => Some(reject.to_string()),
+        StreamEntry::Derived(_) => None,
+        StreamEntry::Line { offset, text } => Some(format!("offset {offset}: the unit says: {text}")),
+        StreamEntry::Reject(reject) => Some(reject.to_string()),
     }
 }
 

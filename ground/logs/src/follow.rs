@@ -15,7 +15,7 @@ use packets::stream::Item;
 
 use crate::{
     cycles::{Cycle, Cycles},
-    flight::{Estimate, Flight},
+    flight::{EstimatedStep, Flight},
 };
 
 /// Estimates that are kept: seven hours at 5 Hz, some 36 MB.
@@ -29,7 +29,7 @@ pub struct Follow {
     number: Option<u64>,
     /// Number of the packet of each estimate, whose time is in its cycle.
     numbers: Vec<u64>,
-    estimates: Vec<Estimate>,
+    estimates: Vec<EstimatedStep>,
     stride: u64,
     seen: u64,
     sent: u64,
@@ -82,8 +82,8 @@ impl Follow {
             .filter(|sent| sent.q_nb.is_some());
         self.sent += u64::from(sent.is_some());
         let estimate = match sent {
-            Some(sent) => Estimate::of(cycle, sent, Vec::new()),
-            None => Estimate::of(
+            Some(sent) => EstimatedStep::of(cycle, sent, Vec::new()),
+            None => EstimatedStep::of(
                 cycle,
                 &self.estimator.step(&cycle.sample, &cycle.increments),
                 Vec::new(),
@@ -113,7 +113,7 @@ impl Follow {
         let each = self.estimates.iter().zip(&self.numbers);
         let estimates = each.map(|(estimate, number)| {
             let start_s = *number as f64 * cycle_s;
-            Estimate {
+            EstimatedStep {
                 t_s: estimate.t_s + start_s,
                 triad_nb: estimate.triad_nb.map(|(triad_s, q_nb)| (triad_s + start_s, q_nb)),
                 ..estimate.clone()

@@ -1,6 +1,6 @@
 //! A flight as messages: one MCAP file, which Foxglove and PlotJuggler open without an importer (mcap.dev/spec).
 //!
-//! In: [`Entry`]s with their times, lines of the log. Out: topics in JSON, each with its schema:
+//! In: [`StreamEntry`]s with their times, lines of the log. Out: topics in JSON, each with its schema:
 //!
 //! | topic | schema | what |
 //! |---|---|---|
@@ -27,7 +27,7 @@ use mcap::{WriteOptions, Writer, records::MessageHeader};
 use packets::channel::{self, CHANNELS};
 use serde_json::{Map, Value, json};
 
-use crate::digest::Entry;
+use crate::digest::StreamEntry;
 
 /// Foxglove's numbers of a log line's level.
 const INFO: u8 = 2;
@@ -77,19 +77,19 @@ impl Messages {
     }
 
     /// What was found in the telemetry; `remark` is what is to be said of it.
-    pub fn entry(&mut self, entry: &Entry, cycle_s: f64, remark: Option<&str>) -> io::Result<()> {
+    pub fn entry(&mut self, entry: &StreamEntry, cycle_s: f64, remark: Option<&str>) -> io::Result<()> {
         match entry {
-            Entry::Packet { number, reading, .. } => {
+            StreamEntry::Packet { number, reading, .. } => {
                 self.latest = Some((*number, reading.counter));
                 self.packet(*number as f64 * cycle_s, reading)?;
             }
-            Entry::Derived(derived) => self.estimate(self.number(derived) as f64 * cycle_s, derived)?,
-            Entry::Line { .. } | Entry::Reject(_) => {}
+            StreamEntry::Derived(derived) => self.estimate(self.number(derived) as f64 * cycle_s, derived)?,
+            StreamEntry::Line { .. } | StreamEntry::Reject(_) => {}
         }
         match remark {
             Some(remark) => {
                 let t_s = self.latest.map_or(0.0, |(number, _)| number as f64 * cycle_s);
-                let level = if matches!(entry, Entry::Line { .. }) {
+                let level = if matches!(entry, StreamEntry::Line { .. }) {
                     INFO
                 } else {
                     WARNING

@@ -1,6 +1,6 @@
 //! Decoded packets as CSV: in counts, in nominal SI, and what derived frames add.
 //!
-//! In: parts of an [`Entry`](crate::digest::Entry). Out: header and rows, without line ends. Time is packet number times
+//! In: parts of a [`StreamEntry`](crate::digest::StreamEntry). Out: header and rows, without line ends. Time is packet number times
 //! cycle; the cell of a value that was not read is empty, in SI also that of a code which says nothing of how much it was. The SI
 //! table is the measured CSV of a gap case: `t_s`, then one column a channel.
 

@@ -38,7 +38,7 @@ use super::{
     clock::{self, ClockError},
     described::{columns, format_of, unit},
     place::{MODEL_SIGMA_UT, check_units, environment, settled, site_told},
-    reference::{Axes, Refused, Told},
+    reference::{Axes, ReferenceRecord, Refused},
 };
 
 /// Steps that the fine search of the clocks takes at most; three come to a tenth of a sigma from 50 ms off.
@@ -168,23 +168,23 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
     );
     check_units(&log, &unit, &log_name)?;
 
-    let mut told = Told::open(&arguments.reference)?;
+    let mut reference = ReferenceRecord::open(&arguments.reference)?;
     said.push(format!(
         "reference  {}: {} rows",
         arguments.reference.display(),
-        told.rows.len()
+        reference.rows.len()
     ));
-    said.extend(told.taken.iter().map(|line| format!("           {line}")));
-    let record = |told: &Told, offset_s: f64, axes: Axes, is_inverse: bool| {
-        let text = told.text(offset_s, axes, is_inverse);
+    said.extend(reference.taken.iter().map(|line| format!("           {line}")));
+    let record = |reference: &ReferenceRecord, offset_s: f64, axes: Axes, is_inverse: bool| {
+        let text = reference.text(offset_s, axes, is_inverse);
         Recorded::read(io::Cursor::new(text.into_bytes()), MOTION).map(|record| record.used())
     };
     let rates = clock::rates(&log, &unit);
     let (mut offset_s, alike) = match arguments.offset_s {
         Some(offset_s) => (offset_s, f64::NAN),
-        None => clock::coarse(&rates, &record(&told, 0.0, Axes::Ned, false)?)?,
+        None => clock::coarse(&rates, &record(&reference, 0.0, Axes::Ned, false)?)?,
     };
-    let (axes, is_inverse, place) = settled(&told, &log, &unit, offset_s, &rates)?;
+    let (axes, is_inverse, place) = settled(&reference, &log, &unit, offset_s, &rates)?;
     said.push(format!(
         "           read as {} to {axes:?}, by the rates and where down is",
         if is_inverse {
@@ -195,12 +195,12 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
     ));
     let environment = environment(arguments, site.as_ref(), &place, &mut said)?;
     put(&arguments.out.join(UNIT), unit.text().as_bytes())?;
-    let case = |told: &Told, offset_s: f64| -> Result<Subject, MadeError> {
+    let case = |reference: &ReferenceRecord, offset_s: f64| -> Result<Subject, MadeError> {
         put(
             &arguments.out.join(MOTION),
-            told.text(offset_s, axes, is_inverse).as_bytes(),
+            reference.text(offset_s, axes, is_inverse).as_bytes(),
         )?;
-        let motion = record(told, offset_s, axes, is_inverse)?;
+        let motion = record(reference, offset_s, axes, is_inverse)?;
         let (from_s, to_s) = motion.span_s();
         let (first_s, last_s) = (
             log.start_s.first().copied().unwrap_or(0.0),
@@ -225,9 +225,9 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
         put(&arguments.out.join(CASE), text.toml().as_bytes())?;
         Ok(Subject::open(&arguments.out)?)
     };
-    let mut subject = case(&told, offset_s)?;
-    if !told.place_is_named {
-        let smaller = told.in_millimetres();
+    let mut subject = case(&reference, offset_s)?;
+    if !reference.place_is_named {
+        let smaller = reference.in_millimetres();
         let apart = [forces_off(&subject), forces_off(&case(&smaller, offset_s)?)];
         let is_mm = apart[1] < apart[0];
         said.push(format!(
@@ -237,15 +237,15 @@ fn make_case(arguments: &NewCaseArguments) -> Result<String, MadeError> {
             apart[0].max(apart[1])
         ));
         if is_mm {
-            told = smaller;
+            reference = smaller;
         }
-        subject = case(&told, offset_s)?;
+        subject = case(&reference, offset_s)?;
     }
     if arguments.offset_s.is_none() {
         let mut error = clock::error(&subject).ok_or(ClockError::Still)?;
         for _ in 0..MOST_STEPS {
             offset_s += error.seconds;
-            subject = case(&told, offset_s)?;
+            subject = case(&reference, offset_s)?;
             error = clock::error(&subject).ok_or(ClockError::Still)?;
             if error.seconds.abs() < 0.1 * error.sigma_s {
                 break;

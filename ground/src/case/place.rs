@@ -22,7 +22,7 @@ use twin::{
 use super::{
     clock,
     made::{MadeError, NewCaseArguments},
-    reference::{Axes, Told},
+    reference::{Axes, ReferenceRecord},
 };
 
 /// [m/s2] what a place on Earth has, and the accelerometers may be off by.
@@ -116,7 +116,7 @@ pub struct Place {
 /// # Errors
 /// When nothing points up.
 pub fn settled(
-    told: &Told,
+    told: &ReferenceRecord,
     log: &Log,
     unit: &UnitDescription,
     offset_s: f64,
@@ -131,7 +131,7 @@ pub fn settled(
     let mean_n = |vectors: &[(f64, Vector3<f64>)], axes: Axes, is_inverse: bool| {
         let turned = vectors
             .iter()
-            .filter_map(|(t_s, vector)| Some(Told::turned(attitude(*t_s)?, axes, is_inverse) * vector));
+            .filter_map(|(t_s, vector)| Some(ReferenceRecord::turned(attitude(*t_s)?, axes, is_inverse) * vector));
         let all: Vec<Vector3<f64>> = turned.collect();
         let mean = all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
         let spread = all.iter().map(|one| (one - mean).norm_squared()).sum::<f64>() / all.len().max(1) as f64;

@@ -1,6 +1,6 @@
 //! A reference in whatever columns its instrument writes, made `motion.csv`.
 //!
-//! In: CSV (.gz) with a header, separated by comma, semicolon or tab. Out: [`Told`]: rows on its own clock in SI, and in words
+//! In: CSV (.gz) with a header, separated by comma, semicolon or tab. Out: [`ReferenceRecord`]: rows on its own clock in SI, and in words
 //! what was taken for what. Recognised, upper or lower case alike:
 //!
 //! | what | columns | units, by |
@@ -11,7 +11,7 @@
 //! | temperature | temperature_c | |
 //!
 //! Whether the attitude is body to navigation or the other way, and which way navigation's axes point, the log decides
-//! ([`Told::turned`]). Refused, naming the file: no time, no attitude, a quaternion that is none, time that runs back, fewer than
+//! ([`ReferenceRecord::turned`]). Refused, naming the file: no time, no attitude, a quaternion that is none, time that runs back, fewer than
 //! [`FEWEST`] rows.
 
 use std::{io::Read, path::Path};
@@ -52,7 +52,7 @@ pub struct Row {
 
 /// What an instrument told.
 #[derive(Clone, Debug)]
-pub struct Told {
+pub struct ReferenceRecord {
     /// Its rows.
     pub rows: Vec<Row>,
     /// What was taken for what.
@@ -86,7 +86,7 @@ impl Axes {
     }
 }
 
-impl Told {
+impl ReferenceRecord {
     /// Reads a file.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl Told {
             why,
         };
         let bytes = gap::input::case::read_bytes(path).map_err(|error| refused(error.to_string()))?;
-        Told::read(&bytes[..]).map_err(refused)
+        ReferenceRecord::read(&bytes[..]).map_err(refused)
     }
 
     fn read(mut bytes: impl Read) -> Result<Self, String> {
@@ -249,7 +249,7 @@ impl Told {
                 rows.len()
             ));
         }
-        Ok(Told {
+        Ok(ReferenceRecord {
             rows,
             taken,
             place_is_named,
@@ -273,7 +273,7 @@ impl Told {
         text.push_str(if has_place { ",px_m,py_m,pz_m" } else { "" });
         text.push_str(if has_temperature { ",temperature_c\n" } else { "\n" });
         for row in &self.rows {
-            let q = Told::turned(row.q, axes, is_inverse);
+            let q = ReferenceRecord::turned(row.q, axes, is_inverse);
             text.push_str(&format!(
                 "{:.5},{:.10},{:.10},{:.10},{:.10}",
                 row.t_s - offset_s,
@@ -335,9 +335,9 @@ fn time_unit_s(times: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn file(header: &str, row: impl Fn(usize) -> String) -> Result<Told, String> {
+    fn file(header: &str, row: impl Fn(usize) -> String) -> Result<ReferenceRecord, String> {
         let rows: Vec<String> = (0..100).map(row).collect();
-        Told::read(format!("{header}\n{}\n", rows.join("\n")).as_bytes())
+        ReferenceRecord::read(format!("{header}\n{}\n", rows.join("\n")).as_bytes())
     }
 
     #[test]
@@ -362,7 +362,7 @@ mod tests {
 
     #[test]
     fn what_is_no_reference_is_refused_by_what_it_lacks() {
-        let check = |told: Result<Told, String>, words: &str| {
+        let check = |told: Result<ReferenceRecord, String>, words: &str| {
             let refusal = told.expect_err(words);
             assert!(refusal.contains(words), "{refusal}");
         };

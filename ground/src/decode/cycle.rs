@@ -1,10 +1,10 @@
 //! The time between two packets of a stream: as its derived frames say it, as it was told, or nominal.
 //!
-//! In: [`Entry`]s as they come. Out: the same entries, held back until the cycle is known: from the first two derived
+//! In: [`StreamEntry`]s as they come. Out: the same entries, held back until the cycle is known: from the first two derived
 //! frames near each other, or after [`PATIENCE`] packets without. Packets are numbered, not timed, so every time in the
 //! tables hangs on it. Refused: frames that contradict what was told or what was settled on, since their times are the unit's.
 
-use logs::digest::Entry;
+use logs::digest::StreamEntry;
 use packets::stream::sequence::CYCLE_S;
 
 /// Packets without two derived frames after which none are waited for: at 50 Hz one packet in nine has one.
@@ -37,7 +37,7 @@ pub struct Contradicted {
 pub struct Cycle {
     told_s: Option<f64>,
     settled_s: Option<f64>,
-    held: Vec<Entry>,
+    held: Vec<StreamEntry>,
     packets: usize,
     /// Counter and start \[us\] of the last derived frame.
     frame: Option<(u16, u64)>,
@@ -77,12 +77,12 @@ impl Cycle {
     ///
     /// # Errors
     /// When derived frames contradict the cycle.
-    pub fn take(&mut self, entries: Vec<Entry>) -> Result<Vec<Entry>, Contradicted> {
+    pub fn take(&mut self, entries: Vec<StreamEntry>) -> Result<Vec<StreamEntry>, Contradicted> {
         for entry in &entries {
             match entry {
-                Entry::Packet { .. } => self.packets += 1,
-                Entry::Derived(derived) => self.frame(derived.counter, derived.start_us)?,
-                Entry::Line { .. } | Entry::Reject(_) => {}
+                StreamEntry::Packet { .. } => self.packets += 1,
+                StreamEntry::Derived(derived) => self.frame(derived.counter, derived.start_us)?,
+                StreamEntry::Line { .. } | StreamEntry::Reject(_) => {}
             }
         }
         self.held.extend(entries);
@@ -93,7 +93,7 @@ impl Cycle {
     }
 
     /// What is held still, at the end.
-    pub fn rest(&mut self) -> Vec<Entry> {
+    pub fn rest(&mut self) -> Vec<StreamEntry> {
         if self.packets > 0 {
             self.settled_s.get_or_insert(self.told_s.unwrap_or(CYCLE_S));
         }
@@ -133,8 +133,8 @@ mod tests {
 
     use super::*;
 
-    fn packet(number: u64) -> Entry {
-        Entry::Packet {
+    fn packet(number: u64) -> StreamEntry {
+        StreamEntry::Packet {
             number,
             step: Step::Next,
             offset: 0,
@@ -142,8 +142,8 @@ mod tests {
         }
     }
 
-    fn frame(counter: u16, start_us: u64) -> Entry {
-        Entry::Derived(Box::new(Derived {
+    fn frame(counter: u16, start_us: u64) -> StreamEntry {
+        StreamEntry::Derived(Box::new(Derived {
             counter,
             start_us,
             ..Derived::NONE

@@ -11,7 +11,7 @@ use emems::{
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{
-    flight::{Estimate, Flight, euler_deg},
+    flight::{EstimatedStep, Flight, euler_deg},
     recording::{Row, attitude_at},
 };
 
@@ -86,7 +86,7 @@ fn panel(title: &str, label: &str, clock: &Clock, layers: Vec<Layer>) -> Panel {
 }
 
 /// The reference at the estimates' instants.
-fn met<'a>(flight: &'a Flight, reference: &'a [Row]) -> impl Iterator<Item = (&'a Estimate, UnitQuaternion<f64>)> {
+fn met<'a>(flight: &'a Flight, reference: &'a [Row]) -> impl Iterator<Item = (&'a EstimatedStep, UnitQuaternion<f64>)> {
     // As `Flight::compare` has it: within a step on both sides.
     let step_s = match flight.estimates.as_slice() {
         [first, .., last] => (last.t_s - first.t_s) / (flight.estimates.len() - 1) as f64,
@@ -141,7 +141,7 @@ pub fn errors(flight: &Flight, reference: &[Row], clock: &Clock) -> Vec<Panel> {
 /// Roll, pitch, yaw, and below them how wide three standard deviations are.
 pub fn angles(flight: &Flight, reference: Option<&[Row]>, clock: &Clock) -> Vec<Panel> {
     let angles = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(axis, name)| {
-        let of = |estimate: &Estimate| (clock.at(estimate.t_s), estimate.euler_deg()[axis]);
+        let of = |estimate: &EstimatedStep| (clock.at(estimate.t_s), estimate.euler_deg()[axis]);
         let band = flight.estimates.iter().map(|estimate| {
             let (time, angle) = of(estimate);
             let three = 3.0 * estimate.euler_sd_deg()[axis];
