@@ -254,10 +254,7 @@ pub fn diagnose(subject: &Subject, withheld: &[String], progress: &dyn Fn(&'stat
         let said = said(&explanation, causes);
         remains(subject, &explanation, causes, &said, events.is_some())
     };
-    let remainder = match is_inexact {
-        true => believed.held_against(left_beneath),
-        false => left_beneath(&believed.causes),
-    };
+    let remainder = believed.held_against(left_beneath);
     // What rows say by themselves is in no model: what a model leaves and how it shrinks the gap is told of the others alone.
     let is_modelled = !believed.causes.is_empty();
     let is_new = |cause: &Cause| believed.causes.iter().all(|other| other.effect != cause.effect);

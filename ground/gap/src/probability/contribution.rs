@@ -45,25 +45,30 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         .for_each(|(cause, energy)| cause.share = energy.max(0.0));
 }
 
-/// Per effect of a model: if a calibration can imitate it, the energy that it takes off the residual of the unit as described, in squares of
-/// noise; 0 if not.
+/// Per effect of a model: if its evidence is how far it strains the calibration, the energy that it takes off the residual of the unit as
+/// described, in squares of noise; 0 if it is a course that no calibration has.
 ///
 /// Evidence counts only what the calibration cannot take up at its sigmas: ten sigmas of a zero are worth fifty nats. But an unknown effect
 /// for which the iron stood in would be in the readings as a whole. So what is left is held against the whole that the iron explains,
-/// which may be a thousand times more.
+/// which may be a thousand times more. Where the course is what the evidence stands on, an unknown one has a mean like any other, which the
+/// calibration takes up: only the course is explained, and held against what is left of it.
 pub fn imitated(problem: &Problem, model: &Model) -> Vec<f64> {
     let nominal = |components: &[Component]| -> f64 {
         let residuals = problem.residuals(components);
         residuals.iter().map(|residual| residual.norm_squared()).sum()
     };
-    let calibrated = |model: &Model| -> f64 { model.energies().into_iter().sum() };
-    let with = [nominal(&model.components), calibrated(model)];
+    let calibrated = |model: &Model| -> [f64; 2] {
+        let course = model.energies().into_iter().sum();
+        [course, model.left() - course]
+    };
+    let (whole, [course, strain]) = (nominal(&model.components), calibrated(model));
     let of = |index: usize| {
         let mut others = model.components.clone();
         others.remove(index);
-        let fall = nominal(&others) - with[0];
-        let beyond = calibrated(&Model::around(problem, others)) - with[1];
-        if beyond < LEAST_PART * fall { fall } else { 0.0 }
+        let fall = nominal(&others) - whole;
+        let [of_course, of_strain] = calibrated(&Model::around(problem, others));
+        let is_imitated = of_course - course < LEAST_PART * fall && of_course - course < of_strain - strain;
+        if is_imitated { fall } else { 0.0 }
     };
     (0..model.components.len()).map(of).collect()
 }

@@ -10,11 +10,11 @@ use serde_json::Value;
 use tempfile::TempDir;
 use twin::{
     effect::{Active, Locality},
-    motion::{self, Motion},
+    motion,
     predict::{UnitDescription, emems, thesis_slot_s},
 };
 
-use crate::twin_case::{Log, active};
+use crate::twin_case::{Log, active, recorded};
 
 /// \[s\] of a log, and of its fit window.
 const SECONDS: f64 = 90.0;
@@ -62,18 +62,7 @@ impl Unit {
         };
         let windows = format!("[windows]\nfit = [[0.0, {FIT_S}]]\nhold = [[{FIT_S}, {SECONDS}]]\n");
         let folder = log.folder(name, normal, first, &windows);
-        let mut told = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n");
-        for row in 0..=((SECONDS + 1.0) / 0.01) as u32 {
-            let t_s = 0.01 * f64::from(row);
-            let (q, p) = (
-                world.motion.at(from_s + t_s).attitude.q_nb,
-                world.motion.position_n(from_s + t_s),
-            );
-            told += &format!(
-                "{t_s:.2},{:.9},{:.9},{:.9},{:.9},{:.7},{:.7},{:.7}\n",
-                q.w, q.i, q.j, q.k, p.x, p.y, p.z
-            );
-        }
+        let told = recorded(&*world.motion, from_s, SECONDS + 1.0);
         fs::write(folder.path().join("motion.csv"), told).expect("a motion");
         folder
     }

@@ -11,6 +11,7 @@ mod gross;
 mod gyros;
 mod injected;
 mod known;
+mod light;
 mod line;
 mod logs;
 mod marinho;

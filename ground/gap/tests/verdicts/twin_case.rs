@@ -7,7 +7,7 @@ use twin::{
     effect::{Active, Cause, Locality, by_name},
     environment::Environment,
     kinematics::Motion,
-    predict::{Scene, Twin, UnitDescription, emems, thesis_slot_s},
+    predict::{Channel, Scene, Twin, UnitDescription, emems, thesis_slot_s},
 };
 
 /// \[s\] from row to row.
@@ -33,6 +33,8 @@ pub struct Log<'a> {
     pub real: UnitDescription,
     /// What else it has.
     pub active: &'a [Active],
+    /// What a channel of the unit reads beyond that at an instant \[s\] of the motion, in its physical unit: what no effect of the library is.
+    pub beyond: &'a dyn Fn(&Channel, f64) -> f64,
     /// \[s\] of the motion where the log counts from.
     pub zero_s: f64,
     /// What moves it.
@@ -50,6 +52,7 @@ impl<'a> Log<'a> {
             described: emems(thesis_slot_s),
             real: emems(thesis_slot_s),
             active: &[],
+            beyond: &|_, _| 0.0,
             zero_s: 0.0,
             motion,
             environment,
@@ -74,8 +77,13 @@ impl<'a> Log<'a> {
         let mut measured = format!("t_s,{}\n", names.join(","));
         for (row, start_s) in starts_s.iter().enumerate() {
             let cells = channels.iter().zip(&readings);
-            let cells =
-                cells.map(|(channel, own)| format!("{:.9}", channel.logged(own[row] + channel.noise_sigma * normal())));
+            let cells = cells.map(|(channel, own)| {
+                let beyond = (self.beyond)(channel, start_s + channel.slot_s);
+                format!(
+                    "{:.9}",
+                    channel.logged(own[row] + beyond + channel.noise_sigma * normal())
+                )
+            });
             let _ = writeln!(
                 measured,
                 "{:.1},{}",
@@ -103,4 +111,19 @@ impl<'a> Log<'a> {
         }
         folder
     }
+}
+
+/// The text of motion.csv: attitude and place every 10 ms, over so long from an instant of the motion on \[s\].
+pub fn recorded(motion: &dyn Motion, from_s: f64, seconds: f64) -> String {
+    let mut text = String::from("t_s,qw,qx,qy,qz,px_m,py_m,pz_m\n");
+    for row in 0..=(seconds / 0.01) as u32 {
+        let t_s = 0.01 * f64::from(row);
+        let (q, p) = (motion.at(from_s + t_s).attitude.q_nb, motion.position_n(from_s + t_s));
+        let _ = writeln!(
+            text,
+            "{t_s:.2},{:.9},{:.9},{:.9},{:.9},{:.7},{:.7},{:.7}",
+            q.w, q.i, q.j, q.k, p.x, p.y, p.z
+        );
+    }
+    text
 }
