@@ -2,7 +2,7 @@
 //!
 //! In: a flight log, an image of the chip or a dump, and the packets of a flight. Out: of the boot that recorded them each rail and site, in
 //! the order they were taken, and when by the unit's clock. The stream of packets has none of them, and without them the attitude from the first one
-//! on is not the unit's. For what wants one place for a whole log, the site at which the latest boot estimated in the end ([`site`]).
+//! on is not the unit's. For what wants one place for a whole log, the site at which the latest boot estimated in the end ([`site()`]).
 //!
 //! Refuses a file that holds no record of a log.
 
