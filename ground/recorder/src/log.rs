@@ -223,22 +223,23 @@ impl Log {
 
     /// The latest boot that left a record.
     pub fn latest_boot(&self) -> Option<Boot> {
-        let keys = self
-            .headers
-            .keys()
+        self.keys().map(Boot::of).max()
+    }
+
+    /// Of every record that is there.
+    fn keys(&self) -> impl Iterator<Item = &Key> {
+        (self.headers.keys())
             .chain(self.changes.keys())
-            .chain(self.packets.keys());
-        keys.map(Boot::of).max()
+            .chain(self.packets.keys())
     }
 
     /// Whether no record of a boot is lost: their numbers follow each other from its header on.
     pub fn is_whole(&self, boot: Boot) -> bool {
-        let keys = self
-            .headers
+        let of_boot: BTreeSet<u32> = self
             .keys()
-            .chain(self.changes.keys())
-            .chain(self.packets.keys());
-        let of_boot: BTreeSet<u32> = keys.filter(|key| Boot::of(key) == boot).map(|key| key.seq).collect();
+            .filter(|key| Boot::of(key) == boot)
+            .map(|key| key.seq)
+            .collect();
         let (Some(first), Some(last)) = (of_boot.first(), of_boot.last()) else {
             return false;
         };

@@ -45,13 +45,13 @@ pub fn settle(problem: &Problem, library: &Library, found: &Attribution, causes:
         .for_each(|(cause, energy)| cause.share = energy.max(0.0));
 }
 
-/// Per effect of a model: if its evidence is how far it strains the calibration, the energy that it takes off the residual of the unit as
-/// described, in squares of noise; 0 if it is a course that no calibration has.
+/// Per effect of a model, in squares of noise: the energy that it takes off the residual of the unit as described, if its evidence is
+/// how far it strains the calibration; 0 if its evidence is a course that no calibration has.
 ///
 /// Evidence counts only what the calibration cannot take up at its sigmas: ten sigmas of a zero are worth fifty nats. But an unknown effect
 /// for which the iron stood in would be in the readings as a whole. So what is left is held against the whole that the iron explains,
-/// which may be a thousand times more. Where the course is what the evidence stands on, an unknown one has a mean like any other, which the
-/// calibration takes up: only the course is explained, and held against what is left of it.
+/// which may be a thousand times more. That does not go for an effect that is known by its course. An unknown course has a mean too, and
+/// any zero takes that up. So what is left of the course is held against the course alone.
 pub fn imitated(problem: &Problem, model: &Model) -> Vec<f64> {
     let nominal = |components: &[Component]| -> f64 {
         let residuals = problem.residuals(components);

@@ -6,6 +6,14 @@ use crate::{
     gyros::diagnosed_in,
     twin_case::{Log, active},
 };
+use gap::{
+    input::case::Subject,
+    null::{
+        model::Model,
+        problem::{Component, Problem},
+    },
+    probability::contribution::imitated,
+};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use tempfile::TempDir;
@@ -74,4 +82,20 @@ fn four_effects_in_one_gyro_that_leave_nothing_are_named() {
         "{:?}",
         diagnosis.withdrawn
     );
+}
+
+/// A step five seconds after the start is nearly a zero that moved: nine tenths of its energy are. But its evidence is the step.
+#[test]
+fn the_whole_of_an_effect_counts_only_where_its_evidence_is_a_calibration_that_is_strained() {
+    let at = |plate: &str| Locality::Group(plate.to_owned());
+    let mut step = active("accel-hysteresis", at("plate 2"), &[0.2; 3]);
+    step.cause.variant = 5.0;
+    let bias = active("accel-bias", at("plate 3"), &[0.3; 3]);
+    let folder = tumbled(&[step.clone(), bias.clone()]);
+    let subject = Subject::open(folder.path()).expect("opens");
+    let problem = Problem::new(&subject.twin, &subject.fit, &subject.reference);
+    let components = [step, bias].map(|active| Component { active, span: None });
+    let wholes = imitated(&problem, &Model::around(&problem, components.to_vec()));
+    assert_eq!(wholes[0], 0.0);
+    assert!(wholes[1] > 1e4, "{wholes:?}");
 }
