@@ -6,7 +6,7 @@
 //! | step | file | gives |
 //! |---|---|---|
 //! | 1 | [`flight`] (by [`phases`], [`turning`]) | the fit windows of the log, and the unit in its environment; what it did when |
-//! | 2 | [`beforehand`] (by [`codes`], [`garbled`], [`wired`], [`bending`]) | samples sent twice, lost, stuck and reversed bits; plates and axes that are exchanged; a part that would bend the motion |
+//! | 2 | [`beforehand`] (by [`codes`], [`garbled`], [`wired`], [`lost`], [`bending`]) | samples sent twice, lost, stuck and reversed bits; plates and axes that are exchanged; packets that nobody counted; a part that would bend the motion |
 //! | 3 | [`course`] (by [`spline`]) | a smoothed motion from the packets, about which everything is linear |
 //! | 4 | [`packet`] | per packet the unknowns of the motion, eliminated by QR |
 //! | 5 | [`space`] | inner products with motion and calibration marginalised |
@@ -42,6 +42,7 @@ pub mod flight;
 pub mod followed;
 pub mod garbled;
 pub mod known;
+pub mod lost;
 pub mod name;
 pub mod nulls;
 pub mod packet;

@@ -30,6 +30,7 @@ use crate::{
         log::{Log, Series},
         repeats,
     },
+    parity::lost::Loss,
     thresholds::ROWS_CHANCE,
 };
 
@@ -52,6 +53,8 @@ pub struct Finding {
     pub step: Option<i64>,
     /// Where channels look, of those that look elsewhere than described.
     pub looks: Vec<Look>,
+    /// Packets that nobody counted.
+    pub losses: Vec<Loss>,
 }
 
 /// Where a channel looks.
@@ -164,6 +167,7 @@ fn old_samples(channels: Vec<usize>, count: f64, chance: f64) -> Finding {
         what: format!("{count} samples in which all axes repeat the one before; by chance {chance:.0}"),
         step: None,
         looks: Vec::new(),
+        losses: Vec::new(),
     }
 }
 
@@ -212,6 +216,7 @@ fn of_parts(unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Finding> {
                 what: format!("all codes are a multiple of {step} apart"),
                 step: Some(step),
                 looks: Vec::new(),
+                losses: Vec::new(),
             }),
         }
     }
@@ -265,6 +270,7 @@ fn stuck(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
             },
             step: None,
             looks: Vec::new(),
+            losses: Vec::new(),
         })
         .collect()
 }

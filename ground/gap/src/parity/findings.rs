@@ -75,6 +75,8 @@ pub struct Findings {
     pub free: [f64; 4],
     /// Channels of a part that the motion is made without.
     pub bending: Vec<usize>,
+    /// Share of the rows after which one lost packet would be found.
+    pub loss_shown: Option<f64>,
     /// \[sigma\] before anything is named, and after.
     pub gap: [f64; 2],
     /// Each channel, before.
@@ -137,6 +139,7 @@ impl Findings {
         // The second look needs as much.
         drop((offered, opened));
         let mut visible = visible::table(&library.hypotheses, &seen);
+        visible::add_loss(&mut visible, beforehand.loss_shown);
         again::take(&space, &mut library, &residual, &mut seen);
         let chosen = search::choose(&space, &mut library, &residual, &mut seen, First::default(), &|share| {
             progress("search", share);
@@ -194,7 +197,7 @@ impl Findings {
             .filter(|_| is_by_smoothing);
         let is_unexplained = [Some(&left), about].into_iter().flatten().any(is_unexplained);
         let names: Vec<Name> = (beforehand.found.iter())
-            .map(Name::by_codes)
+            .map(Name::beforehand)
             .chain(causes.into_iter().map(|(name, _)| name))
             .collect();
         rivals.retain(|(name, probability)| *probability >= LISTED && names.iter().all(|own| own.effect != *name));
@@ -214,6 +217,7 @@ impl Findings {
             rows: problem.twin.starts_s().len(),
             free,
             bending: beforehand.bending.clone(),
+            loss_shown: beforehand.loss_shown,
             channels: (twin.unit().channels.iter().zip(&kept))
                 .map(|(channel, own)| Place::of(channel.name.clone(), *own, kept.len()))
                 .collect(),
@@ -301,7 +305,7 @@ fn is_shown(promise: Promise) -> bool {
 pub fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> f64 {
     let of = |promise: Option<Promise>| promise.map(|promise| promise.confidence());
     match by {
-        By::Codes | By::Axes => 1.0,
+        By::Codes | By::Axes | By::Turns => 1.0,
         By::Parity => of(held).unwrap_or(1.0),
         By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0),
     }
@@ -313,7 +317,7 @@ fn walks_on(by: By, nats: f64) -> f64 {
     let goes_on = 1.0 / (1.0 + (-nats).exp());
     match by {
         By::Smoothing => goes_on,
-        By::Codes | By::Axes | By::Parity => (2.0 * goes_on).min(1.0),
+        By::Codes | By::Axes | By::Turns | By::Parity => (2.0 * goes_on).min(1.0),
     }
 }
 

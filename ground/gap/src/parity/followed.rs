@@ -34,6 +34,8 @@ pub struct Beforehand {
     pub found: Vec<Finding>,
     /// Channels of a part that would bend the motion. They are judged about the motion of the others.
     pub bending: Vec<usize>,
+    /// Share of the rows after which one lost packet would be found; none where nothing would show one.
+    pub loss_shown: Option<f64>,
 }
 
 impl Beforehand {
@@ -41,7 +43,7 @@ impl Beforehand {
     pub fn found(found: &[Finding]) -> Self {
         Self {
             found: found.to_vec(),
-            bending: Vec::new(),
+            ..Self::default()
         }
     }
 }
@@ -74,6 +76,9 @@ impl Followed {
         let environment = flight.environment;
         let (course, mut start) = Course::of(&steady, &unit, &environment);
         start.holes.clone_from(&flight.holes);
+        for finding in &beforehand.found {
+            start.holes.put_back(&finding.losses);
+        }
         Self {
             course,
             smoothed: OnceCell::new(),

@@ -89,6 +89,7 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Option<Finding> {
         ),
         step: None,
         looks: Vec::new(),
+        losses: Vec::new(),
     })
 }
 

@@ -1,6 +1,6 @@
 //! An effect that is said, by whatever says it.
 //!
-//! In: what codes say ([`crate::parity::codes`]), or what a search chose ([`crate::parity::search`]). Out: a [`Name`].
+//! In: what is known before there is a motion ([`crate::parity::beforehand`]), or what a search chose ([`crate::parity::search`]). Out: a [`Name`].
 
 use nalgebra::{DMatrix, DVector};
 use twin::effect::{Parameter, by_name};
@@ -9,7 +9,7 @@ use crate::{
     holdout::strength::Promise,
     library::hypotheses::{Hypothesis, Library},
     null::problem::{Component, Problem},
-    parity::{codes::Finding, phases::shown::Alone, search::Chosen, walk},
+    parity::{codes::Finding, lost::Loss, phases::shown::Alone, search::Chosen, walk},
     probability::cause::Sized,
 };
 
@@ -23,6 +23,8 @@ pub enum By {
     Codes,
     /// The readings as a whole: with other axes nothing is left.
     Axes,
+    /// How far field and force turn from one packet to the next.
+    Turns,
     /// Each packet by itself.
     Parity,
     /// All packets, about the smoothed motion.
@@ -59,6 +61,8 @@ pub struct Name {
     pub alone: Option<Alone>,
     /// Its parameters.
     pub parameters: Vec<Sized>,
+    /// Packets that nobody counted.
+    pub losses: Vec<Loss>,
     /// What was seen, or which of what it may be.
     pub which: Option<String>,
     /// What it is.
@@ -78,25 +82,28 @@ fn places<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> Vec<String> {
 }
 
 impl Name {
-    /// Of what codes say.
-    pub fn by_codes(finding: &Finding) -> Self {
+    /// Of what is known before there is a motion.
+    pub fn beforehand(finding: &Finding) -> Self {
         let page = by_name(finding.effect).map(|effect| effect.page());
+        let surest = finding.losses.iter().map(|loss| loss.probability).reduce(f64::max);
         Self {
             effect: finding.effect,
-            by: match finding.looks.is_empty() {
-                true => By::Codes,
-                false => By::Axes,
+            by: match (finding.looks.as_slice(), finding.losses.as_slice()) {
+                ([], []) => By::Codes,
+                ([], _) => By::Turns,
+                _ => By::Axes,
             },
             locality: String::new(),
             or_at: Vec::new(),
             elsewhere: Vec::new(),
             channels: finding.channels.clone(),
-            probability: BY_CODES,
+            probability: surest.map_or(BY_CODES, |surest| surest.min(BY_CODES)),
             gain: None,
             snr: None,
             promise: None,
             alone: None,
             parameters: Vec::new(),
+            losses: finding.losses.clone(),
             which: Some(finding.what.clone()),
             physics: page.map_or("", |page| page.physics),
             confirm_by: page.map_or("", |page| page.confirm_by),
@@ -136,6 +143,7 @@ impl Name {
                 true => Vec::new(),
                 false => hypothesis.parameters.iter().enumerate().map(sized).collect(),
             },
+            losses: Vec::new(),
             which: hypothesis.cause.effect.told(hypothesis.cause.variant),
             physics: page.physics,
             confirm_by: page.confirm_by,

@@ -1,4 +1,4 @@
-//! A log without what was found in its codes.
+//! A log without what was found in it before there is a motion.
 //!
 //! In: a log, its unit, and [`Finding`]s. Out: the same two, changed in place, so that a motion can be made of what is left.
 
@@ -9,11 +9,12 @@ use crate::{
     parity::{
         codes::{Finding, alike_at_end, repeated},
         garbled,
+        lost::put_back,
     },
 };
 
 /// The log without what was found: old samples, faulty channels and the time in which one is stuck are left out, lost bits are rounding;
-/// channels look where they do.
+/// channels look where they do, and what comes after packets that nobody counted is as late as it is.
 pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
     if found.iter().any(|finding| finding.effect == "packet-corruption") {
         for (channel, spoilt) in garbled::spoilt(log, unit) {
@@ -25,10 +26,13 @@ pub fn taken_out(log: &mut Log, unit: &mut UnitDescription, found: &[Finding]) {
         let own = &mut unit.channels[look.channel];
         (own.axis_b, own.lever_m) = (look.axis_b, look.lever_m);
     }
-    for finding in found
-        .iter()
-        .filter(|finding| finding.looks.is_empty() && finding.effect != "packet-corruption")
-    {
+    for finding in found {
+        put_back(&mut log.start_s, &finding.losses);
+    }
+    let is_of_channels = |finding: &&Finding| {
+        finding.looks.is_empty() && finding.losses.is_empty() && finding.effect != "packet-corruption"
+    };
+    for finding in found.iter().filter(is_of_channels) {
         let repeated = repeated(log, &finding.channels);
         for channel in finding.channels.iter().copied() {
             let own = &mut unit.channels[channel];

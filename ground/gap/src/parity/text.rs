@@ -46,6 +46,7 @@ pub fn screen(flight: &Flight, findings: &Findings, told: &Told) -> String {
     out += &made_without(flight, findings);
     out += &flight.phases_line();
     out += &seen_and_not(findings);
+    out += &lost_packets(findings);
     let _ = writeln!(
         out,
         "GAP     {:.3} sigma where 1 is noise and calibration alone",
@@ -115,6 +116,18 @@ fn seen_and_not(findings: &Findings) -> String {
         seen.join(", "),
         unseen.join(", ")
     )
+}
+
+/// How often packets that nobody counted would be found, in a line.
+fn lost_packets(findings: &Findings) -> String {
+    match findings.loss_shown {
+        None => String::new(),
+        Some(share) => format!(
+            "COUNT   one packet that is lost and not counted would be found after {:.0} % of the packets, by how far field and force turn \
+             to the next\n",
+            100.0 * share
+        ),
+    }
 }
 
 /// Effects that can be named somewhere, and those that cannot anywhere.
@@ -208,7 +221,7 @@ fn evidence(name: &Name) -> String {
         (Some(gain), Some([usual, found])) => {
             let by = match name.by {
                 By::Smoothing => ", about the smoothed motion",
-                By::Codes | By::Axes | By::Parity => "",
+                By::Codes | By::Axes | By::Turns | By::Parity => "",
             };
             let held = name.promise.map_or(String::new(), |promise| {
                 format!(
@@ -221,6 +234,7 @@ fn evidence(name: &Name) -> String {
             )
         }
         _ if name.by == By::Axes => ", by what each packet reads as a whole".to_owned(),
+        _ if name.by == By::Turns => ", by how far field and force turn from one packet to the next".to_owned(),
         _ => ", by the codes alone".to_owned(),
     }
 }
@@ -257,6 +271,7 @@ pub fn visibility(findings: &Findings) -> String {
         );
     }
     out += "\n";
+    out += &lost_packets(findings);
     out += &nulls::told();
     out
 }

@@ -15,7 +15,10 @@ use std::ops::Range;
 use nalgebra::Matrix3;
 use twin::predict::{Kind, UnitDescription};
 
-use crate::input::log::Log;
+use crate::{
+    input::log::Log,
+    parity::lost::{Loss, put_back},
+};
 
 /// Rows without a rate that a spline bridges: as many as its knots are held from one side.
 const BRIDGED: usize = 2;
@@ -25,7 +28,7 @@ const BESIDE: usize = 2;
 
 /// Least eigenvalue of the sum of squares of the axes of gyros that tell a rate: of three axes it is their volume that vanishes where
 /// they lie in a plane; five degrees beside one the rate is eleven times as uncertain as along the others.
-const SPANS: f64 = 0.01;
+pub const SPANS: f64 = 0.01;
 
 /// Stretches of a log in which nobody knows the rate.
 #[derive(Clone, Debug, Default)]
@@ -70,6 +73,14 @@ impl Holes {
         let is_known = |row: &usize| self.rows.iter().all(|hole| !hole.contains(row));
         let kept: Vec<usize> = rows.iter().copied().filter(is_known).collect();
         if kept.len() < least { rows } else { kept }
+    }
+
+    /// As late as they are, of the times that a log tells.
+    pub fn put_back(&mut self, losses: &[Loss]) {
+        for (from_s, to_s) in &mut self.spans_s {
+            put_back(std::slice::from_mut(from_s), losses);
+            put_back(std::slice::from_mut(to_s), losses);
+        }
     }
 
     /// \[s\] pieces of rows between which a hole was left out. Windows that are parted and packets that were lost part nothing.

@@ -12,6 +12,7 @@ use crate::{
         chips,
         findings::Findings,
         flight::Flight,
+        lost::Loss,
         name::{By, Name},
         nulls::NULLS,
         phases::{self, Phase, Stretch},
@@ -46,6 +47,9 @@ pub struct Verdict {
     none_of_these: f64,
     outcome: &'static str,
     visible: Vec<Visible>,
+    /// Share of the packets after which a lost one would be found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lost_packet_shows: Option<f64>,
     not_visible: Vec<NotVisible>,
     never_named: Vec<&'static str>,
     next_experiment: String,
@@ -78,6 +82,9 @@ struct Cause {
     #[serde(skip_serializing_if = "Option::is_none")]
     only_in: Option<Phase>,
     parameters: BTreeMap<String, Parameter>,
+    /// Packets that nobody counted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    losses: Vec<Loss>,
 }
 
 /// Ratios of an effect of usual size.
@@ -114,6 +121,7 @@ impl Verdict {
             by: match name.by {
                 By::Codes => "codes",
                 By::Axes => "axes",
+                By::Turns => "turns",
                 By::Parity => "evidence",
                 By::Smoothing => "smoothing",
             },
@@ -128,6 +136,7 @@ impl Verdict {
                     (sized.parameter.name.clone(), parameter)
                 })
                 .collect(),
+            losses: name.losses.clone(),
         };
         let visible = findings.visible.iter().map(|row| Visible {
             effect: row.effect,
@@ -172,6 +181,7 @@ impl Verdict {
                     settled_by: null.settled_by,
                 })
                 .collect(),
+            lost_packet_shows: findings.loss_shown.map(rounded),
             never_named: text::effects(&findings.visible).1,
             next_experiment: text::next(findings).trim_end().to_owned(),
         }

@@ -78,6 +78,12 @@ pub fn add(rows: &mut [Row], smoothed: &[Row]) {
     }
 }
 
+/// Lost packets have a column that another motion has too; the turn between two packets shows them all the same.
+pub fn add_loss(rows: &mut [Row], shown: Option<f64>) {
+    let own = rows.iter_mut().filter(|row| row.effect == "packet-loss");
+    own.for_each(|row| row.is_visible = shown.is_some_and(|share| share > 0.0));
+}
+
 /// Whether a hypothesis of this ratio may be named at all.
 pub fn may_be_named(hypothesis: &Hypothesis, snr: f64) -> bool {
     snr >= PARITY_SNR && nulls::of(hypothesis).is_none()

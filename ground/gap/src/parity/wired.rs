@@ -58,6 +58,7 @@ pub fn look(flight: &Flight, coded: &[Finding], withheld: &[String]) -> Result<O
         what,
         step: None,
         looks: looks.clone(),
+        losses: Vec::new(),
     };
     let with: Vec<Finding> = coded.iter().cloned().chain([finding(String::new())]).collect();
     let left = |log: &Log, found: &[Finding]| -> Result<f64, CaseError> {

@@ -141,7 +141,7 @@ pub fn why(logs: &[Logged], found: &Found) -> String {
 fn cause_lines(word: &str, logs: &[Logged], cause: &Cause) -> String {
     let by = match cause.by {
         By::Smoothing => ", about the smoothed motions",
-        By::Codes | By::Axes | By::Parity => "",
+        By::Codes | By::Axes | By::Turns | By::Parity => "",
     };
     let held = cause.promise.map_or(String::new(), |promise| {
         format!(

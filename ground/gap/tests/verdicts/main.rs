@@ -14,6 +14,7 @@ mod known;
 mod light;
 mod line;
 mod logs;
+mod lost;
 mod marinho;
 mod parity;
 mod phases;

@@ -30,6 +30,7 @@ pub fn stuck(log: &Log, unit: &UnitDescription, steps: &[Option<i64>]) -> Vec<Fi
             what,
             step: None,
             looks: Vec::new(),
+            losses: Vec::new(),
         })
     });
     found.collect()

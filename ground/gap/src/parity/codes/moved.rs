@@ -60,6 +60,7 @@ pub fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> boo
             ),
             step: None,
             looks: Vec::new(),
+            losses: Vec::new(),
         })
         .collect()
 }
