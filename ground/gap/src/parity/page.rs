@@ -3,7 +3,7 @@
 use chart::{Block, ChartError, Figure, Map};
 
 use crate::{
-    parity::{findings::Findings, flight::Flight, nulls::NULLS, smooth::told::Told, text},
+    parity::{findings::Findings, flight::Flight, name::Name, nulls::NULLS, smooth::told::Told, text},
     probability::outcome::Outcome,
 };
 
@@ -35,21 +35,29 @@ pub fn html(flight: &Flight, findings: &Findings, told: &Told) -> Result<String,
 
 /// What it comes to.
 fn sentence(flight: &Flight, findings: &Findings) -> String {
-    let named = || {
-        let each: Vec<String> = findings
-            .names
-            .iter()
-            .map(|name| format!("{} at {}", name.effect, name.locality))
-            .collect();
-        each.join(", and ")
+    let (lost, named): (Vec<&Name>, Vec<&Name>) = findings.names.iter().partition(|name| !name.losses.is_empty());
+    let because = || {
+        let each = named.iter().map(|name| match name.locality.as_str() {
+            "" => format!("{} at {}", name.effect, flight.names(&name.channels).join(" ")),
+            place => format!("{} at {place}", name.effect),
+        });
+        each.collect::<Vec<_>>().join(", and ")
+    };
+    let lost = match lost.is_empty() {
+        true => "",
+        false => "Packets were lost that nobody counted. ",
     };
     let said = match findings.outcome {
         Outcome::Clean => "The sensors agree with each other".to_owned(),
         Outcome::Recalibrate => "The sensors agree with each other once their calibration is made anew".to_owned(),
-        Outcome::Named => format!("The sensors disagree because of {}", named()),
+        Outcome::Named if named.is_empty() => "The sensors agree with each other".to_owned(),
+        Outcome::Named => format!("The sensors disagree because of {}", because()),
+        Outcome::PartlyNamed if named.is_empty() => {
+            "The sensors disagree because of something that is not known".to_owned()
+        }
         Outcome::PartlyNamed => format!(
             "The sensors disagree because of {}, and of something that is not known",
-            named()
+            because()
         ),
         Outcome::Undecided => "The sensors disagree, but no cause of that is likelier than not".to_owned(),
         Outcome::Unknown => {
@@ -62,7 +70,7 @@ fn sentence(flight: &Flight, findings: &Findings) -> String {
         rows => format!(" Of {rows} packets that were left out nothing is said."),
     };
     format!(
-        "{said}: {:.2} sigma, where 1 is noise and calibration alone. Without a reference, what all sensors share cannot be seen.{left_out}",
+        "{lost}{said}: {:.2} sigma, where 1 is noise and calibration alone. Without a reference, what all sensors share cannot be seen.{left_out}",
         findings.gap[0]
     )
 }

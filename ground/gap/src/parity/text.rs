@@ -162,7 +162,10 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
             out,
             "CAUSE   {} at {}, probability {:.3}{}",
             name.effect,
-            flight.names(&name.channels).join(" "),
+            match name.losses.is_empty() {
+                true => flight.names(&name.channels).join(" "),
+                false => "all channels".to_owned(),
+            },
             name.probability,
             evidence(name)
         );

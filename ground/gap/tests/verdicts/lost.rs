@@ -3,13 +3,12 @@
 use gap::{
     input::log::Log,
     parity::{
-        findings::Findings,
+        ATTITUDE, analysed,
         flight::Flight,
         lost::{Losses, put_back},
-        name::By,
     },
-    probability::outcome::Outcome,
 };
+use serde_json::Value;
 use tempfile::TempDir;
 use twin::{
     effect::{Active, Cause, Locality, by_name},
@@ -56,19 +55,36 @@ fn changed(log: &Log, flight: &Flight, kind: Kind, rows: std::ops::Range<u32>, b
 
 #[test]
 fn lost_packets_are_named_counted_and_put_back() {
-    let flight = tumbling(&[lost(2)]);
-    let findings = Findings::of(&flight, &[], &|_, _| ()).expect("has redundancy");
-    let [name] = findings.names.as_slice() else {
-        panic!("{:?}", findings.names)
+    let folder = flown("tumble", 0.0, 3, &[lost(2)], |_| true);
+    let texts = analysed(folder.path(), &[], &|_, _| ()).expect("has redundancy");
+    let text = |wanted: &str| &texts.iter().find(|(name, _)| name == wanted).expect("is written").1;
+    let verdict: Value = serde_json::from_str(text("verdict.json")).expect("reads");
+    assert_eq!(verdict["outcome"], "named");
+    let [cause] = verdict["causes"].as_array().expect("causes").as_slice() else {
+        panic!("{}", verdict["causes"])
     };
-    assert_eq!((name.effect, name.by), ("packet-loss", By::Turns));
-    let [loss] = name.losses.as_slice() else {
-        panic!("{:?}", name.losses)
+    assert_eq!(
+        (&cause["effect"], &cause["by"]),
+        (&"packet-loss".into(), &"turns".into())
+    );
+    let [loss] = cause["losses"].as_array().expect("losses").as_slice() else {
+        panic!("{cause}")
     };
-    assert_eq!(loss.packets, 2);
-    assert!((loss.after_s - FROM_S).abs() < 0.2, "{loss:?}");
-    assert_eq!(findings.outcome, Outcome::Named);
-    assert!(findings.gap[1] < 1.05, "{:?}", findings.gap);
+    assert_eq!(loss["packets"], 2);
+    assert!(
+        (loss["after_s"].as_f64().expect("a time") - FROM_S).abs() < 0.2,
+        "{loss}"
+    );
+    assert!(
+        verdict["gap"]["after"].as_f64().expect("a gap") < 1.05,
+        "{}",
+        verdict["gap"]
+    );
+    // The last packet of the fit windows, 0.4 s later than told.
+    let last = text(ATTITUDE).lines().last().expect("rows");
+    assert!(last.starts_with("110.2"), "{last}");
+    let page = text("index.html");
+    assert!(page.contains("Packets were lost that nobody counted. The sensors agree with each other"));
 }
 
 #[test]
