@@ -19,6 +19,7 @@ use crate::{
     },
     parity::{
         known::Known,
+        lost::{Loss, put_back_spans},
         phases::{self, Stretch},
         smooth::rests::rests,
         turning::Holes,
@@ -121,10 +122,13 @@ impl Flight {
         phases::line(&self.phases, self.are_phases_told, first_s)
     }
 
-    /// \[s\] spans in which nothing moves, of rows of it: as its file says, or as they are found.
-    pub fn rests(&self, log: &Log, unit: &UnitDescription) -> Vec<(f64, f64)> {
+    /// \[s\] spans in which nothing moves, of rows of it that are put back in time: as its file says by the times that the log tells, or as they
+    /// are found.
+    pub fn rests(&self, log: &Log, unit: &UnitDescription, losses: &[Loss]) -> Vec<(f64, f64)> {
         if self.are_phases_told {
-            phases::still(&self.phases)
+            let mut still = phases::still(&self.phases);
+            put_back_spans(&mut still, losses);
+            still
         } else {
             rests(log, unit, &self.environment)
         }

@@ -18,6 +18,7 @@ use crate::{
         course::{Course, Start},
         flight::Flight,
         known::Known,
+        lost::Loss,
         packet::Motion,
         search::{Free, residual_of},
         smooth::{self, About, Smoothed, smoothing::Smoothing},
@@ -45,6 +46,11 @@ impl Beforehand {
             found: found.to_vec(),
             ..Self::default()
         }
+    }
+
+    /// Packets that nobody counted.
+    pub fn losses(&self) -> Vec<Loss> {
+        self.found.iter().flat_map(|finding| finding.losses.clone()).collect()
     }
 }
 
@@ -76,15 +82,14 @@ impl Followed {
         let environment = flight.environment;
         let (course, mut start) = Course::of(&steady, &unit, &environment);
         start.holes.clone_from(&flight.holes);
-        for finding in &beforehand.found {
-            start.holes.put_back(&finding.losses);
-        }
+        let losses = beforehand.losses();
+        start.holes.put_back(&losses);
         Self {
             course,
             smoothed: OnceCell::new(),
             motion: OnceCell::new(),
             calibrated: OnceCell::new(),
-            rests: flight.rests(&steady, &unit),
+            rests: flight.rests(&steady, &unit, &losses),
             log,
             steady,
             unit,

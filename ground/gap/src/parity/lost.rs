@@ -25,7 +25,7 @@
 //! turned as it should. So without either of the two rows the loss has to be the likelier one still. Of several
 //! that lie beside each other the likelier is found first.
 //!
-//! Refuses nothing: a unit without three gyros that span, or with neither field nor force, shows none.
+//! Refuses nothing: a unit without a cycle or without three gyros that span, or with neither field nor force, shows none.
 
 mod law;
 mod turned;
@@ -100,6 +100,14 @@ pub fn put_back(start_s: &mut [f64], losses: &[Loss]) {
     for start_s in start_s {
         let before = losses.iter().filter(|loss| loss.after_s < *start_s);
         *start_s += before.map(|loss| loss.by_s).sum::<f64>();
+    }
+}
+
+/// The same of spans.
+pub fn put_back_spans(spans_s: &mut [(f64, f64)], losses: &[Loss]) {
+    for (from_s, to_s) in spans_s {
+        put_back(std::slice::from_mut(from_s), losses);
+        put_back(std::slice::from_mut(to_s), losses);
     }
 }
 
@@ -325,6 +333,19 @@ mod tests {
             !Losses::of(&log, &unit).found.is_empty()
         };
         (0..40).filter(is_loss).count()
+    }
+
+    #[test]
+    fn what_comes_after_a_loss_is_put_back_and_nothing_else_is() {
+        let loss = |after_s, packets: usize| Loss {
+            after_s,
+            packets,
+            by_s: 0.2 * packets as f64,
+            probability: 1.0,
+        };
+        let mut spans_s = vec![(0.0, 1.0), (1.0, 1.2), (4.0, 5.0)];
+        put_back_spans(&mut spans_s, &[loss(1.0, 1), loss(4.0, 2)]);
+        assert_eq!(spans_s, [(0.0, 1.0), (1.0, 1.4), (4.2, 5.6)]);
     }
 
     #[test]

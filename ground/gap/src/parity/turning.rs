@@ -17,7 +17,7 @@ use twin::predict::{Kind, UnitDescription};
 
 use crate::{
     input::log::Log,
-    parity::lost::{Loss, put_back},
+    parity::lost::{Loss, put_back_spans},
 };
 
 /// Rows without a rate that a spline bridges: as many as its knots are held from one side.
@@ -77,10 +77,7 @@ impl Holes {
 
     /// As late as they are, of the times that a log tells.
     pub fn put_back(&mut self, losses: &[Loss]) {
-        for (from_s, to_s) in &mut self.spans_s {
-            put_back(std::slice::from_mut(from_s), losses);
-            put_back(std::slice::from_mut(to_s), losses);
-        }
+        put_back_spans(&mut self.spans_s, losses);
     }
 
     /// \[s\] pieces of rows between which a hole was left out. Windows that are parted and packets that were lost part nothing.
