@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::twin_case::Log;
 use gap::parity::{
     flight::Flight,
+    lost::Loss,
     phases::{Phase, is_begun_in_flight},
 };
 use tempfile::TempDir;
@@ -74,7 +75,15 @@ fn told_phases_are_taken_instead_and_wrong_ones_are_refused_naming_both() {
     let flight = open(&flown(0.0, told));
     assert!(flight.are_phases_told);
     assert_eq!(flight.phases.iter().filter(|own| own.phase == Phase::Coast).count(), 1);
-    assert_eq!(flight.rests(&flight.log, &flight.unit), [(0.0, 29.0)]);
+    assert_eq!(flight.rests(&flight.log, &flight.unit, &[]), [(0.0, 29.0)]);
+    // What was lost during a rest makes it longer.
+    let lost = Loss {
+        after_s: 10.0,
+        packets: 5,
+        by_s: 1.0,
+        probability: 1.0,
+    };
+    assert_eq!(flight.rests(&flight.log, &flight.unit, &[lost]), [(0.0, 30.0)]);
     let refused = |more: &str| {
         let error = Flight::open(flown(0.0, more).path())
             .err()
