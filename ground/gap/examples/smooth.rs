@@ -35,7 +35,7 @@ fn of(folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         course: &course,
         start: &start,
     };
-    let mut smoothed = Smoothed::of(&about, flight.rests(&flight.log, &flight.unit), &|_| ())?;
+    let mut smoothed = Smoothed::of(&about, flight.rests(&flight.log, &flight.unit, &[]), &|_| ())?;
     if smoothed.is_settled() {
         smoothed.hold(&flight.known, &about, &|_| ())?;
     }
