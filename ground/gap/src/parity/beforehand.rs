@@ -1,7 +1,7 @@
 //! What is known of a log before there is a motion.
 //!
-//! In: a [`Flight`]. Out: [`Beforehand`]: what codes and axes say by themselves, packets that were lost, and the part that a motion is made without. All of it decides what a
-//! motion is made of, in the fit windows and in the held-out ones alike.
+//! In: a [`Flight`]. Out: [`Beforehand`]: what codes and axes say by themselves, packets that were lost, and the part that a motion is made
+//! without. All of it decides what a motion is made of, in the fit windows and in the held-out ones alike.
 
 use twin::{
     effect::{Cause, Locality, by_name},
@@ -22,6 +22,9 @@ use crate::{
     },
 };
 
+/// The effect's name in the library.
+const PACKET_LOSS: &str = "packet-loss";
+
 /// Of a flight.
 ///
 /// # Errors
@@ -37,8 +40,11 @@ pub fn look(flight: &Flight, withheld: &[String]) -> Result<Beforehand, CaseErro
     found.extend(wired::look(flight, &found, withheld)?);
     let (mut log, mut unit) = (flight.whole.clone(), flight.unit.clone());
     taken_out(&mut log, &mut unit, &found);
-    let losses = Losses::of(&log, &unit);
-    found.extend(finding(&unit, losses.found).filter(is_known));
+    let losses = match withheld.iter().any(|name| name == PACKET_LOSS) {
+        true => Losses::default(),
+        false => Losses::of(&log, &unit),
+    };
+    found.extend(finding(&unit, losses.found));
     let bending = bending::look(flight, &found)?;
     Ok(Beforehand {
         found,
@@ -49,7 +55,7 @@ pub fn look(flight: &Flight, withheld: &[String]) -> Result<Beforehand, CaseErro
 
 /// Packets that were lost, if any were.
 fn finding(unit: &UnitDescription, losses: Vec<Loss>) -> Option<Finding> {
-    let (effect, locality) = (by_name("packet-loss")?, Locality::Unit);
+    let (effect, locality) = (by_name(PACKET_LOSS)?, Locality::Unit);
     (!losses.is_empty()).then(|| Finding {
         effect: effect.page().name,
         channels: Cause {

@@ -75,7 +75,7 @@ pub struct Findings {
     pub free: [f64; 4],
     /// Channels of a part that the motion is made without.
     pub bending: Vec<usize>,
-    /// Share of the rows after which one lost packet would be found.
+    /// Share of the rows after which one lost packet would be found; none where they were not looked for.
     pub loss_shown: Option<f64>,
     /// \[sigma\] before anything is named, and after.
     pub gap: [f64; 2],

@@ -18,7 +18,7 @@ use crate::{
         course::{Course, Start},
         flight::Flight,
         known::Known,
-        lost::Loss,
+        lost::{Loss, put_back_spans},
         packet::Motion,
         search::{Free, residual_of},
         smooth::{self, About, Smoothed, smoothing::Smoothing},
@@ -35,7 +35,7 @@ pub struct Beforehand {
     pub found: Vec<Finding>,
     /// Channels of a part that would bend the motion. They are judged about the motion of the others.
     pub bending: Vec<usize>,
-    /// Share of the rows after which one lost packet would be found; none where nothing would show one.
+    /// Share of the rows after which one lost packet would be found; none where they were not looked for.
     pub loss_shown: Option<f64>,
 }
 
@@ -83,7 +83,7 @@ impl Followed {
         let (course, mut start) = Course::of(&steady, &unit, &environment);
         start.holes.clone_from(&flight.holes);
         let losses = beforehand.losses();
-        start.holes.put_back(&losses);
+        put_back_spans(start.holes.spans_s_mut(), &losses);
         Self {
             course,
             smoothed: OnceCell::new(),

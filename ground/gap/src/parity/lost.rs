@@ -12,18 +12,27 @@
 //!
 //! is small for the true `T`: the cycle, or `n + 1` cycles where `n` packets were lost. How small, the log itself tells: `d` of all
 //! its rows, and of all pairs of rows with `n` rows between them, have a law each ([`law`]). So a motion that is quick beside the
-//! cycle, or that pushes, has wide laws and shows nothing, and no noise, interpolation or acceleration has to be described. The
-//! evidence of a loss is
+//! cycle, or that pushes, has wide laws and shows nothing, and no noise, interpolation or acceleration has to be described.
 //!
-//! ```text
-//! ln p_n(d((n + 1) cycle)) - ln p_0(d(cycle)) - ln rows
-//! ```
+//! A loss of `n` packets has to win three comparisons. Each packet more is half as likely, which costs `n ln 2`.
 //!
-//! with `n ln 2` beside it, for each packet more is half as likely. Believed is what chance makes in less than [`ROWS_CHANCE`] of all
-//! logs. A step of the field or a blow is no turn: where a normal law of the shape of `p_0`, as wide as it has to be, explains a row
-//! as well, nothing is said; from [`CHANCE`] against it on there is a loss. One row that is off is none either: across it the unit has
-//! turned as it should. So without either of the two rows the loss has to be the likelier one still. Of several
-//! that lie beside each other the likelier is found first.
+//! 1. Against chance. Any row may have it, and it must come by chance in less than [`ROWS_CHANCE`] of all logs:
+//!
+//!    ```text
+//!    ln p_n(d((n + 1) cycle)) - n ln 2 - ln p_0(d(cycle)) - ln rows > -ln ROWS_CHANCE
+//!    ```
+//!
+//! 2. Against a jump: a field that steps, a blow. A jump may be of any size. Its law `q` is normal, has the shape of `p_0`, and is as wide
+//!    as explains this one row best. A loss is believed where a jump is less likely than [`CHANCE`] beside it:
+//!
+//!    ```text
+//!    ln p_n(d((n + 1) cycle)) - n ln 2 - ln q(d(cycle)) > -ln CHANCE
+//!    ```
+//!
+//! 3. Against one row that is off. Across that row the unit has turned as it should. So the loss is also asked of the pair that leaves out
+//!    the row before it, and of the pair that leaves out the row after it. In both it must be likelier than no loss and than a jump.
+//!
+//! Losses that share rows are found one after another, the likelier first.
 //!
 //! Refuses nothing: a unit without a cycle or without three gyros that span, or with neither field nor force, shows none.
 
@@ -42,10 +51,11 @@ use crate::{
     thresholds::{CHANCE, ROWS_CHANCE},
 };
 
-/// Cycles between two rows that are looked at: two seconds, over which few motions are a cubic of their ends.
+/// Packets between two rows at most that have a law. Of the unit's cycle they are two seconds, and few motions are a cubic for longer.
 const LONGEST: usize = 10;
 
-/// Rows to either side that are taken together: more of them have less noise, and a longer turn.
+/// Rows to either side that are taken together, of which the log chooses what shows most: more rows have less noise, and their turn has more
+/// error.
 const BESIDE: [usize; 4] = [1, 2, 4, 8];
 
 /// Packets that are not there.
@@ -67,7 +77,7 @@ pub struct Loss {
 pub struct Losses {
     /// In the order of the log.
     pub found: Vec<Loss>,
-    /// Share of the rows after which one lost packet would be found; none where nothing turns.
+    /// Share of the rows after which one lost packet would be found; none of a log that has no laws.
     pub shown: Option<f64>,
 }
 
@@ -137,7 +147,7 @@ struct Laws {
 }
 
 impl Laws {
-    /// With as many rows to either side as show most.
+    /// With as many rows to either side as show most; none where there is no cycle, no rate, nothing that turns or too few rows.
     fn of(log: &Log, unit: &UnitDescription) -> Option<Self> {
         let all = BESIDE.into_iter().filter_map(|beside| Self::beside(log, unit, beside));
         let mut laws = all.max_by(|one, other| one.shown.total_cmp(&other.shown))?;
@@ -283,8 +293,9 @@ mod tests {
         Vector3::from_fn(|_, _| StandardNormal.sample(random))
     }
 
-    /// Three gyros and three magnetometers that turn about all axes, so many times as fast as slowly.
-    fn turning(quick: f64) -> (Log, UnitDescription) {
+    /// Three gyros and three magnetometers that turn about all axes, at up to `0.4 quick` rad/s about each, the field with so much
+    /// noise \[uT\].
+    fn turning(quick: f64, noise_ut: f64, seed: u64) -> (Log, UnitDescription) {
         let mut text = "name = \"x\"\ncycle_s = 0.2\n".to_owned();
         for index in 0..6 {
             let sensor = ["gyro", "magnetometer"][index / 3];
@@ -296,7 +307,7 @@ mod tests {
             );
         }
         let unit = UnitDescription::read(&text, "unit.toml").expect("a unit");
-        let (mut log, mut random) = (Log::empty(6), Xoshiro256PlusPlus::seed_from_u64(7));
+        let (mut log, mut random) = (Log::empty(6), Xoshiro256PlusPlus::seed_from_u64(seed));
         let rate_b = |t_s: f64| {
             Vector3::new(
                 (0.31 * quick * t_s).sin(),
@@ -310,7 +321,7 @@ mod tests {
             let start_s = 0.2 * row as f64;
             log.begin_row(start_s);
             let rate = rate_b(start_s) + 0.005 * normal(&mut random);
-            let field = attitude.inverse() * FIELD_N + 0.2 * normal(&mut random);
+            let field = attitude.inverse() * FIELD_N + noise_ut * normal(&mut random);
             for (index, value) in rate.iter().chain(field.iter()).enumerate() {
                 log.channels[index].rows.push(row as u32);
                 log.channels[index].values.push(*value);
@@ -322,9 +333,10 @@ mod tests {
         (log, unit)
     }
 
-    /// Of forty logs with something else at a row, how many have a loss. Told what is done to the channels of the field, from which row on and by how much.
+    /// In how many of forty logs a loss is found, where something else was done to the field. `change` is given the channels of the field, a
+    /// row and a step \[uT\].
     fn mistaken(quick: f64, change: impl Fn(&mut [Series], usize, Vector3<f64>)) -> usize {
-        let (log, unit) = turning(quick);
+        let (log, unit) = turning(quick, 0.2, 7);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(8);
         let is_loss = |at: &usize| {
             let mut log = log.clone();
@@ -346,6 +358,15 @@ mod tests {
         let mut spans_s = vec![(0.0, 1.0), (1.0, 1.2), (4.0, 5.0)];
         put_back_spans(&mut spans_s, &[loss(1.0, 1), loss(4.0, 2)]);
         assert_eq!(spans_s, [(0.0, 1.0), (1.0, 1.4), (4.2, 5.6)]);
+    }
+
+    /// Of the logs of the seeds 100 to 159 these have a loss if chance is not asked.
+    #[test]
+    fn what_noise_makes_is_no_loss() {
+        for seed in [100, 109, 119] {
+            let (log, unit) = turning(3.0, 5.0, seed);
+            assert_eq!(Losses::of(&log, &unit).found, [], "{seed}");
+        }
     }
 
     #[test]

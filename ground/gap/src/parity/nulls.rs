@@ -2,7 +2,8 @@
 //!
 //! In: nothing but the physics of one body with several sensors. Out: [`NULLS`]. An effect that is the same in every sensor of a
 //! kind is another motion, exactly. The columns of those that have one are free in the fit before anything is sought, so that
-//! what linearisation and priors leave of them is no evidence; and none of them is ever named.
+//! what linearisation and priors leave of them is no evidence; and none of them is ever named by its columns. Lost packets are found
+//! without any, by what the motion does at the loss ([`crate::parity::lost`]).
 
 use twin::effect::Locality;
 

@@ -15,10 +15,7 @@ use std::ops::Range;
 use nalgebra::Matrix3;
 use twin::predict::{Kind, UnitDescription};
 
-use crate::{
-    input::log::Log,
-    parity::lost::{Loss, put_back_spans},
-};
+use crate::input::log::Log;
 
 /// Rows without a rate that a spline bridges: as many as its knots are held from one side.
 const BRIDGED: usize = 2;
@@ -75,9 +72,9 @@ impl Holes {
         if kept.len() < least { rows } else { kept }
     }
 
-    /// As late as they are, of the times that a log tells.
-    pub fn put_back(&mut self, losses: &[Loss]) {
-        put_back_spans(&mut self.spans_s, losses);
+    /// \[s\] the start of the first row of each and of its last, to be put elsewhere in time with the rows of the log.
+    pub fn spans_s_mut(&mut self) -> &mut [(f64, f64)] {
+        &mut self.spans_s
     }
 
     /// \[s\] pieces of rows between which a hole was left out. Windows that are parted and packets that were lost part nothing.
@@ -135,6 +132,21 @@ mod tests {
         assert_eq!(left(|_, row| row != 20 && row != 21).len(), 40);
         assert_eq!(left(|_, row| !(20..23).contains(&row)).len(), 40 - 7);
         assert_eq!(left(|gyro, _| gyro == 0).len(), 40);
+    }
+
+    #[test]
+    fn a_hole_that_is_put_later_with_its_rows_parts_them_still() {
+        let unit = emems(thesis_slot_s);
+        let mut holes = Holes::of(&log(&unit, |_, row| !(20..23).contains(&row)), &unit);
+        let rows = holes.without((0..40).collect(), 16);
+        // Two seconds were lost before the hole, which is as long.
+        let later_s = |start_s: f64| if start_s > 1.0 { start_s + 2.0 } else { start_s };
+        let starts: Vec<f64> = rows.iter().map(|row| later_s(0.2 * *row as f64)).collect();
+        assert_eq!(holes.pieces(&starts).len(), 1, "the hole is where it was told");
+        for (from_s, to_s) in holes.spans_s_mut() {
+            (*from_s, *to_s) = (later_s(*from_s), later_s(*to_s));
+        }
+        assert_eq!(holes.pieces(&starts).len(), 2);
     }
 
     #[test]

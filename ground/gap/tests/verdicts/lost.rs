@@ -40,7 +40,7 @@ fn tumbling(active: &[Active]) -> Flight {
     opened(&flown("tumble", 0.0, 3, active, |_| true))
 }
 
-/// All values of a kind from some row on, changed.
+/// A log with the values of a kind changed in some rows.
 fn changed(log: &Log, flight: &Flight, kind: Kind, rows: std::ops::Range<u32>, by: impl Fn(usize) -> f64) -> Log {
     let mut log = log.clone();
     for (index, (channel, series)) in flight.unit.channels.iter().zip(&mut log.channels).enumerate() {
@@ -108,7 +108,7 @@ fn a_field_that_steps_and_one_row_that_is_off_are_no_loss() {
     let flight = tumbling(&[]);
     for step in [3.0, 10.0, 30.0] {
         for kind in [Kind::Magnetometer, Kind::Accelerometer] {
-            // Of each plate's axes another part, as a current or a blow has it.
+            // The three axes of a plate get different parts of the step.
             let by = |index: usize| step * [1.0, -0.6, 0.3][index % 3];
             for rows in [200..201, 200..u32::MAX] {
                 let log = changed(&flight.whole, &flight, kind, rows.clone(), by);

@@ -16,22 +16,22 @@
 use nalgebra::{DMatrix, DVector, RowDVector};
 use statrs::function::gamma::ln_gamma;
 
-/// Vectors to either side that tell a width.
+/// Vectors to either side that tell a width: fewer are chance, and a motion changes within more.
 const BESIDE: usize = 3;
 
-/// How far a width follows its neighbours.
+/// How far a width follows its neighbours, from not at all to wholly. Not 1: beside rows without any scatter there is a width still.
 const FOLLOWS: [f64; 5] = [0.0, 0.3, 0.6, 0.9, 0.99];
 
-/// Degrees of freedom: from tails without a variance to those of noise.
+/// Degrees of freedom, each some 1.7 times the one before: from tails without a variance to those of noise.
 const FREE: [f64; 6] = [1.5, 2.5, 4.0, 7.0, 15.0, 60.0];
 
-/// Steps of expectation and maximisation.
+/// Steps of expectation and maximisation. With 60 the losses found and the shares shown were the same in four logs at 21 cuts each.
 const STEPS: usize = 8;
 
-/// Vectors from which there is a law.
+/// Vectors from which there is a law: some five for each of the 21 numbers of a scatter of six.
 const LEAST: usize = 100;
 
-/// Vectors that a law is fitted to at most.
+/// Vectors that a law is fitted to at most: sizes are then known to 2 %, which moves the evidence by some tenths of a nat.
 const MOST: usize = 1500;
 
 /// Of vectors.
@@ -65,7 +65,7 @@ impl Known {
         })
     }
 
-    /// Squares of the medians of what a normal law has a standard deviation of 1.48 times: where to begin.
+    /// The squared median size of each component, on a diagonal: where the fit begins.
     fn middle(&self) -> DMatrix<f64> {
         let median = |row: RowDVector<f64>| {
             let mut sizes: Vec<f64> = row.iter().map(|own| own.abs()).collect();
@@ -235,7 +235,7 @@ mod tests {
             let (law, _) = Law::with_widths(&drawn(free, 1.0), 1).expect("a law");
             assert_eq!(law.free, free);
             assert_eq!(law.follows, 0.0);
-            // x and y of a vector go together: apart they are a tenth as likely wide.
+            // y is x and a tenth of an own part.
             let square = |x: f64, y: f64, z: f64| law.square(&DVector::from_vec(vec![x, y, z]));
             assert!((square(1.0, 1.0, 0.0) - 1.0).abs() < 0.15, "{}", square(1.0, 1.0, 0.0));
             assert!((square(0.0, 0.1, 0.0) - 1.0).abs() < 0.15);

@@ -9,16 +9,17 @@
 //! theta = T (w_1 + w_2) / 2 + T^2 (w_1' - w_2') / 12 + s (w_2 - w_1) + T^2 (w_1 x w_2) / 12
 //! ```
 //!
-//! where `s` is by how much the vector is read after the gyros; the last term is that of coning. A slope is that of the rows to its own
-//! side, so that nothing is asked of the time between. The vectors are means of several rows to that side, turned alike. Within a row
-//! `v' = -w x v` of what its sensors read one after another.
+//! where `s` is by how much the vector is read after the gyros; the last term is that of coning. Nothing is asked of the time between:
+//! `s_1` is the slope from the row before the first to the first, and `s_2` from the second to the one after it. They are those of half a
+//! cycle before and after, so that of a rate that bends evenly `w_1' - w_2' = (s_1 - s_2) T / (T + cycle)`. The vectors are means of several
+//! rows to either side, turned alike. Sensors of a row are read one after another, meanwhile `v' = -w x v`.
 
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
 use twin::predict::{Kind, UnitDescription};
 
 use crate::{input::log::Log, parity::turning::SPANS};
 
-/// Part of a cycle by which rows that follow each other may be off.
+/// Part of a cycle by which rows that follow each other may be off: half of what would make the number of cycles doubtful.
 const REGULAR: f64 = 0.25;
 
 /// Kinds of which a vector in n is turned.
@@ -29,15 +30,15 @@ struct Vectors {
     /// \[s\] after the start of the row.
     at_s: f64,
     /// Of each row; none where its sensors do not span.
-    own: Vec<Option<Vector3<f64>>>,
+    own_b: Vec<Option<Vector3<f64>>>,
 }
 
 /// A vector of each row, with what the rows to one side say of it.
 struct Sides {
     /// \[s\] after the gyros.
     later_s: f64,
-    before: Vec<Option<Vector3<f64>>>,
-    after: Vec<Option<Vector3<f64>>>,
+    before_b: Vec<Option<Vector3<f64>>>,
+    after_b: Vec<Option<Vector3<f64>>>,
 }
 
 /// What is needed of a log.
@@ -55,11 +56,11 @@ impl Turned {
         let rates = Vectors::of(log, unit, Kind::Gyro, &still)?;
         let vectors = VECTORS
             .iter()
-            .filter_map(|kind| Vectors::of(log, unit, *kind, &rates.own));
+            .filter_map(|kind| Vectors::of(log, unit, *kind, &rates.own_b));
         let vectors: Vec<Vectors> = vectors.collect();
         let mut turned = Self {
             start_s: log.start_s.clone(),
-            rates_b: rates.own,
+            rates_b: rates.own_b,
             vectors: Vec::new(),
             cycle_s,
         };
@@ -81,25 +82,25 @@ impl Turned {
         let left = |row: usize| Some(self.slope(row.checked_sub(1)?)? - self.slope(row)?);
         let right = |row: usize| Some(self.slope(row)? - self.slope(row + 1)?);
         let before = |row: usize| {
-            let (mut sum, mut back) = (of.own[row]?, Rotation3::identity());
+            let (mut sum, mut back) = (of.own_b[row]?, Rotation3::identity());
             for other in (row.checked_sub(rows - 1)?..row).rev() {
                 back *= turn(other, left(other))?.inverse();
-                sum += back * of.own[other]?;
+                sum += back * of.own_b[other]?;
             }
             Some(sum / rows as f64)
         };
         let after = |row: usize| {
-            let (mut sum, mut back) = (of.own[row]?, Rotation3::identity());
+            let (mut sum, mut back) = (of.own_b[row]?, Rotation3::identity());
             for other in row + 1..row + rows {
                 back *= turn(other - 1, right(other - 1))?;
-                sum += back * (*of.own.get(other)?)?;
+                sum += back * (*of.own_b.get(other)?)?;
             }
             Some(sum / rows as f64)
         };
         Sides {
             later_s,
-            before: (0..self.rows()).map(before).collect(),
-            after: (0..self.rows()).map(after).collect(),
+            before_b: (0..self.rows()).map(before).collect(),
+            after_b: (0..self.rows()).map(after).collect(),
         }
     }
 
@@ -117,14 +118,13 @@ impl Turned {
     /// rows follow each other nor that they are so far apart.
     pub fn off(&self, from: usize, to: usize, apart_s: f64) -> Option<DVector<f64>> {
         let slopes = self.slope(from.checked_sub(1)?)? - self.slope(to)?;
-        // They are those half a cycle before and after; between, the rates bend evenly.
         let theta = self.theta(from, to, apart_s, slopes * (apart_s / (apart_s + self.cycle_s)))?;
         let change = self.change(from, to)?;
         let mut off = DVector::zeros(3 * self.vectors.len());
         for (at, own) in self.vectors.iter().enumerate() {
             let turn = Rotation3::new(-(theta + own.later_s * change));
             off.fixed_rows_mut::<3>(3 * at)
-                .copy_from(&(own.after[to]? - turn * own.before[from]?));
+                .copy_from(&(own.after_b[to]? - turn * own.before_b[from]?));
         }
         Some(off)
     }
@@ -182,8 +182,8 @@ impl Vectors {
             let spans = matrix.symmetric_eigenvalues().min() > SPANS;
             matrix.cholesky().filter(|_| spans).map(|own| own.solve(&right))
         };
-        let own: Vec<Option<Vector3<f64>>> = sums.into_iter().map(solve).collect();
-        own.iter().any(Option::is_some).then_some(Self { at_s, own })
+        let own_b: Vec<Option<Vector3<f64>>> = sums.into_iter().map(solve).collect();
+        own_b.iter().any(Option::is_some).then_some(Self { at_s, own_b })
     }
 }
 
