@@ -45,7 +45,7 @@ use twin::predict::UnitDescription;
 use crate::{
     input::log::Log,
     parity::lost::{
-        law::{Law, about},
+        law::{Law, MOST, about},
         turned::Turned,
     },
     thresholds::{CHANCE, ROWS_CHANCE},
@@ -185,7 +185,7 @@ impl Laws {
             let off = self.turned.off(row, row + gap, gap as f64 * self.cycle_s)?;
             Some((off, about(&self.widths, (row, row + gap - 1), self.shared)?))
         };
-        let all: Vec<_> = (0..self.turned.rows().saturating_sub(gap)).filter_map(at).collect();
+        let all: Vec<_> = self.some_rows().filter_map(at).collect();
         self.laws.push(self.laws[0].of_others(&all)?);
         Some(())
     }
@@ -248,9 +248,16 @@ impl Laws {
         losses
     }
 
+    /// As many as a law needs, from all of the log.
+    fn some_rows(&self) -> impl Iterator<Item = usize> {
+        let known = |row: &usize| self.widths[*row].is_some();
+        let all = self.widths.iter().flatten().count();
+        (0..self.turned.rows()).filter(known).step_by(all.div_ceil(MOST).max(1))
+    }
+
     /// What the log would show of one lost packet: a row is left out, and the two beside it are told to be a cycle apart.
     fn shown(&self) -> f64 {
-        let rows: Vec<usize> = (0..self.turned.rows())
+        let rows: Vec<usize> = (self.some_rows())
             .filter(|row| self.odds((*row, *row + 2), 1, 1).is_some())
             .collect();
         let found = rows

@@ -32,7 +32,7 @@ const STEPS: usize = 8;
 const LEAST: usize = 100;
 
 /// Vectors that a law is fitted to at most: sizes are then known to 2 %, which moves the evidence by some tenths of a nat.
-const MOST: usize = 1500;
+pub const MOST: usize = 1500;
 
 /// Of vectors.
 #[derive(Clone, Debug)]
