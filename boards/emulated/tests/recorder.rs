@@ -24,8 +24,8 @@ use twin::{
 };
 
 /// Cuts per change, over runs of [`CUTS_A_RUN`]: a run for each of two cores.
-const CUTS: u64 = 40;
-const CUTS_A_RUN: u64 = 20;
+const CUTS: u64 = 16;
+const CUTS_A_RUN: u64 = 8;
 /// \[ns\] from reset to the first durable record. A cut of the supply takes 250 ms of it: the gyros' start.
 const BACK: Nanos = 400 * MS;
 /// \[ns\] from one cut to the next at most. One in three comes when the unit has to be back, and not later.
@@ -153,7 +153,7 @@ mod long {
             .and_then(|text| text.parse().ok())
             .unwrap_or(CUTS);
         let runs = cuts.div_ceil(CUTS_A_RUN);
-        // A run is a minute of one core: odd and even ones side by side.
+        // A run is half a minute of one core: odd and even ones side by side.
         std::thread::scope(|scope| {
             for first in 0..2 {
                 scope.spawn(move || (first..runs).step_by(2).for_each(cut_again_and_again));
