@@ -305,32 +305,6 @@ fn a_step_is_found_where_it_is_and_is_no_walk() {
     assert!(["a step at 43 s", "a step at 42 s"].contains(&which), "{which}");
 }
 
-/// A line whose slow image is between two that were tried: halfway it has turned over at the end of the fit windows.
-#[test]
-fn a_line_of_the_mains_is_found_at_its_frequency_and_goes_on_in_the_held_out_windows() {
-    let active = [Active {
-        cause: Cause {
-            effect: by_name("mains-alias").expect("an effect"),
-            locality: Locality::Unit,
-            variant: 50.012,
-        },
-        theta: vec![0.5, -0.3, 0.4, 0.2, 0.4, -0.5],
-    }];
-    for motion in ["tumble", "rate-table"] {
-        let findings = found(&flown_in(motion, 20.0, 4, (&active, &active), 60.0, |_| true));
-        let [name] = findings.names.as_slice() else {
-            panic!("{motion}: {:?} or {:?}", findings.names, findings.alternatives);
-        };
-        assert_eq!(name.effect, "mains-alias");
-        let promise = name.promise.expect("the held-out windows are asked");
-        assert!(
-            (promise.factor - 1.0).abs() < 0.2,
-            "{motion}: {:?} {promise:?}",
-            name.which
-        );
-    }
-}
-
 #[test]
 fn what_is_found_beside_a_cause_does_not_speak_against_it() {
     let iron = iron("plate 3", [1.0, -0.8, 0.6]);
@@ -416,6 +390,33 @@ fn what_needs_a_reference_is_refused_with_a_word_of_what_to_do() {
 /// What takes more than six seconds of a core.
 mod long {
     use super::*;
+
+    /// A line whose slow image is between two that were tried: halfway it has turned over at the end of the fit windows.
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_line_of_the_mains_is_found_at_its_frequency_and_goes_on_in_the_held_out_windows() {
+        let active = [Active {
+            cause: Cause {
+                effect: by_name("mains-alias").expect("an effect"),
+                locality: Locality::Unit,
+                variant: 50.012,
+            },
+            theta: vec![0.5, -0.3, 0.4, 0.2, 0.4, -0.5],
+        }];
+        for motion in ["tumble", "rate-table"] {
+            let findings = found(&flown_in(motion, 20.0, 4, (&active, &active), 60.0, |_| true));
+            let [name] = findings.names.as_slice() else {
+                panic!("{motion}: {:?} or {:?}", findings.names, findings.alternatives);
+            };
+            assert_eq!(name.effect, "mains-alias");
+            let promise = name.promise.expect("the held-out windows are asked");
+            assert!(
+                (promise.factor - 1.0).abs() < 0.2,
+                "{motion}: {:?} {promise:?}",
+                name.which
+            );
+        }
+    }
 
     #[test]
     #[ignore = "takes more than six seconds: cargo host-test-long runs it"]

@@ -25,16 +25,6 @@ fn check(name: &str, effect: Option<&str>) {
 }
 
 #[test]
-fn a_displaced_unit_on_a_centrifuge_is_named() {
-    check("P13", Some("lever-arm"));
-}
-
-#[test]
-fn low_bits_cut_off_are_named() {
-    check("P02", Some("coarse-quantisation"));
-}
-
-#[test]
 fn a_healthy_unit_is_given_no_cause() {
     check("P12", None);
 }
@@ -53,4 +43,21 @@ fn a_printed_table_yields_its_wrong_commands_its_inverted_gyro_and_the_sagnac_si
     );
     let screen = gap::report::terminal::screen(&subject, &diagnosis, "");
     assert!(screen.contains("lme02: scale drift or none of these"), "{screen}");
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_displaced_unit_on_a_centrifuge_is_named() {
+        check("P13", Some("lever-arm"));
+    }
+
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn low_bits_cut_off_are_named() {
+        check("P02", Some("coarse-quantisation"));
+    }
 }

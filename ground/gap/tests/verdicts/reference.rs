@@ -194,19 +194,6 @@ fn what_begins_between_fitted_windows_keeps_its_name() {
     }
 }
 
-/// A walk is a course that nobody knows, but one with the spectrum of a walk, and it says where the zero is between the windows. Not every walk
-/// moves far, and one that moves far resembles a supply that sags now and then; neither may have another name.
-#[test]
-fn a_zero_that_walks_is_named_and_a_slow_wave_is_no_walk() {
-    let named: Vec<_> = (1..=5).flat_map(|seed| named_in_turns(walk(seed, 0.001))).collect();
-    assert!(
-        named.len() >= 3 && named.iter().all(|name| *name == "gyro-bias-walk"),
-        "{named:?}"
-    );
-    assert!(!named_in_turns(|t_s| 0.02 * (TAU * t_s / 55.0).sin()).contains(&"gyro-bias-walk"));
-    assert_eq!(named_in_turns(walk(5, 0.00002)), Vec::<&str>::new());
-}
-
 /// Its largest rates are short by what the reference may err by.
 #[test]
 fn a_gyro_that_stops_inside_its_range_is_named() {
@@ -299,4 +286,23 @@ fn late_gyros_and_a_late_unit_of_gyros_alone_are_not_told_apart() {
     let sets = &diagnosis.indistinguishable;
     let is_one_set = |set: &Vec<_>| set.contains(&"latency") && set.contains(&"gyro-latency");
     assert!(sets.iter().any(is_one_set), "{sets:?}");
+}
+
+/// What takes more than six seconds of a core.
+mod long {
+    use super::*;
+
+    /// A walk is a course that nobody knows, but one with the spectrum of a walk, and it says where the zero is between the windows. Not every walk
+    /// moves far, and one that moves far resembles a supply that sags now and then; neither may have another name.
+    #[test]
+    #[ignore = "takes more than six seconds: cargo host-test-long runs it"]
+    fn a_zero_that_walks_is_named_and_a_slow_wave_is_no_walk() {
+        let named: Vec<_> = (1..=5).flat_map(|seed| named_in_turns(walk(seed, 0.001))).collect();
+        assert!(
+            named.len() >= 3 && named.iter().all(|name| *name == "gyro-bias-walk"),
+            "{named:?}"
+        );
+        assert!(!named_in_turns(|t_s| 0.02 * (TAU * t_s / 55.0).sin()).contains(&"gyro-bias-walk"));
+        assert_eq!(named_in_turns(walk(5, 0.00002)), Vec::<&str>::new());
+    }
 }
