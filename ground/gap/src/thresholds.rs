@@ -1,7 +1,10 @@
 //! Every threshold that decides what is said: with its unit, what a larger and a smaller one do, and where it comes from.
 //!
 //! Steps of an iteration, sizes of a simulation, seeds and widths of a page decide nothing and stand where they are used. A
-//! threshold that is fitted names the cases; one that is only assumed says so, and is the first to be questioned.
+//! threshold that is fitted names the cases; one that is only assumed says so, and is the first to be questioned. What follows from one in
+//! the list is computed from it and is not listed.
+
+use statrs::function::erf::erfc_inv;
 
 /// Where a threshold comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,21 +95,26 @@ thresholds! {
         smaller: "misfits that change nothing are called unknown effects",
         Convention("a twentieth of the noise");
     // Step 4, search
-    /// Evidence that an effect must bring beyond its prior odds, on readings or on the scatter, and must be able to bring in other blocks that are to say anything of it.
-    EFFECT_MARGIN: f64 = 3.0, in "nats",
-        larger: "weak effects are not found, and fewer are cross-validated",
-        smaller: "wrong effects are added, and noise refutes right ones",
-        Derived("three nats are odds of twenty: one wrong addition in twenty");
     /// Effects on readings at once.
     MOST_EFFECTS: usize = 5, in "effects",
         larger: "slower; patchworks for an unknown effect",
         smaller: "true sets of many are cut",
         Fitted("no answer with more was right on the dealt cases");
-    /// Probability from which an effect, or the unknown, is named.
+    /// Probability from which an effect, or the unknown, is named. It is also how far a name is believed of which held-out windows or parity show too little.
     SAID: f64 = 0.5, in "probability",
         larger: "fewer names, fewer of them wrong",
         smaller: "more names, more of them wrong",
         Convention("likelier than not");
+    /// Probability of what chance does once in a thousand. Beyond it a window is not at rest, a slow course is no walk, a motion that is told is another flight's, and a difference of two chips is told.
+    SELDOM: f64 = 1e-3, in "probability",
+        larger: "rests, walks, tracks and simulated trajectories that are right are refused; differences of chips that are chance are told",
+        smaller: "another slow effect is called a walk, and another flight's motion bends this one; small differences of chips are not told",
+        Convention("one in a thousand: what is wrongly refused is said");
+    /// Probability of what chance does in one log of ten thousand. Beyond it rows are believed by themselves: old samples, damage, a line, lost packets. So are a dragged calibration and a gap of a table's channel, and more events than that are not looked for.
+    RARE: f64 = 1e-4, in "probability",
+        larger: "chance is taken for old samples, damage, vibration and gaps of tables; many events are cut",
+        smaller: "few old samples, little damage and weak vibrations are not found; a dragged calibration hides its effect",
+        Convention("one in ten thousand");
     /// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
     REMAINDER: f64 = 0.005, in "part of the strongest gain",
         larger: "weak second effects are not named",
@@ -132,21 +140,11 @@ thresholds! {
         larger: "shorter lists",
         smaller: "longer lists",
         Convention("half a percent");
-    /// Evidence that a stretch of time, once or periodic, must gain over "always", beyond the price of having looked; of effects and of the gap itself.
-    STRETCH_MARGIN: f64 = 10.0, in "nats",
-        larger: "what comes and goes is taken for steady",
-        smaller: "what is steady is cut to a stretch",
-        Assumed("as decisive as the margin of a name");
     /// The least part that counts. Each half of a stretch has to bring it of what is explained, and so has an effect that is to be seen coming and going beside others. Each third of the time has to bring it of what a periodic effect would be there, and to hold it of an even share. A calibration has to leave it of an effect that it does not imitate.
     LEAST_PART: f64 = 0.1, in "part",
         larger: "short strong parts and uneven effects are taken for steady ones",
         smaller: "one blow makes a stretch, and what another law leaves over gets one; iron far beyond a zero's sigma has no name",
         Assumed("an even effect has half or a third, and what another effect's law leaves is not the same at all times either");
-    /// Sum of squares over six octaves beyond which a walk is none.
-    WALK_OFF: f64 = 22.5, in "sum of squares",
-        larger: "other slow effects are called a walk",
-        smaller: "walks are refused",
-        Derived("chi-square of six degrees at one in a thousand");
     /// Samples from which a walk is told from anything else.
     WALK_FEWEST: usize = 100, in "samples",
         larger: "walks of short logs are missed",
@@ -162,16 +160,6 @@ thresholds! {
         larger: "rivals are not tried",
         smaller: "slower",
         Assumed("what a calibration of its own may bring");
-    /// Strain from which a calibration may have been dragged to where it is.
-    DRAGGED: f64 = 4.0, in "prior sigmas",
-        larger: "a dragged calibration hides its effect",
-        smaller: "slower",
-        Derived("four sigmas by chance are one in sixteen thousand");
-    /// Difference of energy, tails or neighbours of a residual from the nominal for a second look.
-    ODD: f64 = 2.0, in "standard deviations",
-        larger: "weak effects on the scatter are not looked at",
-        smaller: "slower",
-        Derived("two are worth two nats, below any price");
     /// Correlation of neighbouring residuals from which a misfit is no white noise.
     COLOURED: f64 = 0.2, in "correlation",
         larger: "louder noise swallows effects the library does not have",
@@ -183,26 +171,21 @@ thresholds! {
         larger: "shorter lists; weak common effects on the scatter are not looked at",
         smaller: "longer lists; slower",
         Convention("three sigma, 4.5 nats, below any price");
-    /// Probability up to which something is chance, or is not possible: of a gap, of a rival, and the share of the cells named that may be wrong.
+    /// Probability up to which chance is believed. It decides whether there is a gap, whether an effect is added (three nats beyond its price), whether a rival is listed, whether two effects are confused, and what share of the cells named may be wrong. As sigmas, which are two, it decides what scatter is looked at twice and what slow remainder may be the reference's.
     CHANCE: f64 = 0.05, in "probability",
-        larger: "more cells, more of them chance; shares of weak gaps are not printed; smaller sets",
-        smaller: "fewer cells; shares of noise are printed; larger sets",
+        larger: "wrong effects are added; more cells, more of them chance; shares of weak gaps are not printed; smaller sets",
+        smaller: "weak effects are not found; fewer cells; shares of noise are printed; larger sets",
         Convention("one in twenty");
     /// Of the mean inside a passage, what the mean outside it must stay below.
     PASSAGE_QUIET: f64 = 0.5, in "part",
         larger: "gaps that only vary get a time",
         smaller: "passages are missed",
         Assumed("less is a gap that varies");
-    /// Share of the excess that the channels looked at, or named for an unexplained gap, hold together.
-    MOST_OF_EXCESS: f64 = 0.8, in "share",
-        larger: "more channels are named",
-        smaller: "fewer channels are named",
+    /// Share that is most of a gap. The channels that are looked at, or named for an unexplained gap, hold it together. An effect that leaves more of a recalibrated gap is no help.
+    MOST_OF_A_GAP: f64 = 0.8, in "share",
+        larger: "more channels are named, and fewer reported as left",
+        smaller: "fewer channels are named, and more reported as left",
         Convention("four fifths");
-    /// Sigmas of the reference or the field below which a slow remainder may be theirs.
-    REFERENCE_SIGMAS: f64 = 2.0, in "sigmas",
-        larger: "unknown effects as small are taken for the reference's",
-        smaller: "errors of a reference are called unknown effects",
-        Convention("two sigma");
     /// Part of a reference's fast variance that it may have more than its record says.
     REFERENCE_KNOWN: f64 = 0.5, in "part",
         larger: "fast unknown effects are taken for the reference's",
@@ -219,16 +202,11 @@ thresholds! {
         larger: "events are held to other blocks",
         smaller: "effects escape cross-validation",
         Convention("most of it");
-    /// Difference by which recalibration and an effect shrink a gap as much.
-    SAME_SHRINK: f64 = 0.01, in "part of the gap",
-        larger: "effects that recalibration beats are kept",
-        smaller: "equal ones are withdrawn",
-        Assumed("a hundredth of a gap is not seen");
-    /// Excess of a gap over its floor below which their quotient is noise over noise.
-    SMALLEST_EXCESS: f64 = 0.01, in "sigma",
-        larger: "small gaps have no percentage",
-        smaller: "percentages of nothing",
-        Derived("1/sqrt(2 n): the gap of five thousand samples is known to it");
+    /// How well a gap is known. A gap that exceeds its floor by less has no percentage. An effect and recalibration that differ by less, as a part of the gap, shrink it alike.
+    GAP_KNOWN: f64 = 0.01, in "sigma, and part of the gap",
+        larger: "small gaps have no percentage; effects that recalibration beats are kept",
+        smaller: "percentages of nothing; effects as good as recalibration are withdrawn",
+        Derived("1/sqrt(2 n) of five thousand samples");
     /// Difference of an effect's held-out strength from one that a true effect may show.
     STRENGTH_TOLERATED: f64 = 0.25, in "1",
         larger: "wrong laws pass",
@@ -239,11 +217,6 @@ thresholds! {
         larger: "windows that hardly show an effect confirm it",
         smaller: "weak hold windows confirm nothing",
         Convention("half of what is asked");
-    /// Probability of more events than are looked for.
-    MORE_EVENTS: f64 = 1e-4, in "probability",
-        larger: "many events are cut",
-        smaller: "slower",
-        Convention("one in ten thousand");
     // Step 7, how sure
     /// Size from which an engineer should look twice.
     SUSPICIOUS: f64 = 0.25, in "part of the largest size",
@@ -255,10 +228,10 @@ thresholds! {
         larger: "more alarms beside names",
         smaller: "stand-ins are believed",
         Assumed("one unit in twenty");
-    /// Evidence at which a name is as likely wrong as right.
+    /// Evidence at which a name is as likely wrong as right. An effect, or a gap, that is on in one stretch of time, or periodically, must gain as much over one that is always on, beyond the price of having looked.
     DOUBTED: f64 = 10.0, in "nats",
-        larger: "weak true names are lost",
-        smaller: "weak wrong names are said",
+        larger: "weak true names are lost; what comes and goes is taken for steady",
+        smaller: "weak wrong names are said; what is steady is cut to a stretch",
         Fitted("wrong names of the dealt cases had 8 to 26 nats; an effect of ratio 8 has 32 before its prior odds (docs/gap/trials.md)");
     /// What an effect that does not matter must be worth beside a reference's errors to be as likely said as not.
     CERTAIN: f64 = 32.0, in "nats",
@@ -275,22 +248,12 @@ thresholds! {
         larger: "stand-ins are believed",
         smaller: "effects that differ a little from their law are doubted",
         Assumed("a law that is a little off leaves a few parts in a hundred");
-    /// How far an effect is believed that is on in no held-out sample, or a walk of which parity shows too little.
-    UNTOLD: f64 = 0.5, in "probability",
-        larger: "patches are believed",
-        smaller: "rare true effects are doubted",
-        Fitted("on dealt cases two wrong names were such, and no right one (docs/gap/trials.md)");
     /// Share of the time that counts as a regime.
     REGIME_TIME: f64 = 0.3, in "share",
         larger: "vague regimes",
         smaller: "narrow regimes",
         Convention("a third");
     // Step 9, advice
-    /// Distance below which two effects are not told apart.
-    SET_APART: f64 = 5.0, in "nats",
-        larger: "larger sets",
-        smaller: "smaller sets that miss the truth",
-        Derived("Q(sqrt(5/2)): 6 % errors");
     /// Marginal signal-to-noise ratio that counts as seen.
     SEEN_SNR: f64 = 5.0, in "1",
         larger: "more conservative limits",
@@ -302,16 +265,6 @@ thresholds! {
         smaller: "fewer",
         Derived("Q(sqrt(11/2)): 1 % errors");
     // Step 10, report
-    /// Held-out gap of a channel of a table that noise does not leave in eight rows.
-    REMAINS: f64 = 2.5, in "sigma",
-        larger: "fewer channels are reported as left",
-        smaller: "more",
-        Derived("one in ten million");
-    /// Part of a recalibrated channel's held-out gap that an effect which helps it may leave.
-    HELPED: f64 = 0.8, in "part",
-        larger: "fewer channels are reported as left",
-        smaller: "more channels are reported as left",
-        Assumed("a fifth of a gap is help");
     // A log without a reference
     /// Signal-to-noise ratio at usual size from which an effect may be named without a reference, by parity or about the smoothed motion.
     PARITY_SNR: f64 = 3.0, in "1",
@@ -328,16 +281,6 @@ thresholds! {
         larger: "units with little redundancy are refused",
         smaller: "one plate is judged by its thermometers",
         Derived("one plate has none, two have three or more");
-    /// Probability by chance below which what the rows of a log say by themselves is believed: old samples, damaged ones, a line.
-    ROWS_CHANCE: f64 = 1e-4, in "probability",
-        larger: "chance is taken for old samples, damage and vibration",
-        smaller: "few old samples, little damage and weak vibrations are not found",
-        Convention("one healthy log in ten thousand");
-    /// Probability below which what is told of a motion is not of this flight, and is not used.
-    NOT_OF_THIS_FLIGHT: f64 = 1e-3, in "probability",
-        larger: "tracks and simulated trajectories that are right are left unused",
-        smaller: "a motion of another flight bends this one",
-        Convention("once in a thousand: a track that is wrongly left out costs what it would have told, and is said");
     /// Second difference of the specific force from which on it is a knock.
     KNOCK_M_S2: f64 = 50.0, in "m/s^2",
         larger: "light taps are not counted",
@@ -368,27 +311,32 @@ thresholds! {
         larger: "gravity is sought in a thrust",
         smaller: "a quick hand is called a flight",
         Derived("a velocity within its sigma has one; 24 recordings by hand (BROAD) have 0.3 at most");
-    /// Sigmas from which on a cross axis or a scale of one chip beside another is told.
-    CHIP_SIGMAS: f64 = 4.0, in "sigma",
-        larger: "small differences of chips are not told",
-        smaller: "chance is told of eighteen numbers a chip",
-        Derived("one in a thousand over eighteen numbers");
-    /// Size from which on it is told.
-    CHIP_DEG: f64 = 0.05, in "deg",
-        larger: "cross axes that matter are not told",
-        smaller: "cross axes that nobody needs are listed",
-        Convention("a tenth of what counts as an attitude's error that matters");
+}
+
+/// \[nats\] that an effect must bring beyond its prior odds, on readings or on the scatter, and must be able to bring in other blocks that
+/// are to say anything of it: a wrong one is added as seldom as [`CHANCE`] (three nats; odds of twenty).
+pub fn effect_margin() -> f64 {
+    -CHANCE.ln()
+}
+
+/// \[standard deviations\] that a normal number is off, to either side, with this probability.
+pub fn sigmas(probability: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erfc_inv(probability)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Fewer is better: fewer than fifty of the diagnosis with a reference, and whoever adds one takes another out or says why
-    /// here. Four more are of logs without a reference, which are judged by other numbers; six of one plate, whose names rest on no evidence of
-    /// the library; two of chips, which are told and not judged; one decides whether a told motion is used. One says how far the noise of a
-    /// description may be off; the gradient that a room was taken to have, a constant beside this list, went for it.
-    const MOST: usize = 49 + 4 + 6 + 2 + 1 + 1;
+    /// Fewer is better: whoever adds one takes another out.
+    const MOST: usize = 49;
+
+    #[test]
+    fn a_normal_number_is_as_far_off_as_tables_say() {
+        for (probability, off) in [(CHANCE, 1.960), (SELDOM, 3.291), (RARE, 3.891)] {
+            assert!((sigmas(probability) - off).abs() < 1e-3, "{probability}");
+        }
+    }
 
     #[test]
     fn every_threshold_is_listed_whole_and_once() {

@@ -5,13 +5,15 @@
 //! marginalised), so that the two differ by `m = 1/2 |h_i|^2 (1 - rho^2)` nats at best (Eriksson, Frisk and Krysander 2013);
 //! deciding between them then errs with probability `Q(sqrt(m/2))`: 11 nats, 1 %; 3 nats, 11 %.
 
+use statrs::function::erf::erfc;
+
 use crate::{
     library::hypotheses::Library,
     search::{
         odds::by_effect,
         readings::{Attribution, Chosen},
     },
-    thresholds::{CHANCE, SEEN_SNR, SET_APART},
+    thresholds::{CHANCE, SEEN_SNR},
 };
 
 /// How small an effect this log would show.
@@ -52,7 +54,7 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
         for rival in chosen.rivals.iter().map(|rival| rival.hypothesis) {
             let name = library.hypotheses[rival].effect();
             let is_likely = likely.iter().any(|(known, share)| *known == name && *share > CHANCE);
-            let is_near = nats_apart(library, chosen, rival).is_some_and(|nats| nats < SET_APART);
+            let is_near = nats_apart(library, chosen, rival).is_some_and(are_confused);
             if !set.contains(&name) && (is_likely || is_near) {
                 set.push(name);
             }
@@ -62,6 +64,17 @@ pub fn sets(library: &Library, found: &Attribution) -> Vec<Vec<&'static str>> {
         }
     }
     sets
+}
+
+/// Probability of deciding wrongly between two hypotheses so many nats apart: `Q(sqrt(m/2))`.
+pub fn error(nats: f64) -> f64 {
+    let x = (nats.max(0.0) / 2.0).sqrt();
+    0.5 * erfc(x / std::f64::consts::SQRT_2)
+}
+
+/// Whether a decision between two that are so many nats apart errs by more than [`CHANCE`].
+fn are_confused(nats: f64) -> bool {
+    error(nats) > CHANCE
 }
 
 /// The pair most worth telling apart: the likeliest rival of the strongest cause, of those that are `said`.
@@ -79,7 +92,7 @@ pub fn pair(library: &Library, found: &Attribution, said: &[&str]) -> Option<Pai
     let (chosen, rival, gap) = pairs.min_by(|one, other| one.2.total_cmp(&other.2))?;
     // The chosen effect has its columns where it is, its rival at zero. Where the effect is large they differ, though the exact fits may not.
     let by_columns = nats_apart(library, chosen, rival)?;
-    let nats = if gap < SET_APART {
+    let nats = if are_confused(gap) {
         by_columns.min(gap.max(0.0))
     } else {
         by_columns

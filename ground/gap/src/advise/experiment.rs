@@ -6,7 +6,6 @@
 //! `Q(sqrt(m/2))`.
 
 use nalgebra::DVector;
-use statrs::function::erf::erfc;
 use twin::{
     effect::{Active, Cause, by_name},
     motion::{Motion, RateTable, RotationTest, Still, Tumble},
@@ -14,7 +13,7 @@ use twin::{
 };
 
 use crate::{
-    advise::confusion::Pair,
+    advise::confusion::{Pair, error},
     input::{case::Subject, log::Series, reference::Reference, windows::Fit},
     library::{column::Column, products::Products},
     null::problem::Problem,
@@ -118,12 +117,6 @@ pub fn advice(subject: &Subject, rivals: Option<&Pair>, confirm: Option<&str>, i
 fn sentence(begin: &str, rest: Option<&str>) -> String {
     rest.filter(|rest| !rest.is_empty())
         .map_or(String::new(), |rest| format!("{begin} {rest}"))
-}
-
-/// Probability of deciding wrongly between two hypotheses so many nats apart: `Q(sqrt(m/2))`.
-fn error(nats: f64) -> f64 {
-    let x = (nats.max(0.0) / 2.0).sqrt();
-    0.5 * erfc(x / std::f64::consts::SQRT_2)
 }
 
 /// Nats between the two on a motion, and its minutes; `None` where one of them cannot be there.

@@ -21,7 +21,7 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
-    thresholds::{EFFECT_MARGIN, EVENT},
+    thresholds::{EVENT, effect_margin},
 };
 
 /// Blocks, each left out in turn.
@@ -77,7 +77,7 @@ fn key_of(without: &[Vec<DVector<f64>>], with: &[Vec<DVector<f64>>]) -> Option<K
     let promised: f64 = blocks()
         .map(|block| sum(block, |without, with| (without - with).norm_squared()))
         .sum();
-    if promised < EFFECT_MARGIN {
+    if promised < effect_margin() {
         return None;
     }
     let gains: Vec<f64> = blocks()

@@ -15,7 +15,7 @@ use crate::{
         model::Model,
         problem::{Component, Problem},
     },
-    thresholds::MORE_EVENTS,
+    thresholds::RARE,
 };
 
 /// What the fit learned of events that happen again.
@@ -83,11 +83,11 @@ impl Events {
     }
 }
 
-/// The number that a Poisson variable of this mean exceeds with a probability of no more than [`MORE_EVENTS`].
+/// The number that a Poisson variable of this mean exceeds with a probability of no more than [`RARE`].
 fn most(mean: f64) -> usize {
     let (mut term, mut count) = ((-mean).exp(), 0);
     let mut left = 1.0 - term;
-    while left > MORE_EVENTS {
+    while left > RARE {
         count += 1;
         term *= mean / count as f64;
         left -= term;

@@ -19,7 +19,7 @@ use super::{
     recurrences::Said,
     shrink::{ChannelShrink, Shrink},
 };
-use crate::{holdout::events::Events, input::hold::Held, thresholds::SMALLEST_EXCESS};
+use crate::{holdout::events::Events, input::hold::Held, thresholds::GAP_KNOWN};
 
 /// \[s\] a bootstrap block: longer than any motion of a hand or a table, and at least ten of them in a useful window.
 pub const BLOCK_S: f64 = 10.0;
@@ -93,7 +93,7 @@ impl Sums {
     /// `None` where there is no gap to shrink.
     fn percent(self) -> Option<f64> {
         let [before, after, floor] = [self.before, self.after, self.floor].map(|energy| self.gap(energy));
-        (before - floor > SMALLEST_EXCESS).then(|| 100.0 * (before - after) / (before - floor))
+        (before - floor > GAP_KNOWN).then(|| 100.0 * (before - after) / (before - floor))
     }
 }
 

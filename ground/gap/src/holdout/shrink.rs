@@ -1,6 +1,6 @@
 //! How far a held-out gap shrinks, and what that says of an effect: what [`crate::input::hold::Held::judge`] gives.
 
-use crate::thresholds::{SAME_SHRINK, SMALLEST_EXCESS};
+use crate::thresholds::GAP_KNOWN;
 
 /// One channel's gap.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,7 +58,7 @@ impl Shrink {
     /// this is withdrawn, whatever its evidence.
     pub fn supports_the_effect(&self) -> bool {
         self.interval_percent[0] > 0.0
-            && self.beyond_recalibration[1] >= -SAME_SHRINK * (self.before - self.floor).max(0.0)
+            && self.beyond_recalibration[1] >= -GAP_KNOWN * (self.before - self.floor).max(0.0)
     }
 }
 
@@ -67,7 +67,7 @@ impl Shrink {
 pub fn ceiling_percent([before, floor]: [f64; 2], parameters: usize, snr: f64) -> f64 {
     let lost = (parameters as f64 / (snr * snr)).min(1.0);
     let [excess, least] = [before * before - floor * floor, floor * floor];
-    if before - floor > SMALLEST_EXCESS && snr > 0.0 {
+    if before - floor > GAP_KNOWN && snr > 0.0 {
         100.0 * (before - (least + excess * lost).sqrt()) / (before - floor)
     } else {
         0.0

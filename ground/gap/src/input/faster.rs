@@ -21,7 +21,7 @@ use twin::{
     predict::{Kind, UnitDescription},
 };
 
-use crate::{input::log::Log, thresholds::ROWS_CHANCE};
+use crate::{input::log::Log, thresholds::RARE};
 
 /// \[Hz\] from which a line is looked for: references are used up to 20 Hz ([`twin::motion::Recorded::used`]), and their smoothing ends a little above.
 const FASTER_HZ: f64 = 25.0;
@@ -91,9 +91,9 @@ fn line(unit: &UnitDescription, steps: &Steps, bins: &Range<usize>, spectra: &[O
         let near = steps.near(peak, bins.len());
         let is_alone = (0..sums.len()).all(|bin| near.contains(&bin) || 2.0 * sums[bin] < highest);
         let nats = -tail(highest, accelerometers.len()) - (bins.len() as f64).ln();
-        (is_alone && nats > -ROWS_CHANCE.ln()).then(|| {
+        (is_alone && nats > -RARE.ln()).then(|| {
             let all = accelerometers.into_iter().chain(own(Kind::Gyro));
-            let is_in = |(_, own): &(usize, &Spectrum)| tail(own.over_level[peak], 1) < ROWS_CHANCE.ln();
+            let is_in = |(_, own): &(usize, &Spectrum)| tail(own.over_level[peak], 1) < RARE.ln();
             let size = |(channel, own): (usize, &Spectrum)| (channel, own.amplitude(near.clone()));
             Line {
                 hz: (bins.start + peak) as f64 * steps.bin_hz(),

@@ -24,7 +24,7 @@ use twin::predict::{Kind, UnitDescription};
 
 use crate::{
     input::log::{Log, Series},
-    thresholds::{ROWS_CHANCE, SAID},
+    thresholds::{RARE, SAID},
 };
 
 /// Axes of a part that are taken together.
@@ -119,7 +119,7 @@ pub fn by_axes(log: &Log, unit: &UnitDescription, kinds: &[Kind]) -> Vec<Repeats
             chance,
         }
     };
-    let least = (parts.len().max(1) as f64 / ROWS_CHANCE).ln();
+    let least = (parts.len().max(1) as f64 / RARE).ln();
     let all = parts.iter().map(of_part);
     all.filter(|repeats| repeats.nats > least).collect()
 }

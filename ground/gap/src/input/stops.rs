@@ -11,7 +11,7 @@
 
 use twin::predict::{Kind, UnitDescription};
 
-use crate::{input::log::Log, thresholds::ROWS_CHANCE};
+use crate::{input::log::Log, thresholds::RARE};
 
 /// Readings inside the largest that say how often two are the same: each further one at the stop is then worth 5.5 nats at most.
 const INSIDE: usize = 256;
@@ -45,7 +45,7 @@ pub fn stops(log: &Log, unit: &UnitDescription) -> Vec<Stop> {
         let same = inside.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let chance = (same + 1) as f64 / INSIDE as f64;
         let nats = -(many as f64 - 1.0) * chance.ln() - sides.ln();
-        (nats > -ROWS_CHANCE.ln()).then_some(Stop {
+        (nats > -RARE.ln()).then_some(Stop {
             channel,
             at: sign * largest,
             nats,

@@ -5,7 +5,7 @@
 //!
 //! - **Samples sent twice.** The three axes of a part repeat their codes together by chance rarely, and as often as those of
 //!   the other parts of its kind do. More repeats than Poisson's law allows at the largest rate among the others
-//!   ([`ROWS_CHANCE`]) are old samples; and so are more than its axes would make each by itself ([`crate::input::repeats`]), which
+//!   ([`RARE`]) are old samples; and so are more than its axes would make each by itself ([`crate::input::repeats`]), which
 //!   holds where all parts of a kind send some.
 //!   Few of them are seen where the others of the kind changed ([`moved`]). A gyro that is the only one of its plate is held against its own scatter ([`alone`]).
 //! - **Lost bits.** All codes of a channel lie a multiple of `n` apart. By chance all differences of `k` codes are even with
@@ -31,7 +31,7 @@ use crate::{
         repeats,
     },
     parity::lost::Loss,
-    thresholds::ROWS_CHANCE,
+    thresholds::RARE,
 };
 
 /// Samples from which codes say anything: that so many are all even is chance once in 2^63.
@@ -143,7 +143,7 @@ fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> bool) -
                 continue;
             };
             let tail = Poisson::new(rate * samples as f64).map_or(1.0, |law| law.sf((count as u64).saturating_sub(1)));
-            if count >= 1.0 && tail < ROWS_CHANCE / parts.len() as f64 {
+            if count >= 1.0 && tail < RARE / parts.len() as f64 {
                 found.push(old_samples(part.clone(), count, rate * samples as f64));
             }
         }
@@ -253,7 +253,7 @@ fn stuck(log: &Log, unit: &UnitDescription) -> Vec<Finding> {
         let others = others.filter(|(other, (own, _))| *other != index && own.sensor == channel.sensor);
         let quiet = others.map(|(_, (_, own))| repeated_since(own, series.rows[from]));
         let chance = quiet.fold(left_by_noise(channel), f64::max).powf(alike as f64);
-        (chance * (unit.channels.len() as f64) < ROWS_CHANCE).then_some(from)
+        (chance * (unit.channels.len() as f64) < RARE).then_some(from)
     };
     let channels = unit.channels.iter().zip(&log.channels).enumerate();
     let stuck = channels.filter_map(|(index, (channel, series))| Some((index, since(index, channel, series)?)));

@@ -38,7 +38,7 @@ use crate::{
         walk,
     },
     probability::outcome::Outcome,
-    thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNTOLD},
+    thresholds::{CHANCE, LISTED, MATTERS_SIGMA, PARITY_FREE, PARITY_GAP, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR},
 };
 
 /// A channel of the gap.
@@ -285,7 +285,7 @@ fn weigh(
         }
         if first_untold.is_none() && name.probability < SAID {
             let is_shown = held.is_some_and(is_shown) || walked.is_some();
-            let untold = if is_shown { 0.0 } else { name.probability / UNTOLD };
+            let untold = if is_shown { 0.0 } else { name.probability / SAID };
             first_untold = Some(untold);
         }
     }
@@ -307,7 +307,7 @@ pub fn confidence(by: By, held: Option<Promise>, by_parity: Option<Promise>) -> 
     match by {
         By::Codes | By::Axes | By::Turns => 1.0,
         By::Parity => of(held).unwrap_or(1.0),
-        By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(UNTOLD) * of(by_parity).unwrap_or(1.0),
+        By::Smoothing => of(held.filter(|held| is_shown(*held))).unwrap_or(SAID) * of(by_parity).unwrap_or(1.0),
     }
 }
 

@@ -10,7 +10,7 @@
 //!
 //! Far samples alone are no damage: a blow makes them. What a reversed bit makes is a power of two in codes. Of samples
 //! that are off by any size, however large, one in [`ODDS`] comes as near to one as noise lets it; more than chance allows
-//! ([`ROWS_CHANCE`]) are damage. That chance is of samples that have nothing to do with each other. What lasts is no damage of packets, and passes
+//! ([`RARE`]) are damage. That chance is of samples that have nothing to do with each other. What lasts is no damage of packets, and passes
 //! slowly through powers of two: a part whose counts mean half as much, in a boost. So a sample has no say when the same part is far off in the packet
 //! before or after it too. Four gyros have one parity, which does not tell whose it is: there it is the one that leaves its own neighbours by as much. They
 //! have no say in whether there is damage.
@@ -22,7 +22,7 @@ use twin::predict::{Channel, Kind, UnitDescription};
 use crate::{
     input::log::Log,
     parity::codes::{Finding, sends_codes},
-    thresholds::ROWS_CHANCE,
+    thresholds::RARE,
 };
 
 /// Standard deviations from which a sample is left out: noise has one in 1e15, and what is nearer bends no motion by more than noise.
@@ -72,7 +72,7 @@ pub fn look(log: &Log, unit: &UnitDescription) -> Option<Finding> {
     let reversed: Vec<&Off> = far.iter().filter(|own| own.is_reversed_bit()).collect();
     let before = (reversed.len() as u64).checked_sub(1)?;
     let chance = Binomial::new(ODDS.recip(), far.len() as u64).map_or(1.0, |law| law.sf(before));
-    if chance >= ROWS_CHANCE {
+    if chance >= RARE {
         return None;
     }
     let mut channels: Vec<usize> = reversed.iter().map(|own| own.channel).collect();

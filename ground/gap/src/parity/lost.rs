@@ -16,10 +16,10 @@
 //!
 //! A loss of `n` packets has to win three comparisons. Each packet more is half as likely, which costs `n ln 2`.
 //!
-//! 1. Against chance. Any row may have it, and it must come by chance in less than [`ROWS_CHANCE`] of all logs:
+//! 1. Against chance. Any row may have it, and it must come by chance in less than [`RARE`] of all logs:
 //!
 //!    ```text
-//!    ln p_n(d((n + 1) cycle)) - n ln 2 - ln p_0(d(cycle)) - ln rows > -ln ROWS_CHANCE
+//!    ln p_n(d((n + 1) cycle)) - n ln 2 - ln p_0(d(cycle)) - ln rows > -ln RARE
 //!    ```
 //!
 //! 2. Against a jump: a field that steps, a blow. A jump may be of any size. Its law `q` is normal, has the shape of `p_0`, and is as wide
@@ -48,7 +48,7 @@ use crate::{
         law::{Law, MOST, about},
         turned::Turned,
     },
-    thresholds::{CHANCE, ROWS_CHANCE},
+    thresholds::{CHANCE, RARE},
 };
 
 /// Packets between two rows at most that have a law. Of the unit's cycle they are two seconds, and few motions are a cubic for longer.
@@ -278,7 +278,7 @@ struct Odds {
 
 impl Odds {
     fn is_loss(&self) -> bool {
-        self.chance > -ROWS_CHANCE.ln() && self.jump > -CHANCE.ln()
+        self.chance > -RARE.ln() && self.jump > -CHANCE.ln()
     }
 }
 

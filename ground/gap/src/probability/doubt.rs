@@ -27,7 +27,7 @@ use crate::{
         importance::{Course, Importance},
     },
     search::explanation::Explanation,
-    thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNLIKE, UNTOLD},
+    thresholds::{DOUBT_STEP, DOUBTED, REMAINDER, SAID, STRENGTH_SHOWN, UNKNOWN_PRIOR, UNLIKE},
     unknown::adequacy::Leftover,
 };
 
@@ -272,7 +272,7 @@ pub fn promises(
         let in_means = is_inexact.then(|| promise_in(Some(&stretches))).flatten();
         let is_shown = |promise: &Promise| promise.sigma <= STRENGTH_SHOWN;
         let promise = in_means.filter(is_shown).or_else(|| promise_in(None));
-        let confidence = promise.map_or(UNTOLD, |promise| promise.confidence());
+        let confidence = promise.map_or(SAID, |promise| promise.confidence());
         let believed = cause.probability;
         cause.probability *= confidence;
         Promised {

@@ -10,13 +10,14 @@ use std::fmt::Write;
 
 pub use place::{places, when};
 pub use shrink::shrink;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 pub use wrap::wrapped;
 
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     report::gained::gained,
-    thresholds::{CHANCE, HELPED, REMAINS},
+    thresholds::{CHANCE, MOST_OF_A_GAP, RARE},
 };
 
 /// Detection limits that are printed.
@@ -118,9 +119,12 @@ fn gross(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std::fm
 /// Channels of a table whose held-out gap remains and that no cause helps beyond recalibration, with the change between
 /// repeats.
 fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
+    let channels = diagnosis.shrink.channels.len() as f64;
     let is_left = |channel: usize| {
         let own = &diagnosis.shrink.channels[channel];
-        own.after > REMAINS && own.after > HELPED * own.recalibrated
+        let samples = own.samples as f64;
+        let by_noise = ChiSquared::new(samples).map_or(1.0, |law| law.sf(samples * own.after * own.after));
+        by_noise * channels < RARE && own.after > MOST_OF_A_GAP * own.recalibrated
     };
     let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
     repeats.map(|repeat| (repeat.channel, repeat.change)).collect()

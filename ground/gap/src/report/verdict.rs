@@ -7,7 +7,7 @@ use twin::predict::Kind;
 
 use crate::{
     diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::terminal,
-    thresholds::MOST_OF_EXCESS,
+    thresholds::MOST_OF_A_GAP,
 };
 
 /// The whole file.
@@ -256,7 +256,7 @@ fn of_cause(subject: &Subject, cause: &crate::probability::cause::Cause) -> Caus
 fn unexplained(diagnosis: &Diagnosis) -> Option<Place> {
     let (mut channels, mut share) = (Vec::new(), 0.0);
     for (name, part) in &diagnosis.place.channels {
-        if share >= MOST_OF_EXCESS || *part <= 0.0 {
+        if share >= MOST_OF_A_GAP || *part <= 0.0 {
             break;
         }
         channels.push(name.clone());

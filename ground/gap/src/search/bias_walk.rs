@@ -12,6 +12,7 @@
 use std::f64::consts::{PI, SQRT_2};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{
     effect::{Effect, LIBRARY, Texture},
     predict::Kind,
@@ -24,7 +25,7 @@ use crate::{
         problem::{Component, Frame, Problem},
     },
     search::scatter::Scatter,
-    thresholds::{WALK_FEWEST, WALK_OFF},
+    thresholds::{SELDOM, WALK_FEWEST},
 };
 
 /// Terms of a walk. What they leave is 0.6 % of its power (the sum of `2/x_k^2` beyond), in five minutes that of periods
@@ -128,7 +129,8 @@ impl Walk {
             ((energy / count).cbrt() - (1.0 - spread)) / spread.sqrt()
         };
         let off: Vec<f64> = octaves.map(off).collect();
-        off.iter().map(|off| off * off).sum::<f64>() < WALK_OFF
+        let energy: f64 = off.iter().map(|off| off * off).sum();
+        ChiSquared::new(off.len() as f64).is_ok_and(|law| law.sf(energy) > SELDOM)
     }
 
     /// Frames of the problem with it open.

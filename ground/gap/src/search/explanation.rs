@@ -29,7 +29,7 @@ use crate::{
         scatter::{Scatter, scatters},
         walked::{Contest, walked, walked_in_colour},
     },
-    thresholds::{COUNTED_PART, EFFECT_MARGIN, MOST_CAUSES, REMAINDER, SAID, WALK_FEWEST},
+    thresholds::{COUNTED_PART, MOST_CAUSES, REMAINDER, SAID, WALK_FEWEST, effect_margin},
 };
 
 /// The effects that a log speaks for.
@@ -80,7 +80,7 @@ impl Explanation {
         let beside = (!is_inexact)
             .then(|| walked(problem, library, &first, withheld, progress))
             .flatten();
-        let beside = beside.filter(|walked| walked.gain() > explained + EFFECT_MARGIN);
+        let beside = beside.filter(|walked| walked.gain() > explained + effect_margin());
         let alone = alone.filter(|alone| !(is_inexact && is_walk(alone)));
         let is_alone = alone.is_some();
         let mut wanders = alone.as_ref().is_some_and(is_walk);
@@ -339,7 +339,7 @@ fn factors(rest: &[DVector<f64>], louder: &[f64], scatter: Option<&Scatter>) -> 
 
 fn best_scatter(problem: &Problem, model: &Model, withheld: &[String]) -> Option<Scatter> {
     let all = scatters(problem, model, withheld);
-    all.into_iter().next().filter(|scatter| scatter.gain > EFFECT_MARGIN)
+    all.into_iter().next().filter(|scatter| scatter.gain > effect_margin())
 }
 
 /// Whether an effect on the scatter, if it alone explains a log best, takes the place of what was found on readings: one that

@@ -11,7 +11,7 @@ use crate::{
     library::column::Entries,
     null::problem::Problem,
     search::interval_sums::{Residual, Steps, Stretches, Touched},
-    thresholds::{LEAST_PART, STRETCH_MARGIN},
+    thresholds::{DOUBTED, LEAST_PART},
 };
 
 /// Instants at which an effect may begin or end.
@@ -87,7 +87,7 @@ impl<'a> Tried<'a> {
         let step_s = (last_s - from_s) / (EDGES - 1) as f64;
         let price = price();
         let (gain, (on_s, off_s)) = best(&self.steps, &self.edges, &|_, _| true)?;
-        if gain <= STRETCH_MARGIN + price || (on_s == from_s && off_s == last_s) {
+        if gain <= DOUBTED + price || (on_s == from_s && off_s == last_s) {
             return None;
         }
         // Each edge nearer and nearer, down to a sample: one sample on the wrong side of a large step is an outlier.

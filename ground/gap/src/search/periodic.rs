@@ -13,7 +13,7 @@ use crate::{
         problem::Problem,
     },
     search::interval_sums::{Residual, Steps, Touched},
-    thresholds::{LEAST_PART, STRETCH_MARGIN},
+    thresholds::{DOUBTED, LEAST_PART},
 };
 
 /// Phases into which a period is folded.
@@ -83,7 +83,7 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
         let tried = (-2..=2).map(|index| 1.0 / (1.0 / every_s + hz_step * f64::from(index)));
         let best = tried.filter_map(|every_s| folded.best(every_s, from_s, &all).map(|best| (best, every_s)));
         let ((gain, [on, off]), period_s) = best.max_by(|one, other| one.0.0.total_cmp(&other.0.0))?;
-        if round >= SHOWN_AFTER && gain < 0.5 * (STRETCH_MARGIN + price) {
+        if round >= SHOWN_AFTER && gain < 0.5 * (DOUBTED + price) {
             return None;
         }
         every_s = period_s;
@@ -114,7 +114,7 @@ pub fn again(problem: &Problem, residual: &Residual, slopes: &[Entries], sigmas:
         *own > LEAST_PART * expected_there && *expected_there > LEAST_PART * expected / gains.len() as f64
     };
     let is_there = gains.iter().all(is_in);
-    (gain > STRETCH_MARGIN + price && is_there).then_some((on, gain - price))
+    (gain > DOUBTED + price && is_there).then_some((on, gain - price))
 }
 
 /// Periods that are tried in so long a time, but one.

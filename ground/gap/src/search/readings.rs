@@ -5,7 +5,7 @@
 //!
 //! A screen of all hypotheses costs matrices only ([`crate::null::evidence`]); the best few are then fitted by Gauss-Newton,
 //! because a latency of 12 ms is not small for a gyro on a table that starts and stops. An effect is added when its
-//! evidence, after the price of its prior odds, is above nothing by [`EFFECT_MARGIN`] nats; each chosen one is then tried against
+//! evidence, after the price of its prior odds, is above nothing by [`effect_margin`] nats; each chosen one is then tried against
 //! all rivals in its place, and dropped if the rest can do without it. An effect that comes and goes is screened with the
 //! stretch of time in which it explains most (`intervals`): one that is on for a quarter of the log looks like a step of
 //! another if it has to be on throughout.
@@ -36,7 +36,7 @@ use crate::{
     library::hypotheses::Library,
     null::problem::{Component, Problem},
     search::gauss_newton::{Refined, model_of, refine},
-    thresholds::{EFFECT_MARGIN, MOST_EFFECTS},
+    thresholds::{MOST_EFFECTS, effect_margin},
 };
 
 /// Rounds in which effects without parameters (signs, orders, ranges) are tried: they are gross, so they come first.
@@ -107,7 +107,7 @@ pub fn attribute(problem: &Problem, library: &mut Library, progress: &dyn Fn(f64
             }
         }
         match found {
-            Some((gain, larger)) if gain > EFFECT_MARGIN => {
+            Some((gain, larger)) if gain > effect_margin() => {
                 let span = larger.last().and_then(|added| stretches[*added]);
                 best = taken(problem, library, &larger, &best.thetas, span);
                 set = larger;

@@ -23,7 +23,7 @@ use crate::{
         odds::by_effect,
         readings::{Chosen, Rival, are_physical},
     },
-    thresholds::{EFFECT_MARGIN, SAID},
+    thresholds::{SAID, effect_margin},
 };
 
 /// The effect that what a model of those chosen leaves most likely is, with its rivals; free courses stand among them without a name.
@@ -85,7 +85,7 @@ pub fn recognised(
             });
         }
     }
-    let best = best.filter(|best| best.gain > EFFECT_MARGIN)?;
+    let best = best.filter(|best| best.gain > effect_margin())?;
     let own = library.hypotheses[best.hypothesis].cause.channels(unit);
     let is_rival = |one: &&Slow| one.channels.iter().any(|channel| own.contains(channel));
     let several = (slow.len() as f64).ln();

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     input::case::{Bars, SlowErrors},
     null::{model::Model, problem::Problem},
-    thresholds::{FILTER_S, REFERENCE_SIGMAS, SAID},
+    thresholds::{CHANCE, FILTER_S, SAID, sigmas},
 };
 
 /// Quantiles of an interval: 5 %, the middle, 95 %.
@@ -140,7 +140,7 @@ pub fn remainder(problem: &Problem, model: &Model, floor: &[Vec<f64>], setting: 
     let of_sensor = Bar::of(&fast, setting.bars, sensor_of, is_there);
     let of_fast = fast.iter().map(|fast| {
         // All frequencies are in it: what the reference errs by slowly too, which an axis across gravity sees more of than others.
-        let off = REFERENCE_SIGMAS * off(problem, Where::Sensor(fast.channel), setting.slow) / fast.sigma;
+        let off = sigmas(CHANCE) * off(problem, Where::Sensor(fast.channel), setting.slow) / fast.sigma;
         let bar = of_sensor.over(fast).max(off * off);
         let sigma = GAUSSIAN.map(|many| (fast.excess + many * fast.error).max(0.0).sqrt());
         let present = present(fast.log_bayes_factor, several);
@@ -181,7 +181,7 @@ fn bar(problem: &Problem, slow: &Slow, setting: &Setting) -> f64 {
     let attitude = degrees(problem, slow.place).map_or(f64::INFINITY, |degrees| setting.bars.attitude_deg / degrees);
     sigma
         .min(attitude)
-        .max(REFERENCE_SIGMAS * off(problem, slow.place, setting.slow))
+        .max(sigmas(CHANCE) * off(problem, slow.place, setting.slow))
 }
 
 fn kind(problem: &Problem, place: Where) -> Option<Kind> {

@@ -7,8 +7,21 @@ use serde_json::json;
 
 use crate::{
     parity::chips::{Beside, joined::Sized},
-    thresholds::{CHIP_DEG, CHIP_SIGMAS},
+    thresholds::{LEAST_PART, MATTERS_DEG, SELDOM, sigmas},
 };
+
+/// Cross axes and scales of two kinds of sensor.
+const NUMBERS: f64 = 18.0;
+
+/// \[sigmas\] from which on a number is known to be there, as many as a chip has of them.
+fn known_from() -> f64 {
+    sigmas(SELDOM / NUMBERS)
+}
+
+/// \[deg\] from which on it is told: smaller ones need nobody.
+fn least_deg() -> f64 {
+    LEAST_PART * MATTERS_DEG
+}
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -56,7 +69,7 @@ fn differs(sized: &Sized) -> String {
     for (row, reads) in AXES.iter().enumerate() {
         for (column, of) in AXES.iter().enumerate() {
             let (size, sigma) = (sized.matrix[(row, column)], sized.sigmas[(row, column)]);
-            let is_told = size.abs() > CHIP_SIGMAS * sigma && size.abs().to_degrees() > CHIP_DEG;
+            let is_told = size.abs() > known_from() * sigma && size.abs().to_degrees() > least_deg();
             if is_told && row == column {
                 told.push(format!("scale {} {:.3} +- {:.3} %", reads, 1e2 * size, 1e2 * sigma));
             } else if is_told {
@@ -77,9 +90,10 @@ fn differs(sized: &Sized) -> String {
 /// A turn is antisymmetric, and accelerometers on the same chip show it.
 pub fn turned_or_crossed(own: &Beside) -> Option<String> {
     let gyros = own.joined.rates.as_ref()?;
-    let known = |at: &(usize, usize)| gyros.matrix[*at].abs() - CHIP_SIGMAS * gyros.sigmas[*at];
-    let beside =
-        |(row, column): &(usize, usize)| row != column && gyros.matrix[(*row, *column)].abs().to_degrees() > CHIP_DEG;
+    let known = |at: &(usize, usize)| gyros.matrix[*at].abs() - known_from() * gyros.sigmas[*at];
+    let beside = |(row, column): &(usize, usize)| {
+        row != column && gyros.matrix[(*row, *column)].abs().to_degrees() > least_deg()
+    };
     let all = (0..9).map(|at| (at / 3, at % 3)).filter(beside);
     let (row, column) = all.max_by(|one, other| known(one).total_cmp(&known(other)))?;
     if known(&(row, column)) < 0.0 {
@@ -89,10 +103,10 @@ pub fn turned_or_crossed(own: &Beside) -> Option<String> {
     let sigma = gyros.sigmas[(row, column)].hypot(gyros.sigmas[(column, row)]);
     let forces = own.joined.forces.as_ref()?;
     let (shown, shown_sigma) = (forces.matrix[(row, column)], forces.sigmas[(row, column)]);
-    let is_shown = (shown - size).abs() < CHIP_SIGMAS * shown_sigma.hypot(gyros.sigmas[(row, column)]);
+    let is_shown = (shown - size).abs() < known_from() * shown_sigma.hypot(gyros.sigmas[(row, column)]);
     let is_hidden = shown.abs() < 0.5 * size.abs() && !is_shown;
-    let is_turn = (size + across).abs() < CHIP_SIGMAS * sigma;
-    let is_even = (size - across).abs() < CHIP_SIGMAS * sigma;
+    let is_turn = (size + across).abs() < known_from() * sigma;
+    let is_even = (size - across).abs() < known_from() * sigma;
     let pair = format!(
         "{} on {} and {} on {}",
         AXES[row], AXES[column], AXES[column], AXES[row]

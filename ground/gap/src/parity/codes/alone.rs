@@ -16,7 +16,7 @@ use twin::predict::{Channel, Kind, UnitDescription};
 use super::{AXES, Finding, code, old_samples, sends_codes};
 use crate::{
     input::log::{Log, Series},
-    thresholds::{ROWS_CHANCE, SAID},
+    thresholds::{RARE, SAID},
 };
 
 /// Changes of each size from which the law of codes is known: to a quarter.
@@ -29,7 +29,7 @@ pub fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> boo
         .collect();
     let of_group = |group: &str| gyros.iter().filter(|own| unit.channels[**own].group == group).count();
     let is_alone = |channel: &&usize| of_group(&unit.channels[**channel].group) < AXES;
-    let least = (gyros.len().max(1) as f64 / ROWS_CHANCE).ln();
+    let least = (gyros.len().max(1) as f64 / RARE).ln();
     let alone = gyros.iter().filter(is_alone).filter(|channel| !is_spoilt(**channel));
     alone
         .filter_map(|channel| {

@@ -15,7 +15,7 @@ use twin::predict::{Channel, UnitDescription};
 use super::{Finding, LEAST, code, sends_codes};
 use crate::{
     input::log::{Log, Series},
-    thresholds::ROWS_CHANCE,
+    thresholds::RARE,
 };
 
 /// Channels with a bit that never changes.
@@ -52,7 +52,7 @@ fn of_channel(channel: &Channel, series: &Series, channels: usize) -> Option<Str
         let is_other = |pair: &&[i64]| pair[0] >> (bit + 1) != pair[1] >> (bit + 1);
         let changes = codes.windows(2).filter(is_other).count();
         let looked_at = (channels * bits as usize) as f64;
-        let is_beyond = looked_at * 0.5_f64.powi(changes as i32) < ROWS_CHANCE;
+        let is_beyond = looked_at * 0.5_f64.powi(changes as i32) < RARE;
         is_beyond.then(|| {
             let always = i64::from(is_set);
             format!("bit {bit} is always {always}, while those above it changed {changes} times")

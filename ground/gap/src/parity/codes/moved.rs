@@ -6,7 +6,7 @@
 //! part reads along its axes is a vector; along those of this part it comes to `p`, off by noise and by [`ELSEWHERE`] of itself:
 //! `s^2 = 4 (NOISIER sigma)^2 + (ELSEWHERE p)^2`, for both differences have the noise of two samples. That all axes repeat is then no likelier than
 //! `exp(-sum p^2/s^2 / 2)`, and of several other parts the one counts that makes it likeliest. Where the sum of these chances over all rows that moved
-//! leaves Chernoff's bound of Poisson's tail below [`ROWS_CHANCE`], the samples are old.
+//! leaves Chernoff's bound of Poisson's tail below [`RARE`], the samples are old.
 //!
 //! One part that reads something of its own, a magnet or a reversed bit, makes no row move, for two others have to. A part that does not
 //! change as the others say in most rows has another place or another field, and is not looked at.
@@ -17,7 +17,7 @@ use twin::predict::{Kind, UnitDescription};
 use super::{AXES, Finding, parts};
 use crate::{
     input::log::Log,
-    thresholds::{ROWS_CHANCE, SAID},
+    thresholds::{RARE, SAID},
 };
 
 /// Part of a change that is another one elsewhere on the unit, and some 20 of a packet's 200 ms later. Assumed; a larger one asks for quicker turns.
@@ -45,7 +45,7 @@ pub fn stale(log: &Log, unit: &UnitDescription, is_spoilt: &dyn Fn(usize) -> boo
     };
     let kinds = [Kind::Accelerometer, Kind::Magnetometer].map(of_kind);
     let looked_at = kinds.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-    let least = (looked_at / ROWS_CHANCE).ln();
+    let least = (looked_at / RARE).ln();
     let found = kinds.iter().flat_map(|kind| {
         let old = |part: &'_ Part| part.old(kind);
         kind.iter().filter_map(move |part| Some((old(part)?, part)))

@@ -19,7 +19,7 @@
 //! than `s_az cos el`; no nose is known better to its side than upward, so there stands `s_el` at least.
 //!
 //! Of this flight: `e' (S + C)^-1 e`, `C` being the covariance of the attitude without them, has a chi-square law of three degrees of freedom. An instant is
-//! not used where as much comes once in a thousand by chance, over all instants ([`NOT_OF_THIS_FLIGHT`]; Bonferroni); the others are.
+//! not used where as much comes once in a thousand by chance, over all instants ([`SELDOM`]; Bonferroni); the others are.
 
 use std::fmt::Write;
 
@@ -38,7 +38,7 @@ use crate::{
         },
     },
     report::verdict::rounded,
-    thresholds::NOT_OF_THIS_FLIGHT,
+    thresholds::SELDOM,
 };
 
 /// \[deg\] standard deviation of an angle that may be anything: 360 over the root of 12.
@@ -166,7 +166,7 @@ impl Instants {
                 off_deg: off.norm().to_degrees(),
                 sigma_deg: axis.dot(&(whole * axis)).max(0.0).sqrt().to_degrees(),
                 chance,
-                is_used: chance >= NOT_OF_THIS_FLIGHT,
+                is_used: chance >= SELDOM,
             }
         };
         self.all.iter().zip(known).map(of).collect()

@@ -17,7 +17,7 @@
 //! scatters less about the same mean where it does not. So has the mean of the acceleration's, whose `C` is `[f]x C [f]x'` and the noise of
 //! the accelerometers. Whether the errors of several phases go together (a heading does, a thrust does not) nobody states, so the sum
 //! over phases has no law. It is of another flight where the least of the chances, times how many there are, is below one in a thousand
-//! ([`NOT_OF_THIS_FLIGHT`]; Bonferroni, which holds whichever way they go together).
+//! ([`SELDOM`]; Bonferroni, which holds whichever way they go together).
 //!
 //! Refuses a file without positions where a distrust of accelerations is stated.
 
@@ -42,7 +42,7 @@ use crate::{
         },
     },
     report::verdict::rounded,
-    thresholds::NOT_OF_THIS_FLIGHT,
+    thresholds::SELDOM,
 };
 
 /// A stretch of the log in which a trajectory is believed within a distrust.
@@ -176,7 +176,7 @@ impl Simulated {
             return Belief::Elsewhere;
         };
         let chance = chance(&energies);
-        if chance < NOT_OF_THIS_FLIGHT {
+        if chance < SELDOM {
             Belief::OfAnother(worst)
         } else {
             Belief::Used { chance, worst }
@@ -342,7 +342,7 @@ mod tests {
         // 1 in 27 each; were they five errors, their sum would be 1 in 5000.
         assert!(chance(&[8.5; 5]) > 0.1);
         // 16.3 is once in a thousand, and 21 once in ten thousand.
-        assert!(chance(&[1.0, 17.0]) > NOT_OF_THIS_FLIGHT && chance(&[1.0, 21.0, 2.0]) < NOT_OF_THIS_FLIGHT);
+        assert!(chance(&[1.0, 17.0]) > SELDOM && chance(&[1.0, 21.0, 2.0]) < SELDOM);
         assert!((chance(&[0.0, 0.0]) - 1.0).abs() < f64::EPSILON);
     }
 

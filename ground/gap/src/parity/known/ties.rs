@@ -17,7 +17,7 @@ use crate::{
         smooth::{basis::Knots, prior::Prior, trajectory::Trajectory},
     },
     report::verdict::rounded,
-    thresholds::NOT_OF_THIS_FLIGHT,
+    thresholds::SELDOM,
 };
 
 /// What a motion is tied to.
@@ -84,7 +84,7 @@ impl Use {
             offset_s: aligned.offset_s,
         };
         let chance = ChiSquared::new(free).map_or(0.0, |law| law.sf(energy));
-        if chance < NOT_OF_THIS_FLIGHT {
+        if chance < SELDOM {
             Use::Misfit(fit)
         } else {
             Use::Used(fit)

@@ -19,7 +19,7 @@ use crate::{
     null::{interval::begins_s, problem::Component},
     parity::space::{Projected, Space},
     search::between::{climbed, half_ways},
-    thresholds::EFFECT_MARGIN,
+    thresholds::effect_margin,
 };
 
 /// Part of the best gain from which a value is moved, which bounds the time it takes. Assumed: a line half a step off still explains four tenths of what it
@@ -121,7 +121,7 @@ pub fn told_anew(
             fit_alone(library, one).map_or(f64::NEG_INFINITY, |fit| fit.gain)
         };
         let [as_it_was, _] = [cause.variant, value].map(&mut at);
-        (told.gain > as_it_was + EFFECT_MARGIN).then_some(told)
+        (told.gain > as_it_was + effect_margin()).then_some(told)
     };
     (0..model.len()).map(&mut anew).collect()
 }

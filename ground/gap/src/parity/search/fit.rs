@@ -19,7 +19,7 @@ use crate::{
         walk,
     },
     search::odds::{itself, oversize},
-    thresholds::{DOUBT_STEP, DOUBTED, EFFECT_MARGIN, TEMPERATURE, UNTOLD},
+    thresholds::{DOUBT_STEP, DOUBTED, SAID, TEMPERATURE, effect_margin},
 };
 
 /// A hypothesis fitted.
@@ -204,7 +204,7 @@ pub(super) fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)])
         let score = |(at, fit): &(usize, Fit)| fit.gain / TEMPERATURE + prior(*at);
         score(one).total_cmp(&score(other))
     })?;
-    if fit.gain + prior(*best) < EFFECT_MARGIN {
+    if fit.gain + prior(*best) < effect_margin() {
         return None;
     }
     let hypothesis = &library.hypotheses[*best];
@@ -223,7 +223,7 @@ pub(super) fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)])
     let is_as_good = |(at, other): &&(usize, Fit)| {
         let is_same = library.hypotheses[*at].effect() == hypothesis.effect();
         let is_elsewhere = library.hypotheses[*at].cause.locality != hypothesis.cause.locality;
-        is_same && is_elsewhere && other.gain > fit.gain - EFFECT_MARGIN
+        is_same && is_elsewhere && other.gain > fit.gain - effect_margin()
     };
     let snr = (seen.iter().find(|one| one.hypothesis == *best)).map_or(0.0, |one| one.snr);
     // Of others whoever offers them has asked: several logs, one of them with a reference, show more than parity.
@@ -237,7 +237,7 @@ pub(super) fn likeliest(library: &Library, seen: &[Seen], fits: &[(usize, Fit)])
         snr,
         found_snr: fit.energy.max(0.0).sqrt(),
         // Beyond its largest size it stands for something else, as in the search with a reference.
-        probability: own * doubt * itself(excess) * if is_shown { 1.0 } else { UNTOLD },
+        probability: own * doubt * itself(excess) * if is_shown { 1.0 } else { SAID },
         rivals: by_effect,
     })
 }

@@ -11,13 +11,10 @@ use twin::{
     predict::{Kind, UnitDescription},
 };
 
-use crate::input::log::Log;
+use crate::{input::log::Log, thresholds::SELDOM};
 
 /// \[s\] of a window: a hand does not hold still for so long.
 const WINDOW_S: f64 = 2.0;
-
-/// Probability below which a window is not one of rest.
-const UNLIKELY: f64 = 1e-3;
 
 /// Share of gravity: far above what a calibration leaves open, far below what a flight feels.
 const ABOUT_GRAVITY: f64 = 0.05;
@@ -70,5 +67,5 @@ fn is_rest(log: &Log, unit: &UnitDescription, environment: &Environment, (from_s
     let force_b = normal.try_inverse().map(|inverse| inverse * right);
     let is_gravity = force_b
         .is_some_and(|force_b| (force_b.norm() - environment.gravity).abs() < ABOUT_GRAVITY * environment.gravity);
-    is_gravity && law.sf(energy) > UNLIKELY
+    is_gravity && law.sf(energy) > SELDOM
 }

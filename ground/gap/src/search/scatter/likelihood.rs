@@ -14,7 +14,7 @@ use super::{
 use crate::{
     null::{model::Model, problem::Problem},
     search::recalibrated::{as_described, recalibrated},
-    thresholds::{DRAGGED, REFERENCE_TAILS, SCATTER_NEAR},
+    thresholds::{RARE, REFERENCE_TAILS, SCATTER_NEAR, sigmas},
 };
 
 /// Steps of expectation and maximisation, and what one must bring \[nats\].
@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
         };
         (search.near, search.standing_out) = (near(Texture::Louder), near(Texture::Outliers));
         let described = |channel: usize| {
-            let is_dragged = model.fitted.nuisance[channel].amax() > DRAGGED;
+            let is_dragged = model.fitted.nuisance[channel].amax() > sigmas(RARE);
             is_dragged.then(|| search.near(channel, &as_described(problem, model, channel), Texture::Louder))
         };
         search.described = channels.clone().map(described).collect();

@@ -4,7 +4,7 @@ use twin::{effect::View, predict::Kind};
 
 use crate::{
     null::calibration::instant_sigma_s,
-    thresholds::{COLOURED, ODD, STANDS_OUT},
+    thresholds::{CHANCE, COLOURED, STANDS_OUT, sigmas},
 };
 
 /// [standard deviations] how far energy, tails and neighbours of a residual are from the nominal.
@@ -13,7 +13,7 @@ pub type Oddness = [f64; 3];
 /// Whether one of some channels does not scatter as described. Only such are looked at closely, which costs a thousand
 /// likelihoods: no effect that leaves energy, tails and neighbours alone would gain its price.
 pub fn is_odd(channels: &[Oddness]) -> bool {
-    channels.iter().flatten().any(|own| own.abs() > ODD)
+    channels.iter().flatten().any(|own| own.abs() > sigmas(CHANCE))
 }
 
 /// Whether all of them scatter otherwise the same way.

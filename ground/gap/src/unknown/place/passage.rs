@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use crate::{
     input::windows::Span,
     null::problem::Problem,
-    thresholds::{MOST_OF_EXCESS, PASSAGE_QUIET, STRETCH_MARGIN},
+    thresholds::{DOUBTED, MOST_OF_A_GAP, PASSAGE_QUIET},
 };
 
 /// Stretches that the fit windows are cut into.
@@ -67,7 +67,7 @@ pub fn find(problem: &Problem, rests: &[DVector<f64>], excess: &[f64]) -> Option
     let whole: f64 = order.iter().map(|channel| excess[*channel]).sum();
     let mut held = 0.0;
     order.retain(|channel| {
-        let is_needed = held < MOST_OF_EXCESS * whole;
+        let is_needed = held < MOST_OF_A_GAP * whole;
         held += excess[*channel];
         is_needed
     });
@@ -140,7 +140,7 @@ fn passage(energies: &[f64], counts: &[f64]) -> Option<(Edge, Edge)> {
     let (from, to, most) = gains.iter().copied().max_by(|one, other| one.2.total_cmp(&other.2))?;
     // The price of having compared so many pairs of edges.
     let pairs = (length * (length + 1) / 2) as f64;
-    if most < pairs.ln() + STRETCH_MARGIN {
+    if most < pairs.ln() + DOUBTED {
         return None;
     }
     let near = || gains.iter().filter(|(_, _, gain)| *gain > most - PROFILE);
