@@ -1,7 +1,7 @@
 //! When the unit rests: spans in which nothing that it reads changes, and it feels gravity.
 //!
 //! In: a log and its unit. Out: spans \[s\]. A window rests when the samples of every channel scatter about their mean no more than
-//! the described noise lets them, once in a thousand windows ([`UNLIKELY`]), and when the specific force is gravity's within
+//! the described noise lets them, once in a thousand windows ([`SELDOM`]), and when the specific force is gravity's within
 //! [`ABOUT_GRAVITY`]: in free fall nothing may change either. Windows that touch are one span.
 
 use nalgebra::{Matrix3, Vector3};
