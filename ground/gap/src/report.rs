@@ -8,4 +8,5 @@ pub mod page;
 mod place_shares;
 pub mod plain;
 pub mod terminal;
+pub mod unit;
 pub mod verdict;

@@ -16,7 +16,7 @@ use crate::{
         visible::Row,
     },
     probability::outcome::Outcome,
-    report::terminal::wrapped,
+    report::{terminal::wrapped, unit::behind},
     thresholds::PARITY_SNR,
 };
 
@@ -174,8 +174,11 @@ pub fn why(flight: &Flight, findings: &Findings) -> String {
             let parameter = &sized.parameter;
             let _ = writeln!(
                 out,
-                "        {} {:.4e} +- {:.1e} {}",
-                parameter.name, sized.value, sized.sigma, parameter.unit
+                "        {} {:.4e} +- {:.1e}{}",
+                parameter.name,
+                sized.value,
+                sized.sigma,
+                behind(parameter.unit)
             );
         }
         if !name.or_at.is_empty() {

@@ -7,7 +7,7 @@ use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
     probability::{cause::Cause, outcome::Outcome},
-    report::gained::gained,
+    report::{gained::gained, unit::behind},
     thresholds::SAID,
 };
 
@@ -153,8 +153,9 @@ fn what(cause: &Cause) -> String {
     let sizes = cause.parameters.iter().take(SAID_OF).map(|sized| {
         let (value, error) = (sized.value, 1.96 * sized.sigma);
         format!(
-            "{} {value:.3e} ± {error:.0e} {}",
-            sized.parameter.name, sized.parameter.unit
+            "{} {value:.3e} ± {error:.0e}{}",
+            sized.parameter.name,
+            behind(sized.parameter.unit)
         )
     });
     let sizes: Vec<String> = sizes.collect();

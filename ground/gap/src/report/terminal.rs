@@ -16,7 +16,7 @@ pub use wrap::wrapped;
 use crate::{
     diagnose::Diagnosis,
     input::case::Subject,
-    report::gained::gained,
+    report::{gained::gained, unit::behind},
     thresholds::{CHANCE, MOST_OF_A_GAP, RARE},
 };
 
@@ -170,7 +170,7 @@ fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_exper
             .iter()
             .rev()
             .take(LIMITS)
-            .map(|limit| format!("{} {:.2e} {}", limit.effect, limit.size, limit.unit))
+            .map(|limit| format!("{} {:.2e}{}", limit.effect, limit.size, behind(limit.unit)))
             .collect();
         writeln!(
             text,

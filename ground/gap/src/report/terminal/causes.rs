@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::{diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, thresholds::SAID};
+use crate::{
+    diagnose::Diagnosis, input::case::Subject, probability::outcome::Outcome, report::unit::behind, thresholds::SAID,
+};
 
 /// Parameters of a cause that are printed; the rest is in the files.
 const PRINTED: usize = 4;
@@ -58,11 +60,11 @@ pub fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std
         for sized in cause.parameters.iter().take(PRINTED) {
             writeln!(
                 text,
-                "        {} = {:.4e} +- {:.1e} {}",
+                "        {} = {:.4e} +- {:.1e}{}",
                 sized.parameter.name,
                 sized.value,
                 1.96 * sized.sigma,
-                sized.parameter.unit
+                behind(sized.parameter.unit)
             )?;
         }
         if cause.parameters.len() > PRINTED {
