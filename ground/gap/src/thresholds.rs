@@ -105,15 +105,15 @@ thresholds! {
         larger: "fewer names, fewer of them wrong",
         smaller: "more names, more of them wrong",
         Convention("likelier than not");
-    /// Probability of what chance does once in a thousand. Beyond it a window is not at rest, a slow course is no walk, a motion that is told is another flight's, and a difference of two chips is told.
+    /// Probability of what chance does once in a thousand. What it does less often is not chance: then a window is not at rest, a slow course is no walk, a motion that is told is another flight's, and a difference of two chips is told.
     SELDOM: f64 = 1e-3, in "probability",
         larger: "rests, walks, tracks and simulated trajectories that are right are refused; differences of chips that are chance are told",
         smaller: "another slow effect is called a walk, and another flight's motion bends this one; small differences of chips are not told",
         Convention("one in a thousand: what is wrongly refused is said");
-    /// Probability of what chance does in one log of ten thousand. Beyond it rows are believed by themselves: old samples, damage, a line, lost packets. So are a dragged calibration and a gap of a table's channel, and more events than that are not looked for.
+    /// Probability of what chance does in one log of ten thousand. What it does less often is not chance: then rows tell by themselves of old samples, damage, a line or lost packets, a calibration counts as dragged, and a channel of a table has a gap left. More events than chance makes so seldom are not looked for.
     RARE: f64 = 1e-4, in "probability",
         larger: "chance is taken for old samples, damage, vibration and gaps of tables; many events are cut",
-        smaller: "few old samples, little damage and weak vibrations are not found; a dragged calibration hides its effect",
+        smaller: "few old samples, little damage and weak vibrations are not found; a dragged calibration hides its effect; fewer channels of tables are reported as left",
         Convention("one in ten thousand");
     /// Gain over that of the strongest effect at which a second one is as likely what the first one's law leaves over.
     REMAINDER: f64 = 0.005, in "part of the strongest gain",
@@ -140,7 +140,7 @@ thresholds! {
         larger: "shorter lists",
         smaller: "longer lists",
         Convention("half a percent");
-    /// The least part that counts. Each half of a stretch has to bring it of what is explained, and so has an effect that is to be seen coming and going beside others. Each third of the time has to bring it of what a periodic effect would be there, and to hold it of an even share. A calibration has to leave it of an effect that it does not imitate.
+    /// The least part that counts. Each half of a stretch has to bring it of what is explained, and so has an effect that is to be seen coming and going beside others. Each third of the time has to bring it of what a periodic effect would be there, and to hold it of an even share. A calibration has to leave it of an effect that it does not imitate. A cross axis of a chip is told from this part of an angle that matters.
     LEAST_PART: f64 = 0.1, in "part",
         larger: "short strong parts and uneven effects are taken for steady ones",
         smaller: "one blow makes a stretch, and what another law leaves over gets one; iron far beyond a zero's sigma has no name",
@@ -173,8 +173,8 @@ thresholds! {
         Convention("three sigma, 4.5 nats, below any price");
     /// Probability up to which chance is believed. It decides whether there is a gap, whether an effect is added (three nats beyond its price), whether a rival is listed, whether two effects are confused, and what share of the cells named may be wrong. As sigmas, which are two, it decides what scatter is looked at twice and what slow remainder may be the reference's.
     CHANCE: f64 = 0.05, in "probability",
-        larger: "wrong effects are added; more cells, more of them chance; shares of weak gaps are not printed; smaller sets",
-        smaller: "weak effects are not found; fewer cells; shares of noise are printed; larger sets",
+        larger: "wrong effects are added; errors of a reference are called unknown effects; more cells, more of them chance; shares of weak gaps are not printed; smaller sets",
+        smaller: "weak effects are not found; unknown effects are taken for the reference's; fewer cells; shares of noise are printed; larger sets",
         Convention("one in twenty");
     /// Of the mean inside a passage, what the mean outside it must stay below.
     PASSAGE_QUIET: f64 = 0.5, in "part",

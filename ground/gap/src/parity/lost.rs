@@ -303,6 +303,15 @@ mod tests {
     /// Three gyros and three magnetometers that turn about all axes, at up to `0.4 quick` rad/s about each, the field with so much
     /// noise \[uT\].
     fn turning(quick: f64, noise_ut: f64, seed: u64) -> (Log, UnitDescription) {
+        turning_without(&[], ROWS, (quick, noise_ut, seed))
+    }
+
+    /// The same of so many rows, with some of them lost and not counted.
+    fn turning_without(
+        lost: &[usize],
+        rows: usize,
+        (quick, noise_ut, seed): (f64, f64, u64),
+    ) -> (Log, UnitDescription) {
         let mut text = "name = \"x\"\ncycle_s = 0.2\n".to_owned();
         for index in 0..6 {
             let sensor = ["gyro", "magnetometer"][index / 3];
@@ -324,14 +333,17 @@ mod tests {
                 * quick
         };
         let mut attitude = Rotation3::identity();
-        for row in 0..ROWS {
+        for row in 0..rows {
             let start_s = 0.2 * row as f64;
-            log.begin_row(start_s);
             let rate = rate_b(start_s) + 0.005 * normal(&mut random);
             let field = attitude.inverse() * FIELD_N + noise_ut * normal(&mut random);
-            for (index, value) in rate.iter().chain(field.iter()).enumerate() {
-                log.channels[index].rows.push(row as u32);
-                log.channels[index].values.push(*value);
+            if !lost.contains(&row) {
+                let kept = log.start_s.len();
+                log.begin_row(0.2 * kept as f64);
+                for (index, value) in rate.iter().chain(field.iter()).enumerate() {
+                    log.channels[index].rows.push(kept as u32);
+                    log.channels[index].values.push(*value);
+                }
             }
             for step in 0..20 {
                 attitude *= Rotation3::new(rate_b(start_s + 0.01 * (f64::from(step) + 0.5)) * 0.01);
@@ -365,6 +377,17 @@ mod tests {
         let mut spans_s = vec![(0.0, 1.0), (1.0, 1.2), (4.0, 5.0)];
         put_back_spans(&mut spans_s, &[loss(1.0, 1), loss(4.0, 2)]);
         assert_eq!(spans_s, [(0.0, 1.0), (1.0, 1.4), (4.2, 5.6)]);
+    }
+
+    /// A law takes every third row of so long a log.
+    #[test]
+    fn a_loss_is_found_after_any_row_of_a_log_longer_than_a_law_needs() {
+        for lost in [2000, 2001, 2002] {
+            let (log, unit) = turning_without(&[lost], 2 * MOST + 100, (2.0, 0.2, 7));
+            let losses = Losses::of(&log, &unit);
+            let found: Vec<_> = losses.found.iter().map(|loss| (loss.after_s, loss.packets)).collect();
+            assert_eq!(found, [(0.2 * (lost - 1) as f64, 1)], "{:?}", losses.shown);
+        }
     }
 
     /// Of the logs of the seeds 100 to 159 these have a loss if chance is not asked.

@@ -8,9 +8,10 @@ mod wrap;
 
 use std::fmt::Write;
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 pub use place::{places, when};
 pub use shrink::shrink;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 pub use wrap::wrapped;
 
 use crate::{
@@ -122,12 +123,16 @@ fn unexplained(subject: &Subject, diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
     let channels = diagnosis.shrink.channels.len() as f64;
     let is_left = |channel: usize| {
         let own = &diagnosis.shrink.channels[channel];
-        let samples = own.samples as f64;
-        let by_noise = ChiSquared::new(samples).map_or(1.0, |law| law.sf(samples * own.after * own.after));
-        by_noise * channels < RARE && own.after > MOST_OF_A_GAP * own.recalibrated
+        by_noise(own.samples, own.after) * channels < RARE && own.after > MOST_OF_A_GAP * own.recalibrated
     };
     let repeats = subject.gross.repeats.iter().filter(|repeat| is_left(repeat.channel));
     repeats.map(|repeat| (repeat.channel, repeat.change)).collect()
+}
+
+/// Probability that noise alone leaves such a gap \[sigma\], or a larger one, of so many samples: their squares have a chi-square law.
+fn by_noise(samples: usize, gap: f64) -> f64 {
+    let samples = samples as f64;
+    ChiSquared::new(samples).map_or(1.0, |law| law.sf(samples * gap * gap))
 }
 
 fn write(text: &mut String, subject: &Subject, diagnosis: &Diagnosis, next_experiment: &str) -> std::fmt::Result {
@@ -235,4 +240,18 @@ fn held_out(text: &mut String, subject: &Subject, diagnosis: &Diagnosis) -> std:
         writeln!(text, "        worse: {}", worse.join(" "))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chi-square tables: of eight degrees of freedom 15.51 is exceeded with 0.05, and 26.12 with 0.001.
+    #[test]
+    fn a_gap_is_noise_as_often_as_the_table_of_its_samples_says() {
+        for (energy, probability) in [(15.51, 0.05), (26.12, 1e-3)] {
+            assert!((by_noise(8, f64::sqrt(energy / 8.0)) / probability - 1.0).abs() < 0.01);
+        }
+        assert!((by_noise(0, 9.0) - 1.0).abs() < f64::EPSILON, "no samples show nothing");
+    }
 }

@@ -10,20 +10,20 @@ use crate::{
     thresholds::{LEAST_PART, MATTERS_DEG, SELDOM, sigmas},
 };
 
-/// Cross axes and scales of two kinds of sensor.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Numbers of a chip that are looked at: scales and cross axes of its gyros, and of its accelerometers.
 const NUMBERS: f64 = 18.0;
 
-/// \[sigmas\] from which on a number is known to be there, as many as a chip has of them.
+/// \[sigmas\] from which on one of these numbers is known to be there (Bonferroni).
 fn known_from() -> f64 {
     sigmas(SELDOM / NUMBERS)
 }
 
-/// \[deg\] from which on it is told: smaller ones need nobody.
+/// \[deg\] from which on it is told. Nobody needs smaller ones.
 fn least_deg() -> f64 {
     LEAST_PART * MATTERS_DEG
 }
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A line and more a chip; nothing of a unit that has no two.
 pub fn lines(chips: &[Beside]) -> String {
